@@ -1,0 +1,49 @@
+"""tomomesh: slices or points in, a closed surface mesh with its proof out."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "PointSet": "model.points",
+    "Settings": "settings",
+    "TomomeshError": "errors",
+    "TriMesh": "model.mesh",
+    "Volume": "model.volume",
+    "assess": "measure.report",
+    "phantom": "phantom",
+    "read_mesh": "io",
+    "read_points": "io",
+    "read_volume": "io",
+    "reconstruct": "pipeline",
+    "reconstruct_points": "pipeline",
+    "segment": "pipeline",
+    "window": "segment.window",
+    "write_mesh": "io",
+}
+
+__all__ = [*_HOMES, "__version__"]  # noqa: PLE0604
+
+if TYPE_CHECKING:
+    from .errors import TomomeshError
+    from .io import read_mesh, read_points, read_volume, write_mesh
+    from .measure.report import assess
+    from .model.mesh import TriMesh
+    from .model.points import PointSet
+    from .model.volume import Volume
+    from .phantom import phantom
+    from .pipeline import reconstruct, reconstruct_points, segment
+    from .segment.window import window
+    from .settings import Settings
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for, so that ``--help`` starts at once."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'tomomesh' has no attribute '{name}'")
+    value = getattr(import_module(f"tomomesh.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value

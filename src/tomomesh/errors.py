@@ -1,0 +1,89 @@
+"""The errors that tomomesh raises: one family, one line each, one exit code a kind."""
+
+from __future__ import annotations
+
+
+class TomomeshError(Exception):
+    """Say in one line what is wrong, where, what was expected and what to try.
+
+    Parameters
+    ----------
+    what : str
+        The fault, without a full stop.
+    file : str, optional
+        The path as the user typed it, or the bare name of a file inside it.
+    found : str, optional
+        The field and its value, as ``"spacing = 0"``.
+    expected : str, optional
+        The rule that was broken.
+    hint : str, optional
+        The flag or action that may help.
+    """
+
+    exit_code = 1
+
+    def __init__(
+        self, what: str, *, file: str = "", found: str = "", expected: str = "", hint: str = ""
+    ) -> None:
+        where = f" File: {_plain(file)}" if file else ""
+        where += (" " if where else " Found: ") + f"[{_plain(found)}]" if found else ""
+        parts = [
+            f"{_plain(what)}.",
+            f"{where.strip()}." if where else "",
+            f"Expected: {expected}." if expected else "",
+            f"Try: {hint}." if hint else "",
+        ]
+        super().__init__(" ".join(part for part in parts if part))
+
+
+def _plain(text: str) -> str:
+    """Replace control characters, so that no file name or tag can write to a terminal or a log."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
+class UsageError(TomomeshError):
+    """A parameter is outside its limits, or two of them contradict each other."""
+
+    exit_code = 2
+
+
+class UnreadableError(TomomeshError):
+    """The path does not exist, is empty or may not be read."""
+
+    exit_code = 3
+
+
+class FormatError(TomomeshError):
+    """The file is corrupt, or of a kind that cannot be read."""
+
+    exit_code = 4
+
+
+class GeometryError(TomomeshError):
+    """The geometry of the study or of the cloud needs a decision or a flag."""
+
+    exit_code = 5
+
+
+class EmptyError(TomomeshError):
+    """Nothing is left to work on."""
+
+    exit_code = 6
+
+
+class ResourceError(TomomeshError):
+    """The work would not fit into the machine."""
+
+    exit_code = 7
+
+
+class OutputError(TomomeshError):
+    """A result cannot be written."""
+
+    exit_code = 8
+
+
+class InternalCheckError(TomomeshError):
+    """A result failed its own check before it was written: a bug in tomomesh."""
+
+    exit_code = 9

@@ -1,0 +1,1 @@
+"""Nouns: frozen dataclasses over plain arrays."""

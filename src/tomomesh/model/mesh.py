@@ -1,0 +1,105 @@
+"""Triangles with their adjacency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class TriMesh:
+    """A triangle mesh: two arrays, and whatever follows from them on first use.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float array
+        Positions (x, y, z).
+    faces : (m, 3) int64 array
+        Vertex numbers, counter-clockwise seen from outside.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+    def moved(self, vertices: NDArray[np.float64]) -> TriMesh:
+        """Return the same faces over other positions."""
+        return replace(self, vertices=vertices)
+
+    @cached_property
+    def corners(self) -> NDArray[np.float64]:
+        """Positions of the three corners of every face, (m, 3, 3)."""
+        return self.vertices[self.faces]
+
+    @cached_property
+    def face_vectors(self) -> NDArray[np.float64]:
+        """Outward normals whose length is twice the face's area, (m, 3)."""
+        a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def face_areas(self) -> NDArray[np.float64]:
+        """Areas of the faces, (m,)."""
+        return np.asarray(0.5 * np.sqrt((self.face_vectors**2).sum(axis=1)))
+
+    @cached_property
+    def half_edges(self) -> NDArray[np.int64]:
+        """Directed edges, three a face, (3m, 2)."""
+        return self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+
+    @cached_property
+    def edges(self) -> NDArray[np.int64]:
+        """Undirected edges, smaller vertex first, sorted, each once, (e, 2)."""
+        n = max(len(self.vertices), 1)
+        low, high = self.half_edges.min(axis=1), self.half_edges.max(axis=1)
+        keys = np.unique(low * n + high)
+        return np.stack([keys // n, keys % n], axis=1)
+
+    @cached_property
+    def vertex_normals(self) -> NDArray[np.float64]:
+        """Unit normals at the vertices, area-weighted, (n, 3)."""
+        total = np.stack(
+            [
+                np.bincount(self.faces.ravel(), np.repeat(self.face_vectors[:, axis], 3), len(self.vertices))
+                for axis in range(3)
+            ],
+            axis=1,
+        )
+        length = np.sqrt((total**2).sum(axis=1, keepdims=True))
+        return total / np.where(length > 0, length, 1.0)
+
+
+@dataclass(frozen=True)
+class QuadMesh:
+    """A cuberille: square faces on the lattice of cubes.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float array
+        Positions (x, y, z).
+    quads : (q, 4) int64 array
+        Vertex numbers, counter-clockwise seen from outside.
+    cubes : (q,) int64 array
+        The occupied cube behind each face.
+    """
+
+    vertices: NDArray[np.float64]
+    quads: NDArray[np.int64]
+    cubes: NDArray[np.int64]
+
+    @cached_property
+    def edges(self) -> NDArray[np.int64]:
+        """Undirected sides of the squares, each once, (e, 2)."""
+        n = max(len(self.vertices), 1)
+        ends = self.quads[:, [0, 1, 1, 2, 2, 3, 3, 0]].reshape(-1, 2)
+        keys = np.unique(ends.min(axis=1) * n + ends.max(axis=1))
+        return np.stack([keys // n, keys % n], axis=1)
+
+    def triangulated(self) -> TriMesh:
+        """Split each square by its diagonal 0-2 (the paper's systematic triangulation, Fig. 8b)."""
+        return TriMesh(self.vertices, self.quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3))

@@ -1,0 +1,40 @@
+"""The trained networks of a study."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from .lattice import Lattice
+
+
+@dataclass(frozen=True)
+class Networks:
+    """One network for each slice that had pixels enough.
+
+    Attributes
+    ----------
+    lattice : Lattice
+        The topology, the same on every slice.
+    slices : (s,) int32 array
+        Slice number K of each network, rising.
+    codebooks : (s, u, 2) float array
+        Positions of the neurons as voxel indices (column i, row j) within their slice.
+    outlined : (s,) bool array
+        Whether the network saw the outline of the filled window, not the window's pixels.
+    pixels : (s,) int64 array
+        Pixels presented.
+    strays : (s,) int64 array
+        Pixels dropped by the trimmed re-fit.
+    """
+
+    lattice: Lattice
+    slices: NDArray[np.int32]
+    codebooks: NDArray[np.float64]
+    outlined: NDArray[np.bool_]
+    pixels: NDArray[np.int64]
+    strays: NDArray[np.int64]

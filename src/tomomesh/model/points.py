@@ -1,0 +1,54 @@
+"""Points in space, and where each came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+NEURON, BRIDGE, CAP = 0, 1, 2
+"""What a point is: a trained neuron, a sample of a bridged gap, a sample of a closing cap."""
+
+
+@dataclass(frozen=True)
+class PointSet:
+    """The set P of the paper: positions, and the slice and neuron behind each.
+
+    Attributes
+    ----------
+    positions : (n, 3) float array
+        Patient millimeters (x, y, z), LPS; or the cloud's own unit.
+    slices : (n,) int32 array
+        The slice of each point, -1 where there is none.
+    neurons : (n,) int32 array
+        Its number within the network of that slice, -1 where it is not a neuron.
+    kinds : (n,) uint8 array
+        ``NEURON``, ``BRIDGE`` or ``CAP``; measured points of a cloud count as ``NEURON``.
+    """
+
+    positions: NDArray[np.float64]
+    slices: NDArray[np.int32]
+    neurons: NDArray[np.int32]
+    kinds: NDArray[np.uint8]
+
+    @classmethod
+    def from_positions(cls, positions: NDArray[np.float64]) -> PointSet:
+        """Take an (n, 3) cloud about which nothing else is known."""
+        unknown = np.full(len(positions), -1, np.int32)
+        return cls(np.asarray(positions, np.float64), unknown, unknown, np.zeros(len(positions), np.uint8))
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def joined(self, other: PointSet) -> PointSet:
+        """Append the points of another set."""
+        return PointSet(
+            np.concatenate([self.positions, other.positions]),
+            np.concatenate([self.slices, other.slices]),
+            np.concatenate([self.neurons, other.neurons]),
+            np.concatenate([self.kinds, other.kinds]),
+        )

@@ -1,0 +1,146 @@
+"""A stack of slices with its place in the patient."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+AXES = ("sagittal", "coronal", "axial")
+"""The plane whose normal is patient axis 0 (left), 1 (posterior), 2 (superior)."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Where a file keeps its voxels: the key to writing labels back on the study's own grid.
+
+    Attributes
+    ----------
+    axes : tuple of int
+        The stored array axis (slowest first) behind each of the canonical axes K, J, I.
+    flipped : tuple of bool
+        Which of the canonical axes K, J, I run against the stored direction.
+    affine : (4, 4) float array
+        Stored index (last, middle, first array axis) to patient millimeters, LPS.
+    """
+
+    axes: tuple[int, int, int]
+    flipped: tuple[bool, bool, bool]
+    affine: NDArray[np.float64]
+
+    def restore(self, voxels: NDArray[Any]) -> NDArray[Any]:
+        """Bring a canonical (K, J, I) array back into the stored order."""
+        keep = tuple(slice(None, None, -1 if flip else 1) for flip in self.flipped)
+        return np.transpose(voxels[keep], np.argsort(self.axes))
+
+
+@dataclass(frozen=True)
+class Volume:
+    """Voxels in canonical order: K runs to superior, J to posterior, I to left (as nearly as they can).
+
+    Attributes
+    ----------
+    voxels : (K, J, I) or (K, J, I, L) array
+        Stored gray levels; HU where the study is CT.
+    affine : (4, 4) float array
+        Index (i, j, k) to patient millimeters (x, y, z), LPS.
+    grid : Grid
+        The file's own order of axes.
+    unit : str
+        ``"HU"`` for CT, else ``"stored"``.
+    notes : tuple of str
+        What the reader decided or dropped, one line each, without patient data.
+    """
+
+    voxels: NDArray[Any]
+    affine: NDArray[np.float64]
+    grid: Grid
+    unit: str = "stored"
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def from_stored(
+        cls, stored: NDArray[Any], affine: NDArray[np.float64], *, unit: str = "stored", notes: tuple[str, ...] = ()
+    ) -> Volume:
+        """Turn a stored array into canonical order without copying it.
+
+        Parameters
+        ----------
+        stored : (A, B, C) or (A, B, C, L) array
+            Voxels, slowest axis first.
+        affine : (4, 4) float array
+            Index (c, b, a), fastest first, to patient millimeters, LPS.
+        """
+        world = _world_axes(affine[:3, :3])
+        order = np.argsort(world)
+        canonical = affine[:, [*order, 3]].copy()
+        axes = tuple(int(2 - order[2 - n]) for n in range(3))
+        voxels = np.transpose(stored, (*axes, *range(3, stored.ndim)))
+        flips = [bool(canonical[2 - n, 2 - n] < 0) for n in range(3)]
+        for n in (n for n in range(3) if flips[n]):
+            canonical[:3, 3] += canonical[:3, 2 - n] * (voxels.shape[n] - 1)
+            canonical[:3, 2 - n] *= -1
+        voxels = voxels[tuple(slice(None, None, -1 if flip else 1) for flip in flips)]
+        grid = Grid(axes, (flips[0], flips[1], flips[2]), affine)  # type: ignore[arg-type]
+        return cls(voxels, canonical + 0.0, grid, unit, notes)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Sizes K, J, I."""
+        return self.voxels.shape[0], self.voxels.shape[1], self.voxels.shape[2]
+
+    @property
+    def spacing_mm(self) -> tuple[float, float, float]:
+        """Distance between neighboring voxels along I, J, K, in millimeters."""
+        x, y, z = np.sqrt((self.affine[:3, :3] ** 2).sum(axis=0))
+        return float(x), float(y), float(z)
+
+    @property
+    def stored_axis(self) -> int:
+        """The patient axis (0 left, 1 posterior, 2 superior) along which the file stacks its slices."""
+        return 2 - self.grid.axes.index(0)
+
+    def thickest_axis(self) -> int:
+        """Return the patient axis of the widest spacing; superior where two are equal within 0.1 %."""
+        spacing = self.spacing_mm
+        return max((2, 1, 0), key=lambda axis: (spacing[axis] > 1.001 * min(spacing), spacing[axis]))
+
+    def along(self, axis: int) -> Volume:
+        """Return a view whose slices K are stacked along a patient axis (0 left, 1 posterior, 2 superior).
+
+        Rows and columns keep their order: K before J before I.
+        """
+        order = [2 - axis, *(n for n in range(3) if n != 2 - axis)]
+        columns = [2 - order[2], 2 - order[1], 2 - order[0], 3]
+        axes, flipped = self.grid.axes, self.grid.flipped
+        grid = replace(
+            self.grid,
+            axes=(axes[order[0]], axes[order[1]], axes[order[2]]),
+            flipped=(flipped[order[0]], flipped[order[1]], flipped[order[2]]),
+        )
+        voxels = np.transpose(self.voxels, (*order, *range(3, self.voxels.ndim)))
+        return replace(self, voxels=voxels, affine=self.affine[:, columns], grid=grid)
+
+    def to_mm(self, indices: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Carry (n, 3) indices (i, j, k) to patient millimeters (x, y, z)."""
+        return indices @ self.affine[:3, :3].T + self.affine[:3, 3]
+
+    def with_voxels(self, voxels: NDArray[Any]) -> Volume:
+        """Return a volume of the same grid that holds other voxels."""
+        return replace(self, voxels=voxels)
+
+
+def _world_axes(columns: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Assign a patient axis to every index axis, the clearest direction first."""
+    cosines = np.abs(columns) / np.sqrt((columns**2).sum(axis=0))
+    world = np.zeros(3, np.int64)
+    for _ in range(3):
+        axis, index = np.unravel_index(int(np.argmax(np.round(cosines, 9))), (3, 3))
+        world[index] = axis
+        cosines[axis, :] = -1
+        cosines[:, index] = -1
+    return world

@@ -1,0 +1,291 @@
+"""Every parameter once: its default, unit, limits, help text, and what the paper has instead.
+
+The command line, the TOML file and the functions all read this table, so they cannot disagree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, asdict, dataclass, field, fields, replace
+from typing import Any
+
+from .errors import UsageError
+
+UNSET = object()
+
+
+def param(
+    default: Any,
+    help: str,
+    *,
+    kind: type | None = None,
+    unit: str = "",
+    choices: tuple[str, ...] = (),
+    low: float = -math.inf,
+    above: float = -math.inf,
+    high: float = math.inf,
+    length: tuple[int, ...] = (),
+    paper: Any = UNSET,
+) -> Any:
+    """Declare a parameter: ``low <= value <= high`` and ``value > above``; `length` where it takes several.
+
+    `kind` is the type of one value; it follows from the default, except where that is None or a tuple.
+    """
+    kind = kind or (float if default is None or isinstance(default, tuple) else type(default))
+    meta = dict(help=help, kind=kind, unit=unit, choices=choices, low=low, above=above, high=high, length=length, paper=paper)
+    return field(default=default, metadata=meta)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Parameters that belong together: a section of the settings file and of ``--help``."""
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if isinstance(value, list):
+                value = tuple(value)
+                object.__setattr__(self, entry.name, value)
+            if value is not None:
+                _check(entry, value)
+
+    def paper(self) -> Mapping[str, Any]:
+        """Return the values that the paper has in place of the defaults."""
+        return {f.name: f.metadata["paper"] for f in fields(self) if f.metadata["paper"] is not UNSET}
+
+
+def _check(entry: Field[Any], value: Any) -> None:
+    meta, option = entry.metadata, option_of(entry.name)
+    if meta["choices"]:
+        if value not in meta["choices"]:
+            raise UsageError(
+                f"{option} has no such value", found=f"{option} = {value}", expected=" | ".join(meta["choices"])
+            )
+        return
+    if meta["kind"] is bool:
+        if not isinstance(value, bool):
+            raise UsageError(f"{option} is a switch", found=f"{option} = {value}", expected="true or false")
+        return
+    values = value if isinstance(value, tuple) else (value,)
+    if meta["length"] and len(values) not in meta["length"]:
+        counts = " or ".join(map(str, meta["length"]))
+        raise UsageError(f"{option} has too few or too many values", found=f"{option} = {value}", expected=counts)
+    if not all(_inside(meta, one) for one in values):
+        raise UsageError(
+            f"{option} is outside its limits", found=f"{option} = {value}", expected=limits_of(entry)
+        )
+
+
+def _inside(meta: Mapping[str, Any], value: Any) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int if meta["kind"] is int else (int, float)):
+        return False
+    return bool(math.isfinite(value) and meta["low"] <= value <= meta["high"] and value > meta["above"])
+
+
+def limits_of(entry: Field[Any]) -> str:
+    """Put a parameter's limits into words."""
+    meta = entry.metadata
+    words = ["a whole number" if meta["kind"] is int else "a number"]
+    words += [f"over {meta['above']:g}"] if math.isfinite(meta["above"]) else []
+    words += [f"at least {meta['low']:g}"] if math.isfinite(meta["low"]) else []
+    words += [f"at most {meta['high']:g}"] if math.isfinite(meta["high"]) else []
+    return words[0] + (" " + ", ".join(words[1:]) if words[1:] else "")
+
+
+def option_of(name: str) -> str:
+    """Return the command line's spelling of a parameter."""
+    return "--" + name.replace("_", "-")
+
+
+@dataclass(frozen=True)
+class ReadSettings(Group):
+    """How a study is read where its files leave a choice."""
+
+    series: int | None = param(None, "number of the series to take from a folder that holds several", kind=int, low=0)
+    spacing: tuple[float, ...] | None = param(
+        None, "distance of the voxels along columns, rows and slices, for files that hold none", unit="mm", above=0, length=(3,)
+    )
+    spacing_z: float | None = param(None, "distance of the slices, for one slice or slices without positions", unit="mm", above=0)
+    fill_gaps: bool = param(False, "interpolate the slices that are missing from a regular stack")
+
+
+@dataclass(frozen=True)
+class WindowSettings(Group):
+    """Gray-level window (eq. 3): a voxel is kept where lower < k <= upper."""
+
+    lower: float | None = param(None, "lowest gray level, itself left out; Otsu's where not given", unit="stored, HU for CT")
+    upper: float | None = param(None, "highest gray level, itself kept; no limit where not given", unit="stored, HU for CT")
+    preset: str | None = param(None, "a window for CT: bone is k > 300 HU, skin is k > -300 HU", kind=str, choices=("bone", "skin"))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        lower = -math.inf if self.lower is None else self.lower
+        upper = math.inf if self.upper is None else self.upper
+        if lower >= upper:
+            raise UsageError(
+                "the window is empty", found=f"--lower = {lower:g}, --upper = {upper:g}", expected="lower < upper"
+            )
+
+
+@dataclass(frozen=True)
+class NetworkSettings(Group):
+    """Self-organising maps (eq. 1, 2; Fig. 1), one a slice."""
+
+    slices: str = param(
+        "auto",
+        "plane of the slices; auto is across the thickest spacing, axial where equal",
+        choices=("auto", "axial", "coronal", "sagittal", "stored"),
+        paper="stored",
+    )
+    signal: str = param(
+        "auto",
+        "what the network sees: the window's pixels (region), the outline of the filled window (boundary), "
+        "or the outline only in slices that the window fills (auto)",
+        choices=("region", "boundary", "auto"),
+        paper="region",
+    )
+    network: str = param("ring", "topology of the network", choices=("chain", "ring", "grid"))
+    neurons: int = param(58, "neurons a slice", low=3, high=10_000)
+    training: str = param("batch", "one presentation at a time, or all at once", choices=("online", "batch"), paper="online")
+    iterations: int = param(10_000, "online: presentations", unit="presentations", low=1)
+    epochs: int = param(10, "batch: passes over all pixels", unit="passes", low=1)
+    start: str = param(
+        "ellipse", "start positions: the ellipse of the pixels, or pixels drawn at random", choices=("ellipse", "random"), paper="random"
+    )
+    neighborhood: str = param(
+        "gaussian", "shape of the neighborhood", choices=("bubble", "gaussian"), paper="bubble"
+    )
+    alpha: tuple[float, float] = param((0.5, 0.01), "online: first and last learning rate", low=0, high=1, length=(2,))
+    radius: tuple[float, float] | None = param(
+        None,
+        "first and last radius of the neighborhood (gaussian: its sigma); "
+        "by default from a quarter of the neurons down to 1 (online) or to what the thickness of the region needs (batch)",
+        unit="hops",
+        low=0,
+        length=(2,),
+    )
+    alpha_power: float = param(3.0, "online: power of the learning rate's fall; 1 is linear", above=0)
+    radius_power: float = param(5.0, "power of the radius' fall; 1 is linear", above=0)
+    trim: float = param(
+        2.5,
+        "pixels farther from their neuron than this many medians are strays: dropped, and the network fitted anew; 0 keeps all",
+        unit="medians",
+        low=0,
+        paper=0.0,
+    )
+
+
+@dataclass(frozen=True)
+class CubeSettings(Group):
+    """Space partition, cuberille and low-pass filter (Fig. 8)."""
+
+    cell_mm: tuple[float, ...] | None = param(
+        None, "edge of the cubes, one or one an axis (x y z); by default r, the widest gap between neighboring points",
+        unit="mm", above=0, length=(1, 3),
+    )  # fmt: skip
+    cell_factor: float = param(1.0, "dilation factor on the edge of the cubes, for coarser models", above=0)
+    bridge: float = param(
+        2.0, "an edge of the network over this many medians is a bridged gap, sampled along its line; 0 samples none",
+        unit="medians", low=0, paper=0.0,
+    )  # fmt: skip
+    caps: bool = param(True, "close the inside of rings that have nothing above or below")
+    closing: int | None = param(
+        None, "cubes by which gaps in the shell are closed; by default the fewest that keep the outside out",
+        kind=int, unit="cubes", low=0, high=64,
+    )  # fmt: skip
+    allow_leaks: bool = param(False, "write the surface even where the outside leaks into the shell")
+    surface: str = param("outer", "the outer surfaces, or all, cavities too", choices=("outer", "all"))
+    smoothing: int = param(3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000)
+
+
+@dataclass(frozen=True)
+class FitSettings(Group):
+    """Dynamic mass-spring mesh (eq. 5-7)."""
+
+    stiffness: float = param(0.5, "sum of the structural stiffness at a vertex over k_d", low=0)
+    damping: float = param(1.0, "damping over critical damping", above=0)
+    step: float = param(0.8, "time step, in units of 1/omega; the stable limit is 1", above=0, high=1)
+    tolerance: float = param(1e-3, "speed and acceleration at which the mesh rests", unit="cube edges", above=0)
+    max_steps: int = param(200, "most steps", unit="steps", low=0)
+    springs: str = param("quads", "springs along the sides of squares or of triangles", choices=("quads", "triangles"), paper="triangles")
+    limit: str = param(
+        "clamp", "where a vertex would move over one cube edge: clamp its step, or shorten the time step", choices=("clamp", "shorten"), paper="shorten"
+    )
+
+
+@dataclass(frozen=True)
+class RunSettings(Group):
+    """How to run; no result depends on the number of threads."""
+
+    seed: int = param(0, "seed of everything drawn at random", low=0)
+    threads: int = param(0, "threads; 0 is one a core", low=0, high=1024)
+    units: str = param("mm", "unit of the written coordinates; for a cloud, the unit that its numbers are in", choices=("mm", "cm", "m", "unknown"))
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All parameters of a run, in groups."""
+
+    read: ReadSettings = field(default_factory=ReadSettings)
+    window: WindowSettings = field(default_factory=WindowSettings)
+    network: NetworkSettings = field(default_factory=NetworkSettings)
+    cubes: CubeSettings = field(default_factory=CubeSettings)
+    fit: FitSettings = field(default_factory=FitSettings)
+    run: RunSettings = field(default_factory=RunSettings)
+
+    @classmethod
+    def for_paper(cls) -> Settings:
+        """Return the paper's own choices."""
+        groups = {entry.name: getattr(cls(), entry.name) for entry in fields(cls)}
+        return cls(**{name: replace(group, **group.paper()) for name, group in groups.items()})
+
+    @classmethod
+    def from_dict(cls, sections: Mapping[str, Any], *, file: str = "") -> Settings:
+        """Take sections of values, as a TOML file holds them.
+
+        Raises
+        ------
+        UsageError
+            For a section or a key that there is not, or a value outside its limits.
+        """
+        known = {entry.name: getattr(cls(), entry.name) for entry in fields(cls)}
+        for name, values in sections.items():
+            keys = {f.name for f in fields(known[name])} if name in known else set()
+            unknown = [key for key in values if key not in keys] if isinstance(values, Mapping) else [name]
+            if unknown or name not in known:
+                raise UsageError(
+                    "the settings have no such entry", file=file, found=".".join([name, *unknown[:1]]), expected="an entry of settings.toml"
+                )
+            known[name] = replace(known[name], **values)
+        return cls(**known)
+
+    def replace(self, **values: Any) -> Settings:
+        """Change parameters by their bare names, whatever group they are in.
+
+        Raises
+        ------
+        UsageError
+            For a name that there is not, or a value outside its limits.
+        """
+        groups = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        for name, group in groups.items():
+            own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
+            groups[name] = replace(group, **own)
+        if values:
+            raise UsageError("there is no such parameter", found=", ".join(values), expected="a field of Settings")
+        return Settings(**groups)
+
+    def to_dict(self) -> dict[str, dict[str, Any]]:
+        """Return sections of values, those not set left out, as a TOML file holds them."""
+        return {
+            name: {key: list(v) if isinstance(v, tuple) else v for key, v in group.items() if v is not None}
+            for name, group in asdict(self).items()
+        }
+
+
+def parameters() -> Iterator[tuple[str, Field[Any]]]:
+    """Yield every group's name with each of its parameters."""
+    for group in fields(Settings):
+        for entry in fields(getattr(Settings(), group.name)):
+            yield group.name, entry
