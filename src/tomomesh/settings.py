@@ -154,7 +154,10 @@ class NetworkSettings(Group):
         "ellipse", "start positions: the ellipse of the pixels, or pixels drawn at random", choices=("ellipse", "random"), paper="random"
     )
     neighborhood: str = param(
-        "gaussian", "shape of the neighborhood", choices=("bubble", "gaussian"), paper="bubble"
+        "auto",
+        "shape of the neighborhood; auto is gaussian in batch and bubble online, the better of each",
+        choices=("auto", "bubble", "gaussian"),
+        paper="bubble",
     )
     alpha: tuple[float, float] = param((0.5, 0.01), "online: first and last learning rate", low=0, high=1, length=(2,))
     radius: tuple[float, float] | None = param(
@@ -167,6 +170,7 @@ class NetworkSettings(Group):
     )
     alpha_power: float = param(3.0, "online: power of the learning rate's fall; 1 is linear", above=0)
     radius_power: float = param(5.0, "power of the radius' fall; 1 is linear", above=0)
+    even: bool = param(True, "space the neurons of a chain or ring evenly along their line", paper=False)
     trim: float = param(
         2.5,
         "pixels farther from their neuron than this many medians are strays: dropped, and the network fitted anew; 0 keeps all",
@@ -241,15 +245,17 @@ class Settings:
         return cls(**{name: replace(group, **group.paper()) for name, group in groups.items()})
 
     @classmethod
-    def from_dict(cls, sections: Mapping[str, Any], *, file: str = "") -> Settings:
-        """Take sections of values, as a TOML file holds them.
+    def from_dict(
+        cls, sections: Mapping[str, Any], *, base: Settings | None = None, file: str = ""
+    ) -> Settings:
+        """Take sections of values, as a TOML file holds them, over the defaults or over `base`.
 
         Raises
         ------
         UsageError
             For a section or a key that there is not, or a value outside its limits.
         """
-        known = {entry.name: getattr(cls(), entry.name) for entry in fields(cls)}
+        known = {entry.name: getattr(base or cls(), entry.name) for entry in fields(cls)}
         for name, values in sections.items():
             keys = {f.name for f in fields(known[name])} if name in known else set()
             unknown = [key for key in values if key not in keys] if isinstance(values, Mapping) else [name]

@@ -100,6 +100,12 @@ class QuadMesh:
         keys = np.unique(ends.min(axis=1) * n + ends.max(axis=1))
         return np.stack([keys // n, keys % n], axis=1)
 
+    @cached_property
+    def vertex_cubes(self) -> NDArray[np.int64]:
+        """The cube that each vertex came from: the first of its faces' cubes, (n,)."""
+        _, first = np.unique(self.quads, return_index=True)
+        return self.cubes[first // 4]
+
     def triangulated(self) -> TriMesh:
         """Split each square by its diagonal 0-2 (the paper's systematic triangulation, Fig. 8b)."""
         return TriMesh(self.vertices, self.quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3))

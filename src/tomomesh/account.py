@@ -1,0 +1,184 @@
+"""Keep the account of a run: what each stage found, and how long it took."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .measure.report import assess, compare
+from .model.points import BRIDGE, CAP, NEURON
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .model.cubes import CubeGrid
+    from .model.mesh import TriMesh
+    from .model.networks import Networks
+    from .model.points import PointSet
+    from .model.trace import Trace
+    from .model.volume import Volume
+    from .segment.sample import Sampling
+    from .settings import Settings
+    from .surface.closing import Shell
+    from .surface.cuberille import Cuberille
+
+SECTIONS = (
+    "study", "window", "networks", "points", "cubes", "surface", "fit", "quality", "truth", "timings",
+    "settings", "versions", "warnings",
+)  # fmt: skip
+PACKAGES = ("tomomesh", "numpy", "scipy", "numba")
+
+
+class Account:
+    """The report in the making; one method a section, each documented key by key in docs/report.md."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._sections: dict[str, dict[str, Any]] = {}
+        self._timings: dict[str, float] = {}
+        self._warnings: list[str] = []
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Measure a stage."""
+        start = time.perf_counter()
+        yield
+        self._timings[f"{stage}_s"] = self._timings.get(f"{stage}_s", 0.0) + time.perf_counter() - start
+
+    def warn(self, message: str) -> None:
+        """Note what a reader of the result must know."""
+        self._warnings.append(message)
+
+    @property
+    def cell_mm(self) -> float:
+        """The smallest edge of the cubes."""
+        return float(min(self._sections["cubes"]["cell_mm"]))
+
+    def study(self, volume: Volume, plane: str) -> None:
+        """Note what the slices are."""
+        self._sections["study"] = {
+            "slices": volume.shape[0],
+            "rows": volume.shape[1],
+            "columns": volume.shape[2],
+            "plane": plane,
+            "column_spacing_mm": volume.spacing_mm[0],
+            "row_spacing_mm": volume.spacing_mm[1],
+            "slice_spacing_mm": volume.spacing_mm[2],
+            "gray_unit": volume.unit,
+            "notes": list(volume.notes),
+        }
+
+    def window(self, mask: NDArray[np.bool_], lower: float, upper: float) -> None:
+        """Note what the window kept."""
+        asked = self._settings.window
+        given = asked.lower is not None or asked.upper is not None
+        edges = [np.take(mask, end, axis=axis).any() for axis in range(3) for end in (0, -1)]
+        self._sections["window"] = {
+            "lower": None if np.isinf(lower) else lower,
+            "upper": None if np.isinf(upper) else upper,
+            "chosen_by": "preset" if asked.preset else "given" if given else "otsu",
+            "voxels": int(mask.sum()),
+            "share": float(mask.mean()),
+            "touches_border": bool(any(edges)),
+        }
+        if any(edges[2:]):
+            self.warn("the window touches the border of the slices: the surface is closed along it")
+
+    def networks(self, networks: Networks, slices: int) -> None:
+        """Note what was trained."""
+        without = np.setdiff1d(np.arange(slices), networks.slices)
+        self._sections["networks"] = {
+            "topology": networks.lattice.name,
+            "neurons": len(networks.lattice),
+            "trained": len(networks.slices),
+            "signal": "boundary" if networks.outlined.all() else "region",
+            "pixels": int(networks.pixels.sum()),
+            "strays": int(networks.strays.sum()),
+            "slices_without": without.tolist(),
+        }
+        inner = without[(without > networks.slices[0]) & (without < networks.slices[-1])]
+        if len(inner):
+            self.warn(f"slices in the middle without a network: {', '.join(map(str, inner))}")
+
+    def points(self, points: PointSet, spacing: float, bridged: int = 0) -> None:
+        """Note how many points there are and how far apart."""
+        self._sections["points"] = {
+            "unit": self._settings.run.units,
+            "count": len(points),
+            "measured": int((points.kinds == NEURON).sum()),
+            "on_bridges": int((points.kinds == BRIDGE).sum()),
+            "on_caps": int((points.kinds == CAP).sum()),
+            "bridged_gaps": bridged,
+            "spacing_mm": spacing,
+        }
+
+    def cubes(self, grid: CubeGrid, shell: Shell, composed: CubeGrid) -> None:
+        """Note the partition, its closing and the cubes added."""
+        self._sections["cubes"] = {
+            "cell_mm": grid.cell_mm.tolist(),
+            "occupied": len(grid.keys),
+            "closing": shell.closing,
+            "added_by_closing": len(shell.keys) - len(grid.keys),
+            "added_for_composition": len(composed.keys) - len(shell.keys),
+            "two_sided": shell.two_sided,
+            "holds": shell.holds,
+        }
+
+    def surface(self, tracked: Cuberille) -> None:
+        """Note which surfaces were found and taken."""
+        self._sections["surface"] = {
+            "found": tracked.surfaces,
+            "cavities": int((tracked.volumes < 0).sum()),
+            "taken": int(tracked.taken.sum()),
+            "square_faces": len(tracked.mesh.quads),
+            "enclosed_cubes": int(tracked.volumes[tracked.taken].sum()),
+        }
+
+    def fit(self, trace: Trace) -> None:
+        """Note how the mesh came to rest."""
+        steps = len(trace.speed)
+        self._sections["fit"] = {"iterations": steps, "converged": trace.converged}
+        if steps:
+            self._sections["fit"] |= {
+                "speed": float(trace.speed[-1]),
+                "acceleration": float(trace.acceleration[-1]),
+                "first_distance_mm": float(trace.distance_mm[0]),
+                "last_distance_mm": float(trace.distance_mm[-1]),
+                "clamped": int(trace.clamped.sum()),
+                "unattracted": int(trace.unattracted[-1]),
+            }
+        if not trace.converged:
+            self.warn(f"the mesh had not come to rest after {steps} steps")
+
+    def quality(self, mesh: TriMesh, points: PointSet) -> None:
+        """Measure the mesh, against its points too."""
+        self._sections["quality"] = assess(mesh, points=points.positions)
+
+    def rings(self, sampling: Sampling) -> None:
+        """Compare the volume of the mesh with the areas of the rings times the distance of their slices."""
+        if len(sampling.ring_area_mm2) > 1:
+            volume = float(np.trapezoid(sampling.ring_area_mm2, sampling.distance_mm))
+            quality = self._sections["quality"]
+            quality["rings_volume_mm3"] = volume
+            quality["volume_over_rings"] = quality["volume_mm3"] / volume
+
+    def truth(self, mesh: TriMesh, caps: NDArray[np.bool_], truth: TriMesh) -> None:
+        """Measure the distance to the exact surface, both ways; the caps are no part of it."""
+        with self.timed("truth"):
+            self._sections["truth"] = compare(mesh, truth, leave_out=caps)
+
+    def report(self) -> dict[str, Any]:
+        """Return the report, its sections in their documented order."""
+        sections: dict[str, Any] = self._sections | {
+            "timings": self._timings | {"total_s": sum(self._timings.values())},
+            "settings": self._settings.to_dict(),
+            "versions": {name: version(name) for name in PACKAGES} | {"python": platform.python_version()},
+            "warnings": list(self._warnings),
+        }
+        return {name: sections[name] for name in SECTIONS if name in sections}

@@ -1,0 +1,36 @@
+"""Files in, files out: the border where every frame becomes LPS millimeters.
+
+One file a format family; each table leads from a suffix to a reader or a writer.
+"""
+
+from __future__ import annotations
+
+from .atomic import check_output, replacing
+from .documents import read_settings, write_document, write_settings
+from .meshes import MESH_READERS, MESH_WRITERS, read_mesh, write_mesh
+from .nifti import write_labels
+from .points import POINT_READERS, POINT_WRITERS, read_points, write_points
+from .volumes import VOLUME_READERS, read_volume
+
+LABEL_WRITERS = (".nii", ".nii.gz")
+"""Suffixes in which labels are written."""
+
+__all__ = [
+    "LABEL_WRITERS",
+    "MESH_READERS",
+    "MESH_WRITERS",
+    "POINT_READERS",
+    "POINT_WRITERS",
+    "VOLUME_READERS",
+    "check_output",
+    "read_mesh",
+    "read_points",
+    "read_settings",
+    "read_volume",
+    "replacing",
+    "write_document",
+    "write_labels",
+    "write_mesh",
+    "write_points",
+    "write_settings",
+]

@@ -1,0 +1,88 @@
+"""Reports as JSON, settings as TOML."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import FormatError
+from ..settings import Settings
+from .atomic import replacing
+from .source import whole
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def write_document(data: Mapping[str, Any], path: str | Path) -> None:
+    """Write a report as JSON, its entries in their own order; what is not finite becomes null.
+
+    Parameters
+    ----------
+    data : mapping
+        Of numbers, texts, lists, arrays and further mappings.
+    path : path
+        The file.
+
+    Raises
+    ------
+    OutputError
+        Where the file cannot be written.
+    """
+    text = json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False)
+    with replacing(path) as file:
+        file.write(f"{text}\n".encode())
+
+
+def _plain(value: Any) -> Any:
+    """Turn arrays, tuples and numpy's numbers into what JSON knows."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def read_settings(path: str | Path) -> Settings:
+    """Read a run's parameters from a TOML file.
+
+    Raises
+    ------
+    UnreadableError
+        Where the file is missing or may not be read.
+    FormatError
+        Where it is no TOML.
+    UsageError
+        For an entry that there is not, or a value outside its limits.
+    """
+    import tomllib
+
+    try:
+        sections = tomllib.loads(whole(path).decode("utf-8"))
+    except UnicodeDecodeError:
+        raise FormatError("the settings are no text", file=str(path), expected="TOML") from None
+    except tomllib.TOMLDecodeError as fault:
+        raise FormatError(
+            "the settings cannot be read", file=str(path), found=str(fault), expected="TOML"
+        ) from None
+    return Settings.from_dict(sections, file=str(path))
+
+
+def write_settings(settings: Settings, path: str | Path) -> None:
+    """Write a run's parameters as TOML; those not set are left out.
+
+    Raises
+    ------
+    OutputError
+        Where the file cannot be written.
+    """
+    import tomli_w
+
+    with replacing(path) as file:
+        file.write(tomli_w.dumps(settings.to_dict()).encode("utf-8"))

@@ -1,0 +1,178 @@
+"""Triangle meshes: in and out."""
+
+from __future__ import annotations
+
+import io
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import EmptyError, FormatError, OutputError
+from ..model.mesh import TriMesh
+from .atomic import check_output, replacing
+from .limits import require_bytes
+from .ply import parse_header, write_ply
+from .points import check_finite
+from .signature import signature
+from .source import existing_file, suffix_of, third_party, whole
+from .weld import weld
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
+
+STL_ROW = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
+"""One face of a binary STL file."""
+
+STL_HEAD = 84
+"""Bytes before the first face: 80 of text, 4 of their count."""
+
+
+def read_mesh(path: str | Path) -> TriMesh:
+    """Read a triangle mesh.
+
+    Parameters
+    ----------
+    path : path
+        ``.stl`` (its equal positions become one vertex), ``.ply``, ``.obj`` or ``.off``.
+
+    Raises
+    ------
+    UnreadableError
+        Where the file is missing or may not be read.
+    FormatError
+        For broken files, vertices that are not finite, and unknown suffixes.
+    EmptyError
+        For a file without faces.
+    """
+    path = existing_file(path)
+    suffix, file = suffix_of(path), str(path)
+    if suffix not in MESH_READERS:
+        raise FormatError(
+            "the file is of an unknown kind",
+            file=file,
+            found=f"suffix = {suffix or 'none'}",
+            expected=" | ".join(MESH_READERS),
+        )
+    vertices, faces = MESH_READERS[suffix](whole(path), file)
+    if len(faces) == 0:
+        raise EmptyError("the mesh has no faces", file=file)
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise FormatError(
+            "a face names a vertex that there is not",
+            file=file,
+            found=f"vertex numbers = {faces.min()} to {faces.max()}",
+            expected=f"0 to {len(vertices) - 1}",
+        )
+    check_finite(vertices, "vertex", file=file)
+    return TriMesh(vertices, faces)
+
+
+def _loaded(kind: str, data: bytes, file: str) -> Arrays:
+    import trimesh
+
+    options: dict[str, Any] = {"skip_materials": True, "maintain_order": True} if kind == "obj" else {}
+    with third_party("trimesh", file):
+        mesh: Any = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False, **options)
+        vertices = np.array(mesh.vertices, np.float64).reshape(-1, 3)
+        return vertices, np.array(mesh.faces, np.int64).reshape(-1, 3)
+
+
+def _read_ply(data: bytes, file: str) -> Arrays:
+    parse_header(data, file=file)
+    return _loaded("ply", data, file)
+
+
+def _read_stl(data: bytes, file: str) -> Arrays:
+    """Compare a binary file's count with its bytes first; text begins with ``solid``."""
+    if not (data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:1000]):
+        require_bytes(STL_HEAD, len(data), file=file)
+        count = int(np.frombuffer(data, "<u4", 1, STL_HEAD - 4)[0])
+        require_bytes(STL_HEAD + count * np.dtype(STL_ROW).itemsize, len(data), file=file)
+    vertices, faces = _loaded("stl", data, file)
+    unique, numbers = weld(vertices)
+    return unique, numbers[faces]
+
+
+MESH_READERS: dict[str, Callable[[bytes, str], Arrays]] = {
+    ".stl": _read_stl,
+    ".ply": _read_ply,
+    ".obj": partial(_loaded, "obj"),
+    ".off": partial(_loaded, "off"),
+}
+"""Suffix to reader of vertices and faces."""
+
+
+def write_mesh(mesh: TriMesh, path: str | Path, *, unit: str = "mm", frame: str = "LPS") -> None:
+    """Write a triangle mesh; the same mesh gives the same bytes.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        Its coordinates are written as they are.
+    path : path
+        ``.stl`` (binary, 32-bit coordinates), ``.ply`` (binary, 64-bit) or ``.obj`` (text, 64-bit).
+    unit, frame : str
+        What the coordinates are in, named in the file.
+
+    Raises
+    ------
+    UsageError
+        For a suffix that has no writer.
+    OutputError
+        Where the file cannot be written, or the format cannot keep distinct vertices apart.
+    """
+    check_output(path, MESH_WRITERS)
+    MESH_WRITERS[suffix_of(path)](mesh, path, signature(unit, frame))
+
+
+def _write_stl(mesh: TriMesh, path: str | Path, head: str) -> None:
+    rows = np.zeros(len(mesh.faces), STL_ROW)
+    rows["corners"] = _single(mesh.vertices, path)[mesh.faces]
+    length = np.linalg.norm(mesh.face_vectors, axis=1, keepdims=True)
+    rows["normal"] = mesh.face_vectors / np.where(length > 0, length, 1.0)
+    with replacing(path) as file:
+        file.write(head.encode("ascii")[:80].ljust(80))
+        file.write(np.array(len(rows), "<u4").tobytes())
+        file.write(rows.tobytes())
+
+
+def _single(vertices: NDArray[np.float64], path: str | Path) -> NDArray[np.float32]:
+    """Return 32-bit coordinates, if they still tell the vertices apart."""
+    with np.errstate(over="ignore"):
+        single = vertices.astype(np.float32)
+    kept = np.isfinite(single).all() and len(weld(single.astype(np.float64))[0]) == len(weld(vertices)[0])
+    if not kept:
+        raise OutputError(
+            "the 32-bit coordinates of STL cannot keep the vertices apart",
+            file=str(path),
+            found=f"largest coordinate = {np.abs(vertices).max():g}",
+            hint="a .ply file, which keeps 64 bits",
+        )
+    return single
+
+
+def _write_ply(mesh: TriMesh, path: str | Path, head: str) -> None:
+    rows = np.empty(len(mesh.vertices), [("x", "f8"), ("y", "f8"), ("z", "f8")])
+    rows["x"], rows["y"], rows["z"] = mesh.vertices.T
+    write_ply(path, head, rows, mesh.faces)
+
+
+def _write_obj(mesh: TriMesh, path: str | Path, head: str) -> None:
+    vertices = (f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist())
+    faces = (f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist())
+    with replacing(path) as file:
+        file.write(("\n".join([f"# {head}", *vertices, *faces]) + "\n").encode("ascii"))
+
+
+MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, str], None]] = {
+    ".stl": _write_stl,
+    ".ply": _write_ply,
+    ".obj": _write_obj,
+}
+"""Suffix to writer."""

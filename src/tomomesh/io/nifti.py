@@ -1,0 +1,305 @@
+"""NIfTI: studies in, labels out. RAS becomes LPS, and LPS becomes RAS, here and nowhere else."""
+
+from __future__ import annotations
+
+import gzip
+import zlib
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import FormatError, GeometryError, OutputError, ResourceError, UnreadableError
+from ..model.volume import Volume
+from .affine import SMALLEST_SPACING, check_affine, check_spacing, upright
+from .atomic import replacing
+from .gray import check_scale, native, scaled, scaled_dtype, without_holes
+from .limits import require_bytes, require_memory
+from .source import existing_file, suffix_of, third_party
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from io import BufferedIOBase
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from ..settings import ReadSettings
+
+FLIP = np.diag([-1.0, -1.0, 1.0, 1.0])
+"""RAS to LPS and back."""
+
+MM_PER_UNIT = {0: 1.0, 1: 1000.0, 2: 1.0, 3: 0.001}
+"""Millimeters in the header's unit: unknown, meter, millimeter, micron."""
+
+SIZES = {348: "Nifti1Header", 540: "Nifti2Header"}
+"""Header lengths in bytes, and nibabel's classes for them."""
+
+DEFLATE_RATIO = 1032
+"""No deflated stream holds more than this many times its own bytes."""
+
+SURPLUS_BYTES = 2**26
+"""A stream that goes on for longer after its voxels is taken for a bomb."""
+
+LARGEST_SIDE = 32767
+"""NIfTI-1 keeps its sizes in 16 bits."""
+
+HINT = "--spacing x y z"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a header promises, checked.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Sizes I, J, K as they are stored, fastest first.
+    dtype : data type
+        Of one voxel.
+    offset : int
+        Bytes before the first voxel.
+    slope, intercept : float
+        Scale of the gray levels; 1 and 0 where the header has none.
+    """
+
+    shape: tuple[int, int, int]
+    dtype: np.dtype[Any]
+    offset: int
+    slope: float
+    intercept: float
+
+    @property
+    def promised(self) -> int:
+        """Bytes of all voxels."""
+        return self.shape[0] * self.shape[1] * self.shape[2] * self.dtype.itemsize
+
+
+def read_nifti(path: Path, settings: ReadSettings) -> Volume:
+    """Read a study from a ``.nii`` or ``.nii.gz`` file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    settings : ReadSettings
+        `spacing` stands in for a frame that the file does not hold.
+
+    Returns
+    -------
+    Volume
+        In patient millimeters, LPS. The sform is used where its code is not 0, else the qform.
+
+    Raises
+    ------
+    UnreadableError, FormatError, GeometryError, ResourceError
+        As the header or the voxels demand.
+    """
+    path, name = existing_file(path), str(path)
+    with _stream(path, name) as stream:
+        start = stream.read(max(SIZES))
+        header = _header(start, name)
+        layout = _layout(header, name)
+        affine, notes = _frame(header, settings, name)
+        _check_promise(layout, path, name)
+        data = _voxel_bytes(stream, start, layout, name)
+    stored, more = _gray(data, layout, name)
+    return Volume.from_stored(stored, affine, notes=notes + more)
+
+
+@contextmanager
+def _stream(path: Path, name: str) -> Iterator[BufferedIOBase]:
+    try:
+        with gzip.open(path) if suffix_of(path) == ".nii.gz" else path.open("rb") as stream:
+            yield stream
+    except (EOFError, zlib.error, gzip.BadGzipFile) as fault:
+        raise FormatError(
+            "the compressed file is damaged",
+            file=name,
+            found=f"gzip = {type(fault).__name__}",
+            expected="a whole gzip stream with the right check sum",
+            hint="a fresh copy of the file",
+        ) from None
+    except OSError as fault:
+        raise UnreadableError("the file cannot be read", file=name, found=fault.strerror or "") from None
+
+
+def _header(start: bytes, name: str) -> Any:
+    """Unpack the header as it stands: nibabel's own checks would repair it in silence."""
+    require_bytes(min(SIZES), len(start), file=name)
+    size = next((n for n in SIZES if n in (_int(start, "<"), _int(start, ">"))), 0)
+    if not size or not start[344 if size == 348 else 4 :].startswith((b"n+1\0", b"n+2\0")):
+        raise FormatError("the file is no NIfTI file", file=name, expected="NIfTI-1 or NIfTI-2 in one file")
+    require_bytes(size, len(start), file=name)
+    import nibabel
+
+    with third_party("nibabel", name):
+        return getattr(nibabel, SIZES[size])(start[:size], check=False)
+
+
+def _int(start: bytes, order: str) -> int:
+    return int(np.frombuffer(start, f"{order}i4", 1)[0])
+
+
+def _layout(header: Any, name: str) -> Layout:
+    dim, ndim = [int(size) for size in header["dim"]], int(header["dim"][0])
+    if not 2 <= ndim <= 7 or min(dim[1 : ndim + 1]) < 1:
+        raise FormatError(
+            "the sizes of the volume are invalid", file=name, found=f"dim = {dim}", expected="all over 0"
+        )
+    sizes = [*dim[1 : ndim + 1], 1][: max(ndim, 3)]
+    if any(size > 1 for size in sizes[3:]):
+        raise FormatError(
+            "the file holds several frames",
+            file=name,
+            found=f"dim = {sizes}",
+            expected="one volume",
+            hint="one frame, written to a file of its own",
+        )
+    slope, intercept = float(header["scl_slope"]), float(header["scl_inter"])
+    if slope == 0:  # the standard's way to say: not scaled
+        slope, intercept = 1.0, 0.0
+    check_scale(slope, intercept, file=name)
+    offset = float(header["vox_offset"])
+    if not offset >= int(header["sizeof_hdr"]) or not offset.is_integer():
+        raise FormatError("the place of the voxels is invalid", file=name, found=f"vox_offset = {offset:g}")
+    return Layout((sizes[0], sizes[1], sizes[2]), _dtype(header, name), int(offset), slope, intercept)
+
+
+def _dtype(header: Any, name: str) -> np.dtype[Any]:
+    with third_party("nibabel", name):
+        known = int(header["datatype"]) in header._data_type_codes.dtype
+    if not known:
+        raise FormatError(
+            "the voxels are of an unknown kind", file=name, found=f"datatype = {int(header['datatype'])}"
+        )
+    return np.dtype(header.get_data_dtype())
+
+
+def _frame(header: Any, settings: ReadSettings, name: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Return the affine in millimeters, LPS, and notes."""
+    pixdim = [float(size) for size in header["pixdim"][1:4]]
+    forms = [form for form in ("sform", "qform") if int(header[f"{form}_code"]) > 0]
+    broken = not forms or not all(SMALLEST_SPACING <= size < np.inf for size in pixdim)
+    if settings.spacing and broken:
+        return upright(settings.spacing), (
+            "no frame in the file: --spacing, columns to the left, rows to the back",
+        )
+    check_spacing(pixdim, ["pixdim[1]", "pixdim[2]", "pixdim[3]"], file=name, hint=HINT)
+    if not forms:
+        raise GeometryError(
+            "the file does not say where its voxels are",
+            file=name,
+            found="sform_code = 0, qform_code = 0",
+            expected="one of them over 0",
+            hint=HINT,
+        )
+    with third_party("nibabel", name):
+        affine = np.asarray(header.get_sform() if forms[0] == "sform" else header.get_qform(), np.float64)
+    unit, notes = _unit(header, name)
+    affine = np.diag([unit, unit, unit, 1.0]) @ FLIP @ affine
+    check_affine(affine, file=name, hint="a file with a valid sform")
+    return affine, notes + (("--spacing is not used: the file holds its own",) if settings.spacing else ())
+
+
+def _unit(header: Any, name: str) -> tuple[float, tuple[str, ...]]:
+    code = int(header["xyzt_units"]) & 7
+    if code not in MM_PER_UNIT:
+        raise GeometryError(
+            "the unit of the coordinates is unknown",
+            file=name,
+            found=f"xyzt_units = {code}",
+            expected="0 to 3",
+        )
+    factor = MM_PER_UNIT[code]
+    return factor, () if factor == 1 else (f"coordinates were brought to millimeters: x {factor:g}",)
+
+
+def _check_promise(layout: Layout, path: Path, name: str) -> None:
+    require_memory(layout.promised, file=name)
+    size = path.stat().st_size
+    held = size * DEFLATE_RATIO if suffix_of(path) == ".nii.gz" else size
+    require_bytes(layout.promised, held - layout.offset, file=name)
+
+
+def _voxel_bytes(stream: BufferedIOBase, start: bytes, layout: Layout, name: str) -> NDArray[np.uint8]:
+    """Read the promised bytes, and the rest of a compressed stream for its check sum."""
+    before = start[layout.offset :]
+    _skip(stream, layout.offset - len(start))
+    data = np.empty(layout.promised, np.uint8)
+    data[: len(before)] = np.frombuffer(before, np.uint8)[: len(data)]
+    done = min(len(before), len(data))
+    while count := stream.readinto(data.data[done : done + 2**24]):
+        done += count
+    require_bytes(layout.promised, done, file=name)
+    if isinstance(stream, gzip.GzipFile):
+        _drain(stream, name)
+    return data
+
+
+def _skip(stream: BufferedIOBase, count: int) -> None:
+    while count > 0 and (chunk := stream.read(min(count, 2**20))):
+        count -= len(chunk)
+
+
+def _drain(stream: BufferedIOBase, name: str) -> None:
+    surplus = 0
+    while chunk := stream.read(2**20):
+        surplus += len(chunk)
+        if surplus > SURPLUS_BYTES:
+            raise ResourceError(
+                "the compressed file goes on far beyond its voxels",
+                file=name,
+                found=f"surplus = {surplus} bytes and more",
+                expected=f"at most {SURPLUS_BYTES} bytes",
+            )
+
+
+def _gray(data: NDArray[np.uint8], layout: Layout, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """Return voxels (K, J, I[, 3]); they are stored fastest axis first."""
+    shape = layout.shape[::-1]
+    if layout.dtype.names:
+        return data.reshape(*shape, len(layout.dtype.names))[..., :3], ()
+    stored = native(data.view(layout.dtype).reshape(shape), file=name)
+    dtype = scaled_dtype(stored.dtype, [(layout.slope, layout.intercept)])
+    return without_holes(scaled(stored, layout.slope, layout.intercept, dtype), file=name)
+
+
+def write_labels(labels: NDArray[np.uint16], volume: Volume, path: str | Path) -> None:
+    """Write labels on the grid of the study's own file, as NIfTI.
+
+    Parameters
+    ----------
+    labels : (K, J, I) uint16 array
+        In the order of ``volume.voxels``.
+    volume : Volume
+        The study; its `grid` says how the file stores its voxels.
+    path : path
+        ``.nii`` or ``.nii.gz``. The bytes repeat: no name and no time is kept.
+
+    Raises
+    ------
+    OutputError
+        Where the file cannot be written, or a side is too long for NIfTI-1.
+    """
+    import nibabel
+
+    stored = np.asarray(volume.grid.restore(labels), np.uint16).T
+    if max(stored.shape) > LARGEST_SIDE:
+        raise OutputError(
+            "the labels do not fit into a NIfTI file",
+            file=str(path),
+            found=f"shape = {stored.shape}",
+            expected=f"sides of at most {LARGEST_SIDE}",
+        )
+    image = nibabel.Nifti1Image(stored, None)
+    image.header.set_sform(FLIP @ volume.grid.affine, code="scanner")
+    image.header.set_xyzt_units("mm")
+    data = image.to_bytes()
+    with replacing(path) as file:
+        if suffix_of(path) == ".nii.gz":
+            with gzip.GzipFile(filename="", fileobj=file, mode="wb", mtime=0) as packed:
+                packed.write(data)
+        else:
+            file.write(data)

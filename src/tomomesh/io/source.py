@@ -1,0 +1,156 @@
+"""What stands behind a path, before anything is opened."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections import Counter
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import FormatError, ResourceError, TomomeshError, UnreadableError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+def suffix_of(path: str | Path) -> str:
+    """Return a path's suffix in lower case; ``.gz`` keeps the suffix before it."""
+    suffixes = [suffix.lower() for suffix in Path(path).suffixes[-2:]]
+    return "".join(suffixes) if suffixes[-1:] == [".gz"] else "".join(suffixes[-1:])
+
+
+def existing(path: str | Path) -> Path:
+    """Return the path of a regular file or of a folder.
+
+    Raises
+    ------
+    UnreadableError
+        Where nothing is there, or it may not be read.
+    FormatError
+        For a device, a pipe, a socket or a loop of links; none of them is opened.
+    """
+    path = Path(path)
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError, PermissionError) as fault:
+        raise UnreadableError("the path cannot be read", file=str(path), found=_reason(fault)) from None
+    except (OSError, ValueError) as fault:
+        raise FormatError("the path leads nowhere", file=str(path), found=_reason(fault)) from None
+    if not (path.is_file() or path.is_dir()):
+        raise FormatError("the path is no regular file", file=str(path), expected="a file or a folder")
+    if not os.access(path, os.R_OK):
+        raise UnreadableError("the path cannot be read", file=str(path), found="no permission")
+    return path
+
+
+def existing_file(path: str | Path) -> Path:
+    """Return the path of a regular file that is not empty.
+
+    Raises
+    ------
+    UnreadableError, FormatError
+        As `existing`; a folder and a file without bytes are refused too.
+    """
+    path = existing(path)
+    if path.is_dir():
+        raise FormatError("the path is a folder", file=str(path), expected="a file")
+    if path.stat().st_size == 0:
+        raise FormatError("the file is empty", file=str(path), found="size = 0 bytes")
+    return path
+
+
+def whole(path: str | Path) -> bytes:
+    """Return a regular file's bytes.
+
+    Raises
+    ------
+    UnreadableError, FormatError
+        As `existing_file`.
+    """
+    path = existing_file(path)
+    try:
+        return path.read_bytes()
+    except OSError as fault:
+        raise UnreadableError("the file cannot be read", file=str(path), found=_reason(fault)) from None
+
+
+def regular_files(folder: Path) -> tuple[list[Path], Counter[str]]:
+    """List a folder's regular files by name; those of its sub-folders where it has none itself.
+
+    Returns
+    -------
+    files : list of Path
+        Sorted. Links are kept where they lead to a regular file inside the folder.
+    others : Counter
+        How many entries were passed over, by reason.
+
+    Raises
+    ------
+    UnreadableError
+        For a folder that is empty or may not be read.
+    """
+    files: list[Path] = []
+    others: Counter[str] = Counter()
+    for parent, folders, names in os.walk(folder, onerror=_refuse):
+        folders.sort()
+        for path in (Path(parent, name) for name in sorted(names)):
+            reason = _passed_over(path, folder)
+            others.update([reason] if reason else [])
+            files += [] if reason else [path]
+        if files and Path(parent) == folder:
+            break
+    if not files and not others:
+        raise UnreadableError("the folder is empty", file=str(folder))
+    return files, others
+
+
+def _passed_over(path: Path, folder: Path) -> str:
+    if path.name.startswith("."):
+        return "hidden"
+    try:
+        target = path.resolve(strict=True)
+    except (OSError, RuntimeError):
+        return "links that lead nowhere"
+    if path.is_symlink() and not target.is_relative_to(folder.resolve()):
+        return "links that leave the folder"
+    return "" if target.is_file() else "no regular files"
+
+
+def _refuse(fault: OSError) -> None:
+    raise UnreadableError(
+        "the folder cannot be read", file=str(fault.filename), found=_reason(fault)
+    ) from None
+
+
+def _reason(fault: Exception) -> str:
+    return (getattr(fault, "strerror", None) or "not a path").lower()
+
+
+def counted(reasons: Counter[str]) -> str:
+    """Put counts by reason into words."""
+    return ", ".join(f"{count} {reason}" for reason, count in sorted(reasons.items()))
+
+
+@contextmanager
+def third_party(reader: str, file: str) -> Iterator[None]:
+    """Turn whatever a third-party reader raises into one line, and silence its warnings.
+
+    Its own words stay out: they may hold patient data or a full path.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except TomomeshError:
+        raise
+    except MemoryError:
+        raise ResourceError("the file does not fit into the memory", file=file) from None
+    except Exception as fault:
+        raise FormatError(
+            f"{reader} cannot read the file",
+            file=file,
+            found=type(fault).__name__,
+            expected="a whole and valid file",
+        ) from None

@@ -1,0 +1,104 @@
+"""A study from whatever holds it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from ..errors import FormatError
+from ..settings import ReadSettings
+from .dicom import is_dicom, read_dicom
+from .images import FAMILIES, read_images
+from .nifti import read_nifti
+from .source import counted, existing, existing_file, regular_files, suffix_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from ..model.volume import Volume
+
+
+def _read_one_dicom(path: Path, settings: ReadSettings) -> Volume:
+    return read_dicom([path], settings, study=str(path))
+
+
+VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
+    ".nii": read_nifti,
+    ".nii.gz": read_nifti,
+    ".dcm": _read_one_dicom,
+    ".ima": _read_one_dicom,
+}
+"""Suffix of a single file to its reader; folders, and DICOM of any name, are known by their content."""
+
+READABLE = "a folder of DICOM, PNG or TIFF slices, a DICOM file, .nii or .nii.gz"
+
+
+def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Volume:
+    """Read a study.
+
+    Parameters
+    ----------
+    path : path
+        A NIfTI file, a DICOM file, or a folder of DICOM, PNG or TIFF slices.
+    settings : ReadSettings, optional
+        What to do where the files leave a choice.
+
+    Returns
+    -------
+    Volume
+        Voxels in canonical order with their affine, patient millimeters, LPS; its `notes` say what was
+        decided on the way.
+
+    Raises
+    ------
+    UnreadableError
+        Where the path is missing, empty or may not be read.
+    FormatError
+        For files that are broken or of an unknown kind.
+    GeometryError
+        Where the geometry is inconsistent, or needs a flag.
+    UsageError
+        For a series that there is not.
+    ResourceError
+        Where the voxels do not fit into the memory.
+    """
+    path, settings = existing(path), settings or ReadSettings()
+    if path.is_dir():
+        return _read_folder(path, settings)
+    existing_file(path)
+    reader = VOLUME_READERS.get(suffix_of(path))
+    if reader is None and is_dicom(path):
+        reader = _read_one_dicom
+    if reader is None:
+        raise FormatError(
+            "the file is of an unknown kind",
+            file=str(path),
+            found=f"suffix = {suffix_of(path) or 'none'}",
+            expected=READABLE,
+            hint="the folder of the slices" if suffix_of(path) in FAMILIES else "",
+        )
+    return reader(path, settings)
+
+
+def _read_folder(folder: Path, settings: ReadSettings) -> Volume:
+    """Read DICOM where there is any, else PNG or TIFF slices."""
+    files, others = regular_files(folder)
+    dicom = [path for path in files if is_dicom(path)]
+    if dicom:
+        others += Counter({"not DICOM": len(files) - len(dicom)})
+        return read_dicom(dicom, settings, study=str(folder), others=others)
+    images = [path for path in files if suffix_of(path) in FAMILIES]
+    if images:
+        return read_images(images, settings, folder=str(folder))
+    others += Counter(_kind(path) for path in files)
+    raise FormatError(
+        f"0 of {sum(others.values())} files are images",
+        file=str(folder),
+        found=counted(others),
+        expected=READABLE,
+    )
+
+
+def _kind(path: Path) -> str:
+    return f"{suffix_of(path)} files" if suffix_of(path) in VOLUME_READERS else "of an unknown kind"

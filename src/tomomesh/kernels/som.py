@@ -1,0 +1,170 @@
+"""Self-organising map: matching (eq. 1) and updating (eq. 2).
+
+Positions are stored one row an axis, (d, u) and (d, n), so that the loops over neurons and pixels vectorize.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .compile import kernel
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+BLOCK = 512
+"""Pixels matched together: their distances stay in the first cache."""
+
+
+INDEX_BITS = 16_383
+"""Low bits of a squared distance that carry the neuron's number; as many neurons a network may have."""
+
+
+@kernel("void(f8[:,::1], f8[:,::1], i4[:,::1], f8[::1], f8[::1], b1)")
+def train_online(
+    codebook: NDArray[np.float64],
+    inputs: NDArray[np.float64],
+    hops: NDArray[np.int32],
+    alpha: NDArray[np.float64],
+    radius: NDArray[np.float64],
+    gaussian: bool,
+) -> None:
+    """Present inputs one by one: m_i += alpha h(hops(c, i)) (x - m_i) (Kohonen 1988; eq. 1, 2).
+
+    Parameters
+    ----------
+    codebook : (d, u) float array
+        Changed in place.
+    inputs : (t, d) float array
+        One input a presentation, in the order of presentation.
+    hops : (u, u) int array
+    alpha, radius : (t,) float arrays
+        Learning rate and radius of each presentation.
+    gaussian : bool
+        h = exp(-hops^2 / 2 radius^2) up to six radii; else h = 1 up to `radius` hops. Beyond, h = 0.
+
+    Notes
+    -----
+    Finite inputs, at most 16,383 neurons. Non-negative floats order as the integers that spell them, and a
+    minimum of integers vectorizes: so the number of each neuron rides in the last bits of its distance. Of
+    neurons that are equally near (within 4e-12 of the squared distance) the lowest number wins.
+    """
+    d, u = codebook.shape
+    squared = np.empty(u)
+    bits = squared.view(np.int64)
+    weight = np.empty(u)
+    at_hop = np.zeros(hops.max() + 1)
+    for t in range(len(inputs)):
+        squared[:] = 0.0
+        for axis in range(d):
+            x = inputs[t, axis]
+            row = codebook[axis]
+            for i in range(u):
+                squared[i] += (x - row[i]) * (x - row[i])
+        winner = np.int64(2**63 - 1)
+        for i in range(u):
+            winner = min(winner, (bits[i] & ~np.int64(INDEX_BITS)) | np.int64(i))
+        apart = hops[winner & np.int64(INDEX_BITS)]
+        if gaussian:
+            for hop in range(len(at_hop)):
+                at_hop[hop] = np.exp(-0.5 * (hop / radius[t]) ** 2) if hop <= 6.0 * radius[t] else 0.0
+            at_hop[0] = 1.0
+            for i in range(u):
+                weight[i] = alpha[t] * at_hop[apart[i]]
+        else:
+            reach = np.int32(radius[t])
+            for i in range(u):
+                weight[i] = alpha[t] if apart[i] <= reach else 0.0
+        for axis in range(d):
+            x = inputs[t, axis]
+            row = codebook[axis]
+            for i in range(u):
+                row[i] += weight[i] * (x - row[i])
+
+
+@kernel("void(f8[:,::1], f8[:,::1], i4[::1], f8[::1])")
+def best_matching_units(
+    codebook: NDArray[np.float64],
+    inputs: NDArray[np.float64],
+    winners: NDArray[np.int32],
+    squared: NDArray[np.float64],
+) -> None:
+    """Find the neuron nearest to every input (eq. 1).
+
+    Parameters
+    ----------
+    codebook : (d, u) float array
+    inputs : (d, n) float array
+    winners : (n,) int array
+        Result: number of the nearest neuron, the lowest where several are equally near.
+    squared : (n,) float array
+        Result: squared distance to it.
+    """
+    d, u = codebook.shape
+    distance = np.empty(BLOCK)
+    for start in range(0, inputs.shape[1], BLOCK):
+        stop = min(start + BLOCK, inputs.shape[1])
+        best, unit = squared[start:stop], winners[start:stop]
+        best[:] = np.inf
+        for i in range(u):
+            distance[:] = 0.0
+            for axis in range(d - 1):
+                m = codebook[axis, i]
+                x = inputs[axis, start:stop]
+                for n in range(len(x)):
+                    distance[n] += (x[n] - m) * (x[n] - m)
+            m = codebook[d - 1, i]
+            x = inputs[d - 1, start:stop]
+            for n in range(len(best)):
+                total = distance[n] + (x[n] - m) * (x[n] - m)
+                nearer = total < best[n]
+                best[n] = total if nearer else best[n]
+                unit[n] = i if nearer else unit[n]
+
+
+@kernel("void(f8[:,::1], f8[:,::1], i4[:,::1], f8[:,::1])")
+def train_batch(
+    codebook: NDArray[np.float64],
+    inputs: NDArray[np.float64],
+    hops: NDArray[np.int32],
+    weights: NDArray[np.float64],
+) -> None:
+    """Move each neuron to the neighborhood-weighted mean of the inputs, again and again (Kohonen 1991).
+
+    Parameters
+    ----------
+    codebook : (d, u) float array
+        Changed in place; a neuron that no input reaches stays.
+    inputs : (d, n) float array
+    hops : (u, u) int array
+    weights : (epochs, h) float array
+        Neighborhood of each epoch by the number of hops, 0 to h - 1.
+
+    Notes
+    -----
+    Sums run over the inputs in their order, then over the winners in theirs.
+    """
+    d, u = codebook.shape
+    winners = np.empty(inputs.shape[1], np.int32)
+    squared = np.empty(inputs.shape[1])
+    total = np.empty((d + 1, u))
+    for epoch in range(len(weights)):
+        best_matching_units(codebook, inputs, winners, squared)
+        total[:] = 0.0
+        for n in range(len(winners)):
+            total[d, winners[n]] += 1.0
+        for axis in range(d):
+            for n in range(len(winners)):
+                total[axis, winners[n]] += inputs[axis, n]
+        for i in range(u):
+            reached = 0.0
+            for c in range(u):
+                reached += weights[epoch, hops[i, c]] * total[d, c]
+            if reached > 0.0:
+                for axis in range(d):
+                    moved = 0.0
+                    for c in range(u):
+                        moved += weights[epoch, hops[i, c]] * total[axis, c]
+                    codebook[axis, i] = moved / reached

@@ -1,0 +1,60 @@
+"""Share ranges of independent work among threads."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+
+
+def in_blocks(
+    work: Callable[[int, int], None],
+    total: int,
+    *,
+    block: int,
+    threads: int = 0,
+    done: Callable[[int], None] = lambda count: None,
+) -> None:
+    """Call ``work(start, stop)`` on blocks that cover ``range(total)``.
+
+    Parameters
+    ----------
+    work : callable
+        Must write only to its own range, so that the result does not depend on the threads.
+    total, block : int
+        Amount of work, and how much of it one call takes: at most 100 ms, so that Ctrl-C answers at once.
+    threads : int
+        0 is one a core.
+    done : callable
+        Told how much is finished after each block, from the calling thread; may raise to stop the work.
+    """
+    starts = range(0, total, max(block, 1))
+    workers = min(threads or os.cpu_count() or 1, len(starts))
+    if workers <= 1:
+        for start in starts:
+            work(start, min(start + block, total))
+            done(min(start + block, total))
+        return
+    _in_pool(work, starts, total, block, workers, done)
+
+
+def _in_pool(
+    work: Callable[[int, int], None],
+    starts: range,
+    total: int,
+    block: int,
+    workers: int,
+    done: Callable[[int], None],
+) -> None:
+    pool = ThreadPoolExecutor(workers)
+    try:
+        waiting = {pool.submit(work, start, min(start + block, total)) for start in starts}
+        finished = 0
+        while waiting:
+            ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in ready:
+                future.result()
+            finished = min(finished + len(ready) * block, total)
+            done(finished)
+    finally:
+        pool.shutdown(cancel_futures=True)

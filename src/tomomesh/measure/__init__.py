@@ -1,0 +1,1 @@
+"""TriMesh -> Report: topology, distances, triangle shapes."""

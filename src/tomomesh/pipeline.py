@@ -1,0 +1,258 @@
+"""The whole way, one arrow a line: study -> mask -> networks -> points -> cubes -> cuberille -> mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .account import Account
+from .errors import GeometryError
+from .measure.topology import check_promise
+from .model.mesh import QuadMesh, TriMesh
+from .model.points import CAP, PointSet
+from .model.volume import AXES, Volume
+from .progress import Progress, silent
+from .segment.sample import Sampling, sample
+from .segment.study import regions, train_study
+from .segment.window import choose_window, window
+from .settings import Settings
+from .surface.closing import close_shell
+from .surface.composition import well_composed
+from .surface.cuberille import track
+from .surface.dynamics import fit
+from .surface.partition import partition, sampling_distance
+from .surface.smooth import low_pass
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .model.cubes import CubeGrid
+    from .model.networks import Networks
+    from .model.trace import Trace
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """A study after stage one.
+
+    Attributes
+    ----------
+    volume : Volume
+        The study, its slices along K.
+    mask : (K, J, I) bool array
+        The window.
+    networks : Networks
+    labels : (K, J, I) uint16 array
+        Every window pixel's winner: 0 background, neuron + 1 within its slice.
+    points : PointSet
+        The neurons, bridged gaps and caps in patient millimeters.
+    sampling : Sampling
+    report : dict
+    """
+
+    volume: Volume
+    mask: NDArray[np.bool_]
+    networks: Networks
+    labels: NDArray[np.uint16]
+    points: PointSet
+    sampling: Sampling
+    report: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A cloud after stages two and three; every stage is kept.
+
+    Attributes
+    ----------
+    points : PointSet
+    cubes : CubeGrid
+    cuberille : QuadMesh
+    smoothed, mesh : TriMesh
+        The surface before and after the fit, with the same faces.
+    nearest : (n,) int32 array
+        The point that draws each vertex of `mesh`, -1 where there is none.
+    trace : Trace
+    report : dict
+    segmentation : Segmentation or None
+        Stage one, where the points came from a study.
+    """
+
+    points: PointSet
+    cubes: CubeGrid
+    cuberille: QuadMesh
+    smoothed: TriMesh
+    mesh: TriMesh
+    nearest: NDArray[np.int32]
+    trace: Trace
+    report: dict[str, Any]
+    segmentation: Segmentation | None = None
+
+    @property
+    def cap_faces(self) -> NDArray[np.bool_]:
+        """Faces (m,) with a corner that is drawn to a cap: filled, not measured."""
+        on_cap = (self.points.kinds[self.nearest] == CAP) & (self.nearest >= 0)
+        return np.asarray(on_cap[self.mesh.faces].any(axis=1))
+
+
+def reconstruct(
+    volume: Volume,
+    settings: Settings | None = None,
+    *,
+    truth: TriMesh | None = None,
+    progress: Progress = silent,
+    **changes: Any,
+) -> Surface:
+    """Turn a study of slices into a closed surface (Reyes Aldasoro & Algorri 2000).
+
+    Parameters
+    ----------
+    volume : Volume
+    settings : Settings, optional
+    truth : TriMesh, optional
+        The exact surface, where it is known; the report then holds the distance to it, caps aside.
+    progress : callable
+        Called as ``progress(stage, done, total)``; raise in it to stop.
+    **changes
+        Parameters by their bare names, as ``neurons=80``.
+
+    Returns
+    -------
+    Surface
+
+    Raises
+    ------
+    TomomeshError
+        Of the kind that fits; see `tomomesh.errors`.
+    """
+    settings = (settings or Settings()).replace(**changes)
+    account = Account(settings)
+    segmentation = _segment(volume, settings, account, progress)
+    surface = _surface(segmentation.points, segmentation.sampling.spacing_mm, settings, account, progress)
+    account.rings(segmentation.sampling)
+    if truth is not None:
+        account.truth(surface.mesh, surface.cap_faces, truth)
+    return replace(surface, report=account.report(), segmentation=segmentation)
+
+
+def segment(
+    volume: Volume, settings: Settings | None = None, *, progress: Progress = silent, **changes: Any
+) -> Segmentation:
+    """Run stage one alone: window, networks, regions, points.
+
+    Parameters and errors are those of `reconstruct`.
+    """
+    settings = (settings or Settings()).replace(**changes)
+    account = Account(settings)
+    found = _segment(volume, settings, account, progress)
+    return replace(found, report=account.report())
+
+
+def reconstruct_points(
+    points: PointSet | NDArray[np.float64],
+    settings: Settings | None = None,
+    *,
+    progress: Progress = silent,
+    **changes: Any,
+) -> Surface:
+    """Turn any unoriented points into a closed surface: stages two and three alone.
+
+    Parameters
+    ----------
+    points : PointSet or (n, 3) array
+        Positions; their order and repetitions change nothing.
+    settings, progress, **changes
+        As in `reconstruct`.
+
+    Returns
+    -------
+    Surface
+    """
+    settings = (settings or Settings()).replace(**changes)
+    cloud = points if isinstance(points, PointSet) else PointSet.from_positions(np.asarray(points, np.float64))
+    account = Account(settings)
+    with account.timed("points"):
+        spacing = sampling_distance(cloud.positions)
+    account.points(cloud, spacing)
+    surface = _surface(cloud, spacing, settings, account, progress)
+    return replace(surface, report=account.report())
+
+
+def _segment(volume: Volume, settings: Settings, account: Account, progress: Progress) -> Segmentation:
+    axis = _slice_axis(volume, settings.network.slices)
+    stack = volume.along(axis)
+    account.study(stack, AXES[axis])
+    with account.timed("window"):
+        lower, upper = choose_window(volume, settings.window)
+        mask = window(stack, lower=lower, upper=upper)
+    account.window(mask, lower, upper)
+    pixel_mm, threads = stack.spacing_mm[:2], settings.run.threads
+    with account.timed("networks"):
+        networks = train_study(
+            mask, settings.network, pixel_mm=pixel_mm, seed=settings.run.seed, threads=threads, progress=progress
+        )
+    with account.timed("regions"):
+        labels = regions(mask, networks, pixel_mm=pixel_mm, threads=threads)
+    account.networks(networks, len(mask))
+    with account.timed("points"):
+        sampling = sample(networks, stack, settings.cubes)
+    account.points(sampling.points, sampling.spacing_mm, sampling.bridged)
+    return Segmentation(stack, mask, networks, labels, sampling.points, sampling, {})
+
+
+def _slice_axis(volume: Volume, slices: str) -> int:
+    if slices == "auto":
+        return volume.thickest_axis()
+    return volume.stored_axis if slices == "stored" else AXES.index(slices)
+
+
+def _surface(
+    points: PointSet, spacing: float, settings: Settings, account: Account, progress: Progress
+) -> Surface:
+    with account.timed("cubes"):
+        grid = partition(points.positions, _cell(spacing, settings))
+        shell = close_shell(grid.keys, settings.cubes.closing, progress)
+        cubes = grid.with_cubes(well_composed(shell.keys))
+    account.cubes(grid, shell, cubes)
+    if not shell.holds:
+        _leaks(account, settings)
+    with account.timed("cuberille"):
+        tracked = track(cubes, surface=settings.cubes.surface)
+        cuberille = tracked.mesh
+    account.surface(tracked)
+    with account.timed("smooth"):
+        rough = cuberille.triangulated()
+        smoothed = rough.moved(low_pass(cuberille.vertices, cuberille.edges, settings.cubes.smoothing))
+    with account.timed("fit"):
+        springs = cuberille.edges if settings.fit.springs == "quads" else rough.edges
+        rest = fit(
+            smoothed.vertices, springs, cuberille.vertex_cubes, points.positions, cubes, settings.fit,
+            threads=settings.run.threads, progress=progress,
+        )  # fmt: skip
+    mesh = smoothed.moved(rest.vertices)
+    account.fit(rest.trace)
+    with account.timed("quality"):
+        check_promise(mesh)
+        account.quality(mesh, points)
+    return Surface(points, cubes, cuberille, smoothed, mesh, rest.nearest, rest.trace, {})
+
+
+def _cell(spacing: float, settings: Settings) -> NDArray[np.float64]:
+    """Return the edge of the cubes along each axis: r, or what was asked for, times the dilation factor."""
+    asked = settings.cubes.cell_mm or (spacing,)
+    return np.broadcast_to(np.array(asked, np.float64) * settings.cubes.cell_factor, 3).copy()
+
+
+def _leaks(account: Account, settings: Settings) -> None:
+    """Refuse a shell that the outside leaks into, unless that was allowed."""
+    if settings.cubes.allow_leaks:
+        account.warn("the outside leaks into the shell: the surface is two-walled in places")
+        return
+    raise GeometryError(
+        "the outside leaks into the shell of cubes, so its surface would have two walls",
+        found=f"cell = {account.cell_mm:.4g} mm",
+        expected="gaps between the points that are narrower than a hole of the surface",
+        hint="a larger --cell-mm or --closing, or --allow-leaks",
+    )

@@ -1,0 +1,1 @@
+"""Volume -> PointSet: window, networks, regions, points."""

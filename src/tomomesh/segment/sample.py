@@ -1,0 +1,162 @@
+"""Networks -> points: neurons in patient millimeters, bridged gaps and caps (Fig. 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..model.points import BRIDGE, CAP, NEURON, PointSet
+from .polygon import area, distance, inside, lattice_inside
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.networks import Networks
+    from ..model.volume import Volume
+    from ..settings import CubeSettings
+
+REACH = 2
+"""Rings at most this many slices apart count as neighbors: one slice without a network between them is bridged."""
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """The point set P with what is known about its density.
+
+    Attributes
+    ----------
+    points : PointSet
+    spacing_mm : float
+        r: the widest gap between neighbors in a network, and between slices.
+    bridged : int
+        Edges of the networks that were sampled along their line.
+    ring_area_mm2 : (s,) float array
+        Area inside each ring; empty for other networks.
+    distance_mm : (s,) float array
+        Position of each network's slice along the stack.
+    """
+
+    points: PointSet
+    spacing_mm: float
+    bridged: int
+    ring_area_mm2: NDArray[np.float64]
+    distance_mm: NDArray[np.float64]
+
+
+def sample(networks: Networks, volume: Volume, settings: CubeSettings) -> Sampling:
+    """Place the neurons of all slices in space, sample bridged gaps, and close the ends of rings.
+
+    Parameters
+    ----------
+    networks : Networks
+    volume : Volume
+        Its slices K are those of the networks.
+    settings : CubeSettings
+        ``bridge`` and ``caps`` are read.
+
+    Returns
+    -------
+    Sampling
+    """
+    neurons = _neurons(networks, volume)
+    bridges, bridged, in_ring = _bridges(networks, volume, settings.bridge)
+    points = neurons.joined(bridges)
+    is_ring = networks.lattice.name == "ring"
+    spacing = max(in_ring, _slice_step(networks, volume))
+    if is_ring and settings.caps:
+        points = points.joined(_caps(networks, volume, spacing))
+    spacing = max(spacing, _across(points, settings.bridge))
+    pixel = np.prod(volume.spacing_mm[:2])
+    areas = np.array([abs(area(ring)) for ring in networks.codebooks]) * pixel if is_ring else np.empty(0)
+    return Sampling(points, spacing, bridged, areas, networks.slices * volume.spacing_mm[2])
+
+
+def _neurons(networks: Networks, volume: Volume) -> PointSet:
+    count, u = networks.codebooks.shape[:2]
+    slices = np.repeat(networks.slices, u)
+    numbers = np.tile(np.arange(u, dtype=np.int32), count)
+    positions = _place(networks.codebooks.reshape(-1, 2), slices, volume)
+    return PointSet(positions, slices, numbers, np.full(len(slices), NEURON, np.uint8))
+
+
+def _place(indices: NDArray[np.float64], slices: NDArray[np.int32], volume: Volume) -> NDArray[np.float64]:
+    return volume.to_mm(np.column_stack([indices, slices]))
+
+
+def _made(indices: NDArray[np.float64], slices: NDArray[np.int32], volume: Volume, kind: int) -> PointSet:
+    """Return points that are no neurons."""
+    none = np.full(len(slices), -1, np.int32)
+    return PointSet(_place(indices, slices, volume), slices, none, np.full(len(slices), kind, np.uint8))
+
+
+def _bridges(networks: Networks, volume: Volume, bridge: float) -> tuple[PointSet, int, float]:
+    """Sample each edge over `bridge` medians of its slice; return also how many, and the widest gap left."""
+    pixel = np.array(volume.spacing_mm[:2])
+    ends = networks.codebooks[:, networks.lattice.edges]
+    lengths = np.sqrt((((ends[:, :, 1] - ends[:, :, 0]) * pixel) ** 2).sum(axis=2))
+    median = np.median(lengths, axis=1, keepdims=True)
+    pieces = np.ones(lengths.shape, np.int64)
+    if bridge > 0:
+        wide = (lengths > bridge * median) & (median > 0)
+        pieces[wide] = np.ceil((lengths / np.where(median > 0, median, 1))[wide])
+    which, edge = np.nonzero(pieces > 1)
+    inner = pieces[which, edge] - 1
+    owner = np.repeat(np.arange(len(which)), inner)
+    step = np.arange(len(owner)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
+    share = (step / pieces[which, edge][owner])[:, None]
+    first, last = ends[which, edge, 0][owner], ends[which, edge, 1][owner]
+    indices = first + share * (last - first)
+    points = _made(indices, networks.slices[which][owner], volume, BRIDGE)
+    return points, len(which), float((lengths / pieces).max())
+
+
+def _slice_step(networks: Networks, volume: Volume) -> float:
+    """Return the widest distance between slices that count as neighbors."""
+    steps = np.diff(networks.slices)
+    steps = steps[steps <= REACH]
+    return float(steps.max(initial=1) * volume.spacing_mm[2])
+
+
+def _across(points: PointSet, limit: float) -> float:
+    """Return the widest gap from a ring to the next slice, or to a cap on its own slice where there is no next.
+
+    Gaps over `limit` medians are left to the closing of the shell, as bridged edges are; 0 takes the widest.
+    """
+    gaps = []
+    present = np.unique(points.slices)
+    for here, there in zip(present[:-1], present[1:], strict=True):
+        if there - here > REACH:
+            continue
+        lower, upper = points.slices == here, points.slices == there
+        for own, other in ((lower, upper), (upper, lower)):
+            ring = own & (points.kinds != CAP)
+            target = other | (own & (points.kinds == CAP))
+            gaps.append(cKDTree(points.positions[target]).query(points.positions[ring])[0])
+    if not gaps:
+        return 0.0
+    widest = np.concatenate(gaps)
+    return float(widest[widest <= limit * np.median(widest)].max(initial=0.0) if limit else widest.max())
+
+
+def _caps(networks: Networks, volume: Volume, spacing: float) -> PointSet:
+    """Fill what lies inside a ring but not inside the next ring above, or below, at the given spacing."""
+    pixel = np.array(volume.spacing_mm[:2])
+    rings = networks.codebooks * pixel
+    found = []
+    for n, ring in enumerate(rings):
+        lattice = lattice_inside(ring, spacing)
+        bare = np.zeros(len(lattice), bool)
+        for m in (n - 1, n + 1):
+            if 0 <= m < len(rings) and abs(networks.slices[m] - networks.slices[n]) <= REACH:
+                outside = ~inside(rings[m], lattice)
+                outside[outside] = distance(rings[m], lattice[outside]) > spacing / 2
+                bare |= outside
+            else:
+                bare |= True
+        bare[bare] = distance(ring, lattice[bare]) > spacing / 2
+        found.append(lattice[bare] / pixel)
+    slices = np.repeat(networks.slices, [len(f) for f in found])
+    return _made(np.concatenate(found), slices, volume, CAP)

@@ -1,0 +1,123 @@
+"""Train a network on every slice of a study."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import EmptyError
+from ..kernels.threads import in_blocks
+from ..model.lattice import lattice
+from ..model.networks import Networks
+from ..progress import Progress, silent
+from .even import even_spacing
+from .signal import fills_most, outline
+from .som import match, train
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..settings import NetworkSettings
+
+EVEN_BRIDGE = 2.0
+"""Edges over this many medians are gaps, which even spacing leaves as they are."""
+
+
+def train_study(
+    mask: NDArray[np.bool_],
+    settings: NetworkSettings,
+    *,
+    pixel_mm: tuple[float, float] = (1.0, 1.0),
+    seed: int = 0,
+    threads: int = 0,
+    progress: Progress = silent,
+) -> Networks:
+    """Run one self-organising map on each slice of a window (the paper's Fig. 5, 7).
+
+    Slices are the unit of parallel work, and each draws from a generator of its own, so the result does not
+    depend on the number of threads.
+
+    Parameters
+    ----------
+    mask : (K, J, I) bool array
+    settings : NetworkSettings
+    pixel_mm : (float, float)
+        Distance of the columns and of the rows: the networks live in millimeters.
+    seed, threads : int
+    progress : callable
+
+    Returns
+    -------
+    Networks
+        Slices with fewer pixels than neurons have none.
+
+    Raises
+    ------
+    EmptyError
+        Where no slice has pixels enough.
+    """
+    graph = lattice(settings.network, settings.neurons)
+    outlined = settings.signal == "boundary" or (settings.signal == "auto" and fills_most(mask))
+    count = len(mask)
+    pixel_area = pixel_mm[0] * pixel_mm[1]
+    codebooks = np.zeros((count, len(graph), 2))
+    pixels, strays = np.zeros(count, np.int64), np.zeros(count, np.int64)
+
+    def work(start: int, stop: int) -> None:
+        for k in range(start, stop):
+            shown = np.argwhere(outline(mask[k]) if outlined else mask[k])[:, ::-1] * np.array(pixel_mm)
+            pixels[k] = len(shown)
+            if len(shown) >= len(graph):
+                codebook, kept = train(
+                    shown, graph, settings, np.random.default_rng([seed, k]), pixel_area=pixel_area
+                )
+                if settings.even:
+                    codebook = even_spacing(codebook, graph, bridge=EVEN_BRIDGE)
+                codebooks[k], strays[k] = codebook / pixel_mm, (~kept).sum()
+
+    in_blocks(work, count, block=1, threads=threads, done=lambda done: progress("networks", done, count))
+    trained = pixels >= len(graph)
+    if not trained.any():
+        raise EmptyError(
+            "no slice has pixels enough for a network",
+            found=f"at most {pixels.max()} pixels in a slice",
+            expected=f"at least {len(graph)}, one a neuron",
+            hint="a wider window, or fewer --neurons",
+        )
+    slices = np.flatnonzero(trained).astype(np.int32)
+    return Networks(
+        graph, slices, codebooks[trained], np.full(len(slices), outlined), pixels[trained], strays[trained]
+    )
+
+
+def regions(
+    mask: NDArray[np.bool_], networks: Networks, *, pixel_mm: tuple[float, float] = (1.0, 1.0), threads: int = 0
+) -> NDArray[np.uint16]:
+    """Compare the networks with the image: give every window pixel its winner's label (Fig. 5).
+
+    Parameters
+    ----------
+    mask : (K, J, I) bool array
+    networks : Networks
+    pixel_mm : (float, float)
+        Distance of the columns and of the rows.
+    threads : int
+
+    Returns
+    -------
+    (K, J, I) uint16 array
+        0 outside the window and on slices without a network, else the neuron's number within its slice plus 1.
+    """
+    labels = np.zeros(mask.shape, np.uint16)
+
+    def work(start: int, stop: int) -> None:
+        for n in range(start, stop):
+            plane = networks.slices[n]
+            row, column = np.nonzero(mask[plane])
+            by_axis = np.stack([column, row]) * np.array(pixel_mm)[:, None]
+            winners, _ = match(np.ascontiguousarray((networks.codebooks[n] * pixel_mm).T), by_axis)
+            labels[plane, row, column] = winners + 1
+
+    in_blocks(work, len(networks.slices), block=1, threads=threads)
+    return labels

@@ -1,0 +1,68 @@
+"""The history of a fit: how fast, how far, how much energy."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator, NullLocator
+
+from .marks import small_print
+from .style import ACCENT, INK, MUTED, NETWORK, canvas, heading, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from ..model.trace import Trace
+
+
+@styled
+def draw_fit(trace: Trace, *, tolerance: float | None = None, unit: str = "mm") -> Figure:
+    """Draw the trace of the dynamic mesh over its steps.
+
+    Parameters
+    ----------
+    trace : Trace
+        One entry a step.
+    tolerance : float, optional
+        Speed and acceleration at which the mesh rests, drawn as a line.
+    unit : str
+        The unit of the distances.
+    """
+    figure, axes = canvas(9.2, 5.8, 2, 2)
+    state = "converged" if trace.converged else "not converged"
+    _curves(axes[0], {"speed": trace.speed, "acceleration": trace.acceleration}, log=True)
+    if tolerance is not None:
+        axes[0].axhline(tolerance, color=MUTED, linewidth=0.9, linestyle=":")
+        small_print(axes[0], "tolerance", np.array([1, tolerance]), (0, 6), align="left")
+    heading(axes[0], "Motion", f"largest over the vertices, cube edges; {state} in {len(trace.speed)} steps")
+    _curves(axes[1], {"mean distance": trace.distance_mm})
+    heading(axes[1], "Distance to the points", f"mean over the attracted vertices, {unit}")
+    _curves(axes[2], {"kinetic": trace.kinetic, "potential": trace.potential}, log=True)
+    heading(axes[2], "Energy", f"per unit of k_d, {unit}²")
+    _curves(axes[3], {"clamped to one cube edge": trace.clamped, "without a point": trace.unattracted})
+    heading(axes[3], "Vertices", "number of vertices held back or not attracted")
+    for ax in axes[2:]:
+        ax.set_xlabel("step")
+    return figure
+
+
+def _curves(ax: Axes, curves: dict[str, NDArray[np.generic]], *, log: bool = False) -> None:
+    """Draw curves over the steps; a logarithmic axis leaves zeros out."""
+    for (name, values), color in zip(curves.items(), (NETWORK, ACCENT), strict=False):
+        heights = np.asarray(values, float)
+        if log:
+            heights = np.where(heights > 0, heights, np.nan)
+        ax.plot(np.arange(1, len(heights) + 1), heights, color=color, label=name, marker="o", markersize=2.6)
+    if log and any((np.asarray(values) > 0).any() for values in curves.values()):
+        ax.set_yscale("log")
+        ax.yaxis.set_major_formatter("{x:g}")
+        ax.yaxis.set_minor_locator(NullLocator())
+    else:
+        ax.set_ylim(bottom=0)
+    ax.grid(axis="y")
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if len(curves) > 1:
+        ax.legend(loc="best", labelcolor=INK)

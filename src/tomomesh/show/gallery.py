@@ -1,0 +1,117 @@
+"""All pictures of a run, from its stages."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .fit import draw_fit
+from .plane import Plane
+from .relief import draw_relief
+from .render import View
+from .slices import draw_contour, draw_regions, draw_window
+from .space import draw_points, draw_shaded, draw_surfaces, draw_wireframe
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from ..model.mesh import QuadMesh, TriMesh
+    from ..model.networks import Networks
+    from ..model.points import PointSet
+    from ..model.trace import Trace
+
+
+def draw_all(
+    *,
+    images: NDArray[Any] | None = None,
+    mask: NDArray[np.bool_] | None = None,
+    networks: Networks | None = None,
+    labels: NDArray[Any] | None = None,
+    points: PointSet | None = None,
+    cuberille: QuadMesh | None = None,
+    triangulated: TriMesh | None = None,
+    smoothed: TriMesh | None = None,
+    mesh: TriMesh | None = None,
+    trace: Trace | None = None,
+    plane: Plane = Plane(),  # noqa: B008
+    view: View = View(),  # noqa: B008
+    bridge: float = 2.0,
+    tolerance: float | None = None,
+) -> Iterator[tuple[str, Figure]]:
+    """Draw every picture whose stages are given, numbered as the paper's figures.
+
+    Parameters
+    ----------
+    images : (K, J, I) or (K, J, I, L) array
+        The slices.
+    mask : (K, J, I) bool array
+        The window.
+    networks : Networks
+        The trained networks.
+    labels : (K, J, I) int array
+        0 outside, else neuron plus one.
+    points, cuberille, triangulated, smoothed, mesh, trace
+        The later stages.
+    plane : Plane
+        Spacing and sense of the slices.
+    view : View
+        How space is looked at, its unit and axes.
+    bridge : float
+        Edges over this many medians are bridged gaps.
+    tolerance : float, optional
+        Where the fit rests.
+
+    Yields
+    ------
+    name : str
+        As ``"03-relief"``, the name for a file.
+    figure : Figure
+    """
+    if images is not None and mask is not None:
+        yield from _of_slice(images, mask, networks, labels, plane, bridge)
+    if points is not None and len(points):
+        yield "07-points", draw_points(points, view)
+    if cuberille is not None or triangulated is not None or smoothed is not None:
+        yield "08-surfaces", draw_surfaces(cuberille, triangulated, smoothed, view)
+    if mesh is not None and len(mesh.faces):
+        yield "09-wireframe", draw_wireframe(mesh, view)
+        yield "10-shaded", draw_shaded(mesh, view)
+    if trace is not None and len(trace.speed):
+        yield "11-fit", draw_fit(trace, tolerance=tolerance, unit=view.unit)
+
+
+def _of_slice(
+    images: NDArray[Any],
+    mask: NDArray[np.bool_],
+    networks: Networks | None,
+    labels: NDArray[Any] | None,
+    plane: Plane,
+    bridge: float,
+) -> Iterator[tuple[str, Figure]]:
+    k = median_slice(mask, None if networks is None else networks.slices)
+    note = f"slice {k + 1} of {len(images)}"
+    yield "03-relief", draw_relief(images[k], plane)
+    yield "04-window", draw_window(images[k], mask[k], plane, note=note)
+    if networks is None or k not in networks.slices:
+        return
+    codebook = networks.codebooks[np.flatnonzero(networks.slices == k)[0]]
+    if labels is not None:
+        yield (
+            "05-regions",
+            draw_regions(images[k], mask[k], codebook, networks.lattice, labels[k], plane),
+        )
+    yield "06-network", draw_contour(mask[k], codebook, networks.lattice, plane, bridge=bridge)
+
+
+def median_slice(mask: NDArray[np.bool_], among: NDArray[np.int32] | None = None) -> int:
+    """Return the slice with the median number of window pixels, among those given or those that have any."""
+    pixels = np.count_nonzero(mask, axis=(1, 2))
+    slices = np.flatnonzero(pixels) if among is None or not len(among) else np.asarray(among)
+    if not len(slices):
+        return 0
+    order = np.argsort(pixels[slices], kind="stable")
+    return int(slices[order[(len(order) - 1) // 2]])

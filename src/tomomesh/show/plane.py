@@ -1,0 +1,98 @@
+"""How a slice lies in its picture: its millimeters, its gray levels, its panels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .style import INK, canvas
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    Pixels = NDArray[Any]
+    Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A slice's own millimeters, from the center of its first pixel.
+
+    Attributes
+    ----------
+    spacing_mm : (x, y)
+        Distance of the pixels along a row and along a column.
+    upward : bool
+        Whether the rows rise, as in coronal and sagittal slices, or fall.
+    unit : str
+        What the spacing is measured in.
+    """
+
+    spacing_mm: tuple[float, float] = (1.0, 1.0)
+    upward: bool = False
+    unit: str = "mm"
+
+    def place(self, indices: Floats) -> Floats:
+        """Carry (n, 2) pixel indices (column, row) to millimeters."""
+        return np.asarray(indices * np.array(self.spacing_mm))
+
+    def draw(self, ax: Axes, image: Pixels, span: tuple[float, float] = (0, 1)) -> None:
+        """Show (J, I) levels in gray, black and white at the ends of the span, or (J, I, 3) colors."""
+        (dx, dy), (rows, columns) = self.spacing_mm, image.shape[:2]
+        first, last = -0.5 * dy, (rows - 0.5) * dy
+        bottom, top = (first, last) if self.upward else (last, first)
+        ax.imshow(
+            image,
+            extent=(-0.5 * dx, (columns - 0.5) * dx, bottom, top),
+            origin="lower" if self.upward else "upper",
+            interpolation="nearest",
+            cmap="gray",
+            vmin=span[0],
+            vmax=span[1],
+        )
+
+    def bounds(self, mask: Pixels, places: Floats) -> Floats:
+        """Return the lowest and highest (x, y) of the window and the places, with a margin, (2, 2)."""
+        rows, columns = np.nonzero(mask)
+        seen = np.vstack([self.place(np.stack([columns, rows], axis=1)), places])
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        margin = 0.09 * float((high - low).max()) + max(self.spacing_mm)
+        return np.stack([low - margin, high + margin])
+
+    def crop(self, ax: Axes, bounds: Floats) -> None:
+        """Limit a panel."""
+        (left, low), (right, high) = bounds
+        ax.set_aspect("equal")
+        ax.set(xlim=(left, right), ylim=(low, high) if self.upward else (high, low))
+
+    def rule(self, axes: list[Axes]) -> None:
+        """Name the axes of a row of panels."""
+        for ax in axes:
+            ax.set_xlabel(f"along a row ({self.unit})")
+            ax.locator_params(nbins=6)
+            for spine in ax.spines.values():
+                spine.set_edgecolor(INK)
+        axes[0].set_ylabel(f"along a column ({self.unit})")
+
+
+def gray(image: Pixels) -> Floats:
+    """Return one level a pixel, the mean over the layers of a (J, I, L) image."""
+    return np.asarray(image if image.ndim == 2 else image.mean(axis=2), np.float64)
+
+
+def contrast(levels: Floats) -> tuple[float, float]:
+    """Return the span of nearly all levels, or of all where nearly all are equal."""
+    low, high = np.percentile(levels, [0.2, 99.8])
+    return (float(low), float(high)) if low < high else (float(levels.min()), float(levels.max()))
+
+
+def panels(
+    width: float, count: int, size: Floats, more: float, gap: float = 0.02
+) -> tuple[Figure, list[Axes]]:
+    """Open a row of panels as high as their content (x, y) needs, and `more` inches for what is written."""
+    ratio = float(np.clip(size[1] / size[0], 0.4, 1.8))
+    return canvas(width, width / count * ratio + more, 1, count, gap=gap)

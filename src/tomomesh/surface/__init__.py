@@ -1,0 +1,1 @@
+"""PointSet -> TriMesh: partition, closing, cuberille, low-pass filter, dynamic mesh."""

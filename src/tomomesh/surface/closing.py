@@ -1,0 +1,135 @@
+"""Close the gaps of a shell of cubes, and tell whether it keeps the outside out.
+
+Topology comes from a coarser scale than geometry: the cubes are dilated until the outside no longer reaches the
+inside, and what was added is taken away again from the outside only (a morphological closing).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.cells import label_components, spread
+from ..progress import Progress, silent
+from .neighbors import FACE_COLUMNS, column_of, dilate, neighbor_table
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+WIDEST = 8
+"""Largest closing that is tried by itself, cubes."""
+HELD = 0.5
+"""Share of a component's occupied cubes that must see enclosed space for the shell to hold."""
+DEBRIS = 0.01
+"""Components with less than this share of the occupied cubes have no say."""
+
+BELOW = column_of((0, 0, -1))
+
+
+@dataclass(frozen=True)
+class Shell:
+    """A set of cubes after closing.
+
+    Attributes
+    ----------
+    keys : (c,) int64 array
+        Occupied cubes and those added, rising.
+    closing : int
+        Cubes by which the shell was dilated and eroded.
+    two_sided : float
+        Smallest share, over the components, of occupied cubes that see enclosed space: near 1 where the
+        shell holds, near 0 where the outside leaks in and the surface would be two-walled.
+    """
+
+    keys: NDArray[np.int64]
+    closing: int
+    two_sided: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the outside stays out."""
+        return self.two_sided >= HELD
+
+
+def close_shell(occupied: NDArray[np.int64], closing: int | None = None, progress: Progress = silent) -> Shell:
+    """Close the shell by a given number of cubes, or by the fewest that make it hold.
+
+    Parameters
+    ----------
+    occupied : (c,) int64 array
+        Keys of the cubes that hold points, rising.
+    closing : int, optional
+    progress : callable
+
+    Returns
+    -------
+    Shell
+        Where no closing up to `WIDEST` holds, the unclosed cubes; see `Shell.holds`.
+    """
+    tried = range(WIDEST + 1) if closing is None else [closing]
+    for count, steps in enumerate(tried):
+        progress("closing", count, len(tried))
+        band = _Band.around(occupied, steps)
+        share = band.two_sided()
+        if share >= HELD or closing is not None:
+            progress("closing", len(tried), len(tried))
+            return Shell(band.closed(), steps, share)
+    progress("closing", len(tried), len(tried))
+    return Shell(occupied, 0, _Band.around(occupied, 0).two_sided())
+
+
+@dataclass(frozen=True)
+class _Band:
+    """Dilated cubes with one layer of empty ones around them: all that the test and the erosion look at."""
+
+    keys: NDArray[np.int64]
+    table: NDArray[np.int32]
+    occupied: NDArray[np.bool_]
+    dilated: NDArray[np.bool_]
+    outside: NDArray[np.bool_]
+    steps: int
+
+    @classmethod
+    def around(cls, occupied: NDArray[np.int64], steps: int) -> _Band:
+        inner = dilate(occupied, steps)
+        keys = dilate(inner, 1)
+        table = neighbor_table(keys)
+        dilated = np.isin(keys, inner, assume_unique=True)
+        return cls(
+            keys, table, np.isin(keys, occupied, assume_unique=True), dilated, _outer_layer(table, dilated), steps
+        )
+
+    def two_sided(self) -> float:
+        """Return the smallest share, over the components, of occupied cubes near enclosed space or inside a solid."""
+        depth = np.where(~self.dilated & ~self.outside, 0, -1).astype(np.int32)
+        spread(self.table, self.dilated, depth, self.steps + 1)
+        filled = np.append(self.occupied, False)[self.table].all(axis=1)
+        inside = (depth >= 0) | (np.append(filled, False)[self.table].any(axis=1))
+        labels = np.full(len(self.keys), -1, np.int32)
+        label_components(self.table, self.dilated, labels)
+        cubes = np.bincount(labels[self.occupied])
+        seeing = np.bincount(labels[self.occupied], weights=inside[self.occupied])
+        return float((seeing / cubes)[cubes >= DEBRIS * cubes.sum()].min())
+
+    def closed(self) -> NDArray[np.int64]:
+        """Take away again what the outside reaches within the dilation, never passing an occupied cube."""
+        depth = np.where(self.outside, 0, -1).astype(np.int32)
+        spread(self.table, self.dilated & ~self.occupied, depth, self.steps)
+        return self.keys[self.dilated & (depth < 0)]
+
+
+def _outer_layer(table: NDArray[np.int32], dilated: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which cubes of the empty layer lie outside.
+
+    The layer falls apart into pieces that are connected over faces, one around each object and one lining each
+    cavity. The lowest cube of a cavity has the object right below it; the lowest cube around an object has not.
+    """
+    labels = np.full(len(dilated), -1, np.int32)
+    count = label_components(np.ascontiguousarray(table[:, FACE_COLUMNS]), ~dilated, labels)
+    empty = np.flatnonzero(~dilated)
+    _, first = np.unique(labels[empty], return_index=True)
+    below = table[empty[first], BELOW]
+    lining = (below >= 0) & dilated[below]
+    return np.append(~lining, False)[labels] if count else np.zeros(len(dilated), bool)

@@ -1,0 +1,184 @@
+"""The dynamic mesh: masses on springs, drawn to the points (eq. 5-7).
+
+mu_i x_i'' + gamma_i x_i' + sum_j k (x_i - x_j) + k_d (x_i - x_d) = 0, natural lengths zero, explicit Euler.
+
+With masses mu_i = k_d + sum_j k every vertex has omega_i = 1, critical damping is gamma_i = 2 mu_i, and a step
+h <= 1 is stable on every mesh: nobody has to know the unit of a stiffness.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.cells import nearest_points
+from ..kernels.threads import in_blocks
+from ..model.trace import Trace
+from ..progress import Progress, silent
+from .neighbors import neighbor_table
+from .smooth import adjacency
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.cubes import CubeGrid
+    from ..settings import FitSettings
+
+BLOCK = 20_000
+"""Vertices matched in one call: far below 100 ms."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A mesh at rest.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float array
+    nearest : (n,) int32 array
+        The point that draws each vertex, -1 where there is none.
+    trace : Trace
+    """
+
+    vertices: NDArray[np.float64]
+    nearest: NDArray[np.int32]
+    trace: Trace
+
+
+def fit(
+    vertices: NDArray[np.float64],
+    edges: NDArray[np.int64],
+    cubes: NDArray[np.int64],
+    points: NDArray[np.float64],
+    grid: CubeGrid,
+    settings: FitSettings,
+    *,
+    threads: int = 0,
+    progress: Progress = silent,
+) -> Fit:
+    """Let the mesh move until it rests on the points.
+
+    Each vertex is drawn to the point nearest to it: at first among those of the cube it came from and its 26
+    neighbors, then at every step among those of the cube that holds the point last assigned and its 26
+    neighbors. Where those hold none it has no k_d and follows its springs.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float array
+        Where the mesh starts, at rest.
+    edges : (e, 2) int array
+        The springs, each once.
+    cubes : (n,) int array
+        The cube of `grid` behind each vertex.
+    points : (p, 3) float array
+    grid : CubeGrid
+    settings : FitSettings
+    threads : int
+    progress : callable
+
+    Returns
+    -------
+    Fit
+    """
+    motion = _Motion(vertices, edges, cubes, points, grid, settings, threads)
+    most = settings.max_steps
+    while len(motion.history) < most and not motion.rests():
+        motion.advance()
+        progress("fit", len(motion.history), most)
+    motion.match()
+    progress("fit", most, most)
+    columns = list(zip(*motion.history, strict=True)) or [()] * 7
+    trace = Trace(*(np.array(column, np.float64) for column in columns[:5]),
+                  *(np.array(column, np.int64) for column in columns[5:]), motion.rests())  # fmt: skip
+    return Fit(grid.origin + motion.position, motion.nearest, trace)
+
+
+class _Motion:
+    """Positions and velocities of the vertices, relative to the grid's origin, and one step of Euler's."""
+
+    def __init__(
+        self,
+        vertices: NDArray[np.float64],
+        edges: NDArray[np.int64],
+        cubes: NDArray[np.int64],
+        points: NDArray[np.float64],
+        grid: CubeGrid,
+        settings: FitSettings,
+        threads: int,
+    ) -> None:
+        self.grid, self.settings, self.threads, self.edges = grid, settings, threads, edges
+        self.position = np.ascontiguousarray(vertices - grid.origin)
+        self.velocity = np.zeros_like(self.position)
+        self.points = np.ascontiguousarray(points - grid.origin)
+        self.springs = adjacency(edges, len(vertices))
+        self.degree = np.diff(self.springs.indptr)[:, None]
+        self.stiffness = settings.stiffness / max(self.degree.mean(), 1.0)
+        self.table = neighbor_table(grid.keys)
+        self.cube = cubes.astype(np.int32)
+        self.nearest = np.full(len(vertices), -1, np.int32)
+        self.edge = float(grid.cell_mm.min())
+        self.history: list[tuple[float, ...]] = []
+
+    def rests(self) -> bool:
+        """Tell whether speed and acceleration have fallen below the tolerance."""
+        return bool(self.history) and max(self.history[-1][:2]) < self.settings.tolerance
+
+    def match(self) -> None:
+        """Assign its nearest point to every vertex."""
+
+        def work(start: int, stop: int) -> None:
+            nearest_points(
+                self.position, self.points, self.table, self.grid.order, self.grid.start,
+                self.cube, self.nearest, start, stop,
+            )  # fmt: skip
+
+        in_blocks(work, len(self.position), block=BLOCK, threads=self.threads)
+
+    def advance(self) -> None:
+        """Take one step: x += h x', x' += h x''; no vertex moves more than one cube edge."""
+        self.match()
+        drawn = (self.nearest >= 0)[:, None]
+        pull = np.where(drawn, self.points[self.nearest] - self.position, 0.0)
+        tension = self.stiffness * (self.springs @ self.position - self.degree * self.position)
+        mass = drawn + self.stiffness * self.degree
+        acceleration = (pull + tension) / mass - 2 * self.settings.damping * self.velocity
+        step, clamped = self._limited_step()
+        self._record(pull, drawn, mass, acceleration, clamped)
+        self.position = self.position + step * self.velocity
+        self.velocity = self.velocity + step * acceleration
+
+    def _limited_step(self) -> tuple[float, int]:
+        """Return the time step, after slowing the vertices that would move too far or shortening it for all."""
+        step = self.settings.step
+        reach = step * _length(self.velocity) / self.edge
+        far = reach > 1
+        if far.any() and self.settings.limit == "shorten":
+            return step / float(reach.max()), int(far.sum())
+        if far.any():
+            self.velocity = self.velocity / np.maximum(reach, 1.0)[:, None]
+        return step, int(far.sum())
+
+    def _record(
+        self,
+        pull: NDArray[np.float64],
+        drawn: NDArray[np.bool_],
+        mass: NDArray[np.float64],
+        acceleration: NDArray[np.float64],
+        clamped: int,
+    ) -> None:
+        stretched = self.position[self.edges[:, 0]] - self.position[self.edges[:, 1]]
+        self.history.append((
+            float(_length(self.velocity).max()) / self.edge,
+            float(_length(acceleration).max()) / self.edge,
+            0.5 * float((mass * self.velocity**2).sum()),
+            0.5 * float((pull**2).sum() + self.stiffness * (stretched**2).sum()),
+            float(_length(pull).sum() / max(int(drawn.sum()), 1)),
+            clamped,
+            int((~drawn).sum()),
+        ))  # fmt: skip
+
+
+def _length(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.sqrt((vectors**2).sum(axis=1)))

@@ -1,0 +1,80 @@
+"""Partition of space into cubes (the paper's page 3)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import EmptyError, ResourceError
+from ..model.cubes import MARGIN, SIDE, CubeGrid, keys_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def partition(positions: NDArray[np.float64], cell_mm: NDArray[np.float64]) -> CubeGrid:
+    """Flag the cubes that hold points, and register the points of each.
+
+    Parameters
+    ----------
+    positions : (n, 3) float array
+        Any unstructured points; their order does not matter.
+    cell_mm : (3,) float array
+        Edge of the cubes along x, y and z.
+
+    Returns
+    -------
+    CubeGrid
+        The lowest point lies in the middle of its cube.
+
+    Raises
+    ------
+    EmptyError
+        Without points.
+    ResourceError
+        Where the cubes are too small to be numbered; names the smallest edge.
+    """
+    if len(positions) == 0:
+        raise EmptyError("there are no points", expected="at least one")
+    low = positions.min(axis=0)
+    widest = (positions.max(axis=0) - low).max()
+    if (widest / cell_mm).max() > SIDE - 2 * MARGIN - 2:
+        raise ResourceError(
+            "the cubes are too small for the extent of the points",
+            found=f"cell = {cell_mm.min():g}",
+            expected=f"at least {widest / (SIDE - 2 * MARGIN - 2):g}",
+            hint="a larger --cell-mm",
+        )
+    origin = low - 0.5 * cell_mm
+    keys = keys_of(np.floor((positions - origin) / cell_mm).astype(np.int64))
+    order = np.lexsort((*positions.T, keys))
+    present, first = np.unique(keys[order], return_index=True)
+    return CubeGrid(present, origin, cell_mm, order, np.append(first, len(keys)))
+
+
+def sampling_distance(positions: NDArray[np.float64], *, neighbors: int = 6) -> float:
+    """Estimate the distance of neighboring samples of a surface, from their positions alone.
+
+    If points lie s apart, so that each owns s^2 of the surface, the k-th neighbor is about s sqrt(k / pi) away,
+    on a grid as well as for points thrown at random. The median over the points is returned; repeated points
+    count once.
+
+    Parameters
+    ----------
+    positions : (n, 3) float array
+    neighbors : int
+
+    Returns
+    -------
+    float
+        In the unit of the positions; 1 where all points are the same.
+    """
+    from scipy.spatial import cKDTree
+
+    distinct = np.unique(positions, axis=0)
+    k = min(neighbors, len(distinct) - 1)
+    if k == 0:
+        return 1.0
+    distance, _ = cKDTree(distinct).query(distinct, k=[k + 1])
+    return float(np.median(distance) * np.sqrt(np.pi / k))
