@@ -60,7 +60,7 @@ class TestTruth:
         )
 
     def test_is_smooth_across_the_equator(self) -> None:
-        head = Head(1.0, 1.0, 3.3)
+        head = Head()
         around = head.skull(np.full(2, 60.0), np.full(2, 30.0), np.array([-1e-4, 1e-4]))
         assert abs(np.diff(around)[0]) < 1e-6
 
@@ -68,11 +68,11 @@ class TestTruth:
 class TestDistance:
     def test_is_exact_for_a_ball(self) -> None:
         points = np.random.default_rng(0).normal(size=(100, 3)) * 10
-        away = Head(1.0, 1.0, 1.0).ellipsoid(((0.0, 0.0, 0.0), (7.0, 7.0, 7.0)), *points.T)
+        away = Head().ellipsoid(((0.0, 0.0, 0.0), (7.0, 7.0, 7.0)), *points.T)
         np.testing.assert_allclose(away, np.sqrt((points**2).sum(axis=1)) - 7, atol=1e-9)
 
     def test_of_the_skull_is_of_second_order(self) -> None:
-        head = Head(1.0, 1.0, 3.3)
+        head = Head()
         mesh = head.middle(64, 32)
         faults = []
         for offset in (2.0, 1.0, 0.5):

@@ -25,7 +25,24 @@ _HOMES = {
     "write_mesh": "io",
 }
 
-__all__ = [*_HOMES, "__version__"]  # noqa: PLE0604
+__all__ = [
+    "PointSet",
+    "Settings",
+    "TomomeshError",
+    "TriMesh",
+    "Volume",
+    "assess",
+    "phantom",
+    "read_mesh",
+    "read_points",
+    "read_volume",
+    "reconstruct",
+    "reconstruct_points",
+    "segment",
+    "window",
+    "write_mesh",
+    "__version__",
+]
 
 if TYPE_CHECKING:
     from .errors import TomomeshError

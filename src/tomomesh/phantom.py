@@ -24,6 +24,7 @@ LOWEST_MM, HIGHEST_MM = -60.0, 83.0
 SKULL_X, SKULL_Y, SKULL_UP, SKULL_DOWN = 70.0, 88.0, 85.0, 110.0
 SKULL_HALF_WIDTH = 3.3
 SCALP_WIDTH = 6.0
+FLATTEST = 0.25
 TAPER = 0.12
 """How much wider the back of the skull is than its front, as a logarithm over half its length."""
 
@@ -81,20 +82,34 @@ class Phantom:
 
 @dataclass(frozen=True)
 class Head:
-    """The head's size: `scale` in the slices' plane and `scale_z` across it, over full size."""
+    """The head's size, and the part of it that the slices meet.
 
-    scale: float
-    scale_z: float
-    half_width_mm: float
+    Attributes
+    ----------
+    scale, scale_z : float
+        Size in the slices' plane and across it, over full size.
+    half_width_mm : float
+        Half the thickness of the skull.
+    lowest_mm, highest_mm : float
+        Heights of the outer slices.
+    """
+
+    scale: float = 1.0
+    scale_z: float = 1.0
+    half_width_mm: float = SKULL_HALF_WIDTH
+    lowest_mm: float = LOWEST_MM
+    highest_mm: float = HIGHEST_MM
 
     @classmethod
     def fitted(cls, shape: tuple[int, int, int], spacing_mm: Triple) -> Head:
         """Fit the head to the field of view; its skull is never thinner than two and a half pixels."""
         slices, rows, columns = shape
         dx, dy, dz = spacing_mm
-        scale = min(columns * dx, rows * dy) / FIELD_MM
-        scale_z = (slices - 1) * dz / (HIGHEST_MM - LOWEST_MM)
-        return cls(scale, scale_z, max(SKULL_HALF_WIDTH * min(scale, scale_z), 1.25 * max(dx, dy)))
+        scale, depth = min(columns * dx, rows * dy) / FIELD_MM, (slices - 1) * dz
+        scale_z = max(depth / (HIGHEST_MM - LOWEST_MM), FLATTEST * scale)
+        half_width = max(SKULL_HALF_WIDTH * min(scale, scale_z), 1.25 * max(dx, dy))
+        middle = (LOWEST_MM + HIGHEST_MM) / 2 * scale_z
+        return cls(scale, scale_z, half_width, middle - depth / 2, middle + depth / 2)
 
     def skull(self, x: Floats, y: Floats, z: Floats) -> Floats:
         """Return the first-order signed distance (g - 1) / |grad g| to the skull's middle surface, mm.
@@ -119,7 +134,8 @@ class Head:
     def middle(self, around: int = 384, along: int = 144) -> TriMesh:
         """Triangulate the skull's middle surface between the outer slices, open at both ends."""
         up, down = SKULL_UP * self.scale_z, SKULL_DOWN * self.scale_z
-        latitude = np.linspace(math.asin(LOWEST_MM / SKULL_DOWN), math.asin(HIGHEST_MM / SKULL_UP), along)
+        ends = [math.asin(z / (down if z < 0 else up)) for z in (self.lowest_mm, self.highest_mm)]
+        latitude = np.linspace(ends[0], ends[1], along)
         turn = np.arange(around) * (2 * math.pi / around)
         v = np.cos(latitude)[:, None] * np.sin(turn)
         u = np.cos(latitude)[:, None] * np.cos(turn)
@@ -165,9 +181,9 @@ def phantom(
     """Make a head whose skull is known exactly.
 
     The head is fitted to the field of view: to its smaller side in the slices' plane, and across it so that
-    the slices reach from the upper jaw to just below the apex, whatever their number and distance. The
-    bright band of the skull has nearly the same gray on both sides, so that the window is symmetric about
-    its middle. The nose's opening is cut through it in the lower slices.
+    the slices reach from the upper jaw to just below the apex; a stack too thin for a head of a quarter of
+    its natural height shows the middle of one. The bright band of the skull has nearly the same gray on both
+    sides, so that the window is symmetric about its middle. The nose's opening is cut through it in front.
 
     Parameters
     ----------
@@ -191,7 +207,7 @@ def phantom(
     tissue, head = CONTRASTS[contrast], Head.fitted(shape, spacing_mm)
     affine = np.diag([*spacing_mm, 1.0])
     affine[:2, 3] = [-(shape[2] - 1) / 2 * spacing_mm[0], -(shape[1] - 1) / 2 * spacing_mm[1]]
-    affine[2, 3] = LOWEST_MM * head.scale_z
+    affine[2, 3] = head.lowest_mm
     voxels = _voxels(head, shape, affine, tissue, tissue.noise if noise is None else noise, seed)
     volume = Volume.from_stored(voxels, affine, unit=tissue.unit)
     return Phantom(volume, head.middle(), tissue.lower, tissue.upper)

@@ -134,7 +134,8 @@ def reconstruct(
     account.rings(segmentation.sampling)
     if truth is not None:
         account.truth(surface.mesh, surface.cap_faces, truth)
-    return replace(surface, report=account.report(), segmentation=segmentation)
+    report = account.report()
+    return replace(surface, report=report, segmentation=replace(segmentation, report=report))
 
 
 def segment(
@@ -171,7 +172,9 @@ def reconstruct_points(
     Surface
     """
     settings = (settings or Settings()).replace(**changes)
-    cloud = points if isinstance(points, PointSet) else PointSet.from_positions(np.asarray(points, np.float64))
+    cloud = (
+        points if isinstance(points, PointSet) else PointSet.from_positions(np.asarray(points, np.float64))
+    )
     account = Account(settings)
     with account.timed("points"):
         spacing = sampling_distance(cloud.positions)
@@ -191,7 +194,12 @@ def _segment(volume: Volume, settings: Settings, account: Account, progress: Pro
     pixel_mm, threads = stack.spacing_mm[:2], settings.run.threads
     with account.timed("networks"):
         networks = train_study(
-            mask, settings.network, pixel_mm=pixel_mm, seed=settings.run.seed, threads=threads, progress=progress
+            mask,
+            settings.network,
+            pixel_mm=pixel_mm,
+            seed=settings.run.seed,
+            threads=threads,
+            progress=progress,
         )
     with account.timed("regions"):
         labels = regions(mask, networks, pixel_mm=pixel_mm, threads=threads)

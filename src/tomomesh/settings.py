@@ -33,7 +33,17 @@ def param(
     `kind` is the type of one value; it follows from the default, except where that is None or a tuple.
     """
     kind = kind or (float if default is None or isinstance(default, tuple) else type(default))
-    meta = dict(help=help, kind=kind, unit=unit, choices=choices, low=low, above=above, high=high, length=length, paper=paper)
+    meta = dict(
+        help=help,
+        kind=kind,
+        unit=unit,
+        choices=choices,
+        low=low,
+        above=above,
+        high=high,
+        length=length,
+        paper=paper,
+    )
     return field(default=default, metadata=meta)
 
 
@@ -60,7 +70,9 @@ def _check(entry: Field[Any], value: Any) -> None:
     if meta["choices"]:
         if value not in meta["choices"]:
             raise UsageError(
-                f"{option} has no such value", found=f"{option} = {value}", expected=" | ".join(meta["choices"])
+                f"{option} has no such value",
+                found=f"{option} = {value}",
+                expected=" | ".join(meta["choices"]),
             )
         return
     if meta["kind"] is bool:
@@ -70,7 +82,9 @@ def _check(entry: Field[Any], value: Any) -> None:
     values = value if isinstance(value, tuple) else (value,)
     if meta["length"] and len(values) not in meta["length"]:
         counts = " or ".join(map(str, meta["length"]))
-        raise UsageError(f"{option} has too few or too many values", found=f"{option} = {value}", expected=counts)
+        raise UsageError(
+            f"{option} has too few or too many values", found=f"{option} = {value}", expected=counts
+        )
     if not all(_inside(meta, one) for one in values):
         raise UsageError(
             f"{option} is outside its limits", found=f"{option} = {value}", expected=limits_of(entry)
@@ -102,11 +116,19 @@ def option_of(name: str) -> str:
 class ReadSettings(Group):
     """How a study is read where its files leave a choice."""
 
-    series: int | None = param(None, "number of the series to take from a folder that holds several", kind=int, low=0)
-    spacing: tuple[float, ...] | None = param(
-        None, "distance of the voxels along columns, rows and slices, for files that hold none", unit="mm", above=0, length=(3,)
+    series: int | None = param(
+        None, "number of the series to take from a folder that holds several", kind=int, low=0
     )
-    spacing_z: float | None = param(None, "distance of the slices, for one slice or slices without positions", unit="mm", above=0)
+    spacing: tuple[float, ...] | None = param(
+        None,
+        "distance of the voxels along columns, rows and slices, for files that hold none",
+        unit="mm",
+        above=0,
+        length=(3,),
+    )
+    spacing_z: float | None = param(
+        None, "distance of the slices, for one slice or slices without positions", unit="mm", above=0
+    )
     fill_gaps: bool = param(False, "interpolate the slices that are missing from a regular stack")
 
 
@@ -114,9 +136,15 @@ class ReadSettings(Group):
 class WindowSettings(Group):
     """Gray-level window (eq. 3): a voxel is kept where lower < k <= upper."""
 
-    lower: float | None = param(None, "lowest gray level, itself left out; Otsu's where not given", unit="stored, HU for CT")
-    upper: float | None = param(None, "highest gray level, itself kept; no limit where not given", unit="stored, HU for CT")
-    preset: str | None = param(None, "a window for CT: bone is k > 300 HU, skin is k > -300 HU", kind=str, choices=("bone", "skin"))
+    lower: float | None = param(
+        None, "lowest gray level, itself left out; Otsu's where not given", unit="stored, HU for CT"
+    )
+    upper: float | None = param(
+        None, "highest gray level, itself kept; no limit where not given", unit="stored, HU for CT"
+    )
+    preset: str | None = param(
+        None, "a window for CT: bone is k > 300 HU, skin is k > -300 HU", kind=str, choices=("bone", "skin")
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -124,7 +152,9 @@ class WindowSettings(Group):
         upper = math.inf if self.upper is None else self.upper
         if lower >= upper:
             raise UsageError(
-                "the window is empty", found=f"--lower = {lower:g}, --upper = {upper:g}", expected="lower < upper"
+                "the window is empty",
+                found=f"--lower = {lower:g}, --upper = {upper:g}",
+                expected="lower < upper",
             )
 
 
@@ -147,11 +177,16 @@ class NetworkSettings(Group):
     )
     network: str = param("ring", "topology of the network", choices=("chain", "ring", "grid"))
     neurons: int = param(58, "neurons a slice", low=3, high=10_000)
-    training: str = param("batch", "one presentation at a time, or all at once", choices=("online", "batch"), paper="online")
+    training: str = param(
+        "batch", "one presentation at a time, or all at once", choices=("online", "batch"), paper="online"
+    )
     iterations: int = param(10_000, "online: presentations", unit="presentations", low=1)
     epochs: int = param(10, "batch: passes over all pixels", unit="passes", low=1)
     start: str = param(
-        "ellipse", "start positions: the ellipse of the pixels, or pixels drawn at random", choices=("ellipse", "random"), paper="random"
+        "ellipse",
+        "start positions: the ellipse of the pixels, or pixels drawn at random",
+        choices=("ellipse", "random"),
+        paper="random",
     )
     neighborhood: str = param(
         "auto",
@@ -159,7 +194,9 @@ class NetworkSettings(Group):
         choices=("auto", "bubble", "gaussian"),
         paper="bubble",
     )
-    alpha: tuple[float, float] = param((0.5, 0.01), "online: first and last learning rate", low=0, high=1, length=(2,))
+    alpha: tuple[float, float] = param(
+        (0.5, 0.01), "online: first and last learning rate", low=0, high=1, length=(2,)
+    )
     radius: tuple[float, float] | None = param(
         None,
         "first and last radius of the neighborhood (gaussian: its sigma); "
@@ -200,7 +237,9 @@ class CubeSettings(Group):
     )  # fmt: skip
     allow_leaks: bool = param(False, "write the surface even where the outside leaks into the shell")
     surface: str = param("outer", "the outer surfaces, or all, cavities too", choices=("outer", "all"))
-    smoothing: int = param(3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000)
+    smoothing: int = param(
+        3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000
+    )
 
 
 @dataclass(frozen=True)
@@ -210,11 +249,21 @@ class FitSettings(Group):
     stiffness: float = param(0.5, "sum of the structural stiffness at a vertex over k_d", low=0)
     damping: float = param(1.0, "damping over critical damping", above=0)
     step: float = param(0.8, "time step, in units of 1/omega; the stable limit is 1", above=0, high=1)
-    tolerance: float = param(1e-3, "speed and acceleration at which the mesh rests", unit="cube edges", above=0)
+    tolerance: float = param(
+        1e-3, "speed and acceleration at which the mesh rests", unit="cube edges", above=0
+    )
     max_steps: int = param(200, "most steps", unit="steps", low=0)
-    springs: str = param("quads", "springs along the sides of squares or of triangles", choices=("quads", "triangles"), paper="triangles")
+    springs: str = param(
+        "quads",
+        "springs along the sides of squares or of triangles",
+        choices=("quads", "triangles"),
+        paper="triangles",
+    )
     limit: str = param(
-        "clamp", "where a vertex would move over one cube edge: clamp its step, or shorten the time step", choices=("clamp", "shorten"), paper="shorten"
+        "clamp",
+        "where a vertex would move over one cube edge: clamp its step, or shorten the time step",
+        choices=("clamp", "shorten"),
+        paper="shorten",
     )
 
 
@@ -224,7 +273,11 @@ class RunSettings(Group):
 
     seed: int = param(0, "seed of everything drawn at random", low=0)
     threads: int = param(0, "threads; 0 is one a core", low=0, high=1024)
-    units: str = param("mm", "unit of the written coordinates; for a cloud, the unit that its numbers are in", choices=("mm", "cm", "m", "unknown"))
+    units: str = param(
+        "mm",
+        "unit of the written coordinates; for a cloud, the unit that its numbers are in",
+        choices=("mm", "cm", "m", "unknown"),
+    )
 
 
 @dataclass(frozen=True)
@@ -261,7 +314,10 @@ class Settings:
             unknown = [key for key in values if key not in keys] if isinstance(values, Mapping) else [name]
             if unknown or name not in known:
                 raise UsageError(
-                    "the settings have no such entry", file=file, found=".".join([name, *unknown[:1]]), expected="an entry of settings.toml"
+                    "the settings have no such entry",
+                    file=file,
+                    found=".".join([name, *unknown[:1]]),
+                    expected="an entry of settings.toml",
                 )
             known[name] = replace(known[name], **values)
         return cls(**known)
@@ -279,7 +335,9 @@ class Settings:
             own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
             groups[name] = replace(group, **own)
         if values:
-            raise UsageError("there is no such parameter", found=", ".join(values), expected="a field of Settings")
+            raise UsageError(
+                "there is no such parameter", found=", ".join(values), expected="a field of Settings"
+            )
         return Settings(**groups)
 
     def to_dict(self) -> dict[str, dict[str, Any]]:

@@ -7,13 +7,10 @@ from __future__ import annotations
 
 from .atomic import check_output, replacing
 from .documents import read_settings, write_document, write_settings
+from .labels import LABEL_WRITERS, write_labels
 from .meshes import MESH_READERS, MESH_WRITERS, read_mesh, write_mesh
-from .nifti import write_labels
 from .points import POINT_READERS, POINT_WRITERS, read_points, write_points
 from .volumes import VOLUME_READERS, read_volume
-
-LABEL_WRITERS = (".nii", ".nii.gz")
-"""Suffixes in which labels are written."""
 
 __all__ = [
     "LABEL_WRITERS",

@@ -52,7 +52,7 @@ def scaled(stored: NDArray[Any], slope: float, intercept: float, dtype: DTypeLik
     if slope == 1 and intercept == 0:
         return stored.astype(dtype, copy=False)
     kind: Any = np.dtype(dtype).type
-    return np.add(stored.astype(dtype) * kind(slope), kind(intercept))
+    return np.asarray(stored.astype(dtype) * kind(slope) + kind(intercept))
 
 
 def scaled_dtype(dtype: DTypeLike, scales: list[tuple[float, float]], bits: int = 64) -> np.dtype[Any]:
@@ -101,5 +101,5 @@ def without_holes(voxels: NDArray[Any], *, file: str) -> tuple[NDArray[Any], tup
     if count == 0:
         return voxels, ()
     return np.where(holes, voxels.min(where=~holes, initial=np.inf), voxels), (
-        f"{count} NaN or infinite voxels were set to the background",
+        f"NaN or infinite voxels set to the background: {count}",
     )

@@ -1,4 +1,4 @@
-"""NIfTI: studies in, labels out. RAS becomes LPS, and LPS becomes RAS, here and nowhere else."""
+"""NIfTI studies: RAS becomes LPS here."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import FormatError, GeometryError, OutputError, ResourceError, UnreadableError
+from ..errors import FormatError, GeometryError, ResourceError, UnreadableError
 from ..model.volume import Volume
 from .affine import SMALLEST_SPACING, check_affine, check_spacing, upright
-from .atomic import replacing
 from .gray import check_scale, native, scaled, scaled_dtype, without_holes
 from .limits import require_bytes, require_memory
 from .source import existing_file, suffix_of, third_party
@@ -41,9 +40,6 @@ DEFLATE_RATIO = 1032
 
 SURPLUS_BYTES = 2**26
 """A stream that goes on for longer after its voxels is taken for a bomb."""
-
-LARGEST_SIDE = 32767
-"""NIfTI-1 keeps its sizes in 16 bits."""
 
 HINT = "--spacing x y z"
 
@@ -168,13 +164,13 @@ def _layout(header: Any, name: str) -> Layout:
 
 
 def _dtype(header: Any, name: str) -> np.dtype[Any]:
-    with third_party("nibabel", name):
-        known = int(header["datatype"]) in header._data_type_codes.dtype
-    if not known:
-        raise FormatError(
-            "the voxels are of an unknown kind", file=name, found=f"datatype = {int(header['datatype'])}"
-        )
-    return np.dtype(header.get_data_dtype())
+    from nibabel.nifti1 import data_type_codes
+
+    code = int(header["datatype"])
+    if code not in data_type_codes.dtype:
+        raise FormatError("the voxels are of an unknown kind", file=name, found=f"datatype = {code}")
+    dtype: np.dtype[Any] = np.dtype(data_type_codes.dtype[code])
+    return dtype.newbyteorder(header.endianness)
 
 
 def _frame(header: Any, settings: ReadSettings, name: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
@@ -264,42 +260,3 @@ def _gray(data: NDArray[np.uint8], layout: Layout, name: str) -> tuple[NDArray[A
     stored = native(data.view(layout.dtype).reshape(shape), file=name)
     dtype = scaled_dtype(stored.dtype, [(layout.slope, layout.intercept)])
     return without_holes(scaled(stored, layout.slope, layout.intercept, dtype), file=name)
-
-
-def write_labels(labels: NDArray[np.uint16], volume: Volume, path: str | Path) -> None:
-    """Write labels on the grid of the study's own file, as NIfTI.
-
-    Parameters
-    ----------
-    labels : (K, J, I) uint16 array
-        In the order of ``volume.voxels``.
-    volume : Volume
-        The study; its `grid` says how the file stores its voxels.
-    path : path
-        ``.nii`` or ``.nii.gz``. The bytes repeat: no name and no time is kept.
-
-    Raises
-    ------
-    OutputError
-        Where the file cannot be written, or a side is too long for NIfTI-1.
-    """
-    import nibabel
-
-    stored = np.asarray(volume.grid.restore(labels), np.uint16).T
-    if max(stored.shape) > LARGEST_SIDE:
-        raise OutputError(
-            "the labels do not fit into a NIfTI file",
-            file=str(path),
-            found=f"shape = {stored.shape}",
-            expected=f"sides of at most {LARGEST_SIDE}",
-        )
-    image = nibabel.Nifti1Image(stored, None)
-    image.header.set_sform(FLIP @ volume.grid.affine, code="scanner")
-    image.header.set_xyzt_units("mm")
-    data = image.to_bytes()
-    with replacing(path) as file:
-        if suffix_of(path) == ".nii.gz":
-            with gzip.GzipFile(filename="", fileobj=file, mode="wb", mtime=0) as packed:
-                packed.write(data)
-        else:
-            file.write(data)

@@ -76,8 +76,30 @@ def whole(path: str | Path) -> bytes:
         raise UnreadableError("the file cannot be read", file=str(path), found=_reason(fault)) from None
 
 
-def regular_files(folder: Path) -> tuple[list[Path], Counter[str]]:
-    """List a folder's regular files by name; those of its sub-folders where it has none itself.
+def first_bytes(path: Path, count: int) -> bytes:
+    """Return a file's first bytes, fewer where it has fewer.
+
+    Raises
+    ------
+    UnreadableError
+        Where the file may not be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return file.read(count)
+    except OSError as fault:
+        raise UnreadableError("the file cannot be read", file=path.name, found=_reason(fault)) from None
+
+
+def regular_files(folder: Path, *, deep: bool = False) -> tuple[list[Path], Counter[str]]:
+    """List the regular files of a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The path as the user typed it.
+    deep : bool
+        Whether the files of all sub-folders are listed too; links to folders are never followed.
 
     Returns
     -------
@@ -89,20 +111,16 @@ def regular_files(folder: Path) -> tuple[list[Path], Counter[str]]:
     Raises
     ------
     UnreadableError
-        For a folder that is empty or may not be read.
+        For a folder that may not be read.
     """
     files: list[Path] = []
     others: Counter[str] = Counter()
     for parent, folders, names in os.walk(folder, onerror=_refuse):
-        folders.sort()
+        folders[:] = sorted(folders) if deep else []
         for path in (Path(parent, name) for name in sorted(names)):
             reason = _passed_over(path, folder)
             others.update([reason] if reason else [])
             files += [] if reason else [path]
-        if files and Path(parent) == folder:
-            break
-    if not files and not others:
-        raise UnreadableError("the folder is empty", file=str(folder))
     return files, others
 
 

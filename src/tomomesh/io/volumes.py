@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from ..errors import FormatError
+from ..errors import FormatError, UnreadableError
 from ..settings import ReadSettings
 from .dicom import is_dicom, read_dicom
 from .images import FAMILIES, read_images
@@ -82,22 +82,33 @@ def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Vo
 
 
 def _read_folder(folder: Path, settings: ReadSettings) -> Volume:
-    """Read DICOM where there is any, else PNG or TIFF slices."""
-    files, others = regular_files(folder)
-    dicom = [path for path in files if is_dicom(path)]
-    if dicom:
-        others += Counter({"not DICOM": len(files) - len(dicom)})
-        return read_dicom(dicom, settings, study=str(folder), others=others)
-    images = [path for path in files if suffix_of(path) in FAMILIES]
-    if images:
-        return read_images(images, settings, folder=str(folder))
+    """Read the images of a folder; where it holds none, those of its sub-folders."""
+    for deep in (False, True):
+        files, others = regular_files(folder, deep=deep)
+        volume = _read_images(files, others, folder, settings)
+        if volume is not None:
+            return volume
     others += Counter(_kind(path) for path in files)
+    if not others:
+        raise UnreadableError("the folder is empty", file=str(folder), expected=READABLE)
     raise FormatError(
         f"0 of {sum(others.values())} files are images",
         file=str(folder),
         found=counted(others),
         expected=READABLE,
     )
+
+
+def _read_images(
+    files: list[Path], others: Counter[str], folder: Path, settings: ReadSettings
+) -> Volume | None:
+    """Read DICOM where there is any, else PNG or TIFF slices."""
+    dicom = [path for path in files if is_dicom(path)]
+    if dicom:
+        others = others + Counter({"not DICOM": len(files) - len(dicom)})
+        return read_dicom(dicom, settings, study=str(folder), others=others)
+    images = [path for path in files if suffix_of(path) in FAMILIES]
+    return read_images(images, settings, folder=str(folder)) if images else None
 
 
 def _kind(path: Path) -> str:

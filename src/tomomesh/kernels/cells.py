@@ -112,9 +112,7 @@ def spread(table: NDArray[np.int32], open_: NDArray[np.bool_], depth: NDArray[np
 
 
 @kernel("i8(i4[:,::1], i4[:,::1], i4[:,::1])")
-def track_surfaces(
-    table: NDArray[np.int32], turns: NDArray[np.int32], labels: NDArray[np.int32]
-) -> int:
+def track_surfaces(table: NDArray[np.int32], turns: NDArray[np.int32], labels: NDArray[np.int32]) -> int:
     """Track the surfaces of a cube set from face to face (Gordon & Udupa 1989).
 
     Parameters

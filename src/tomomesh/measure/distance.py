@@ -43,17 +43,15 @@ def distance_to_surface(points: NDArray[np.float64], mesh: TriMesh) -> NDArray[n
     return np.concatenate(found) if found else np.empty(0)
 
 
-def _search(
-    points: NDArray[np.float64], mesh: TriMesh, tree: cKDTree, radius: float
-) -> NDArray[np.float64]:
+def _search(points: NDArray[np.float64], mesh: TriMesh, tree: cKDTree, radius: float) -> NDArray[np.float64]:
     best = np.full(len(points), np.inf)
     left, count = np.arange(len(points)), min(FIRST_TRY, len(mesh.faces))
     while len(left):
         reach, face = tree.query(points[left], k=np.arange(1, count + 1))
         squared = np.empty(len(left))
-        nearest_triangle(points[left], mesh.corners, face, squared)
+        nearest_triangle(points[left], mesh.corners, np.asarray(face, np.int64), squared)
         best[left] = np.sqrt(squared)
-        left = left[(reach[:, -1] < best[left] + radius) & (count < len(mesh.faces))]
+        left = left[(np.asarray(reach)[:, -1] < best[left] + radius) & (count < len(mesh.faces))]
         count = min(2 * count, len(mesh.faces))
     return best
 

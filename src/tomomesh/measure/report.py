@@ -48,7 +48,7 @@ def assess(
     found |= triangle_shapes(mesh)
     if points is not None:
         found |= spread_of(distance_to_surface(points, mesh), "points_to_surface_")
-        found |= spread_of(cKDTree(points).query(mesh.vertices)[0], "vertices_to_points_")
+        found |= spread_of(np.asarray(cKDTree(points).query(mesh.vertices)[0]), "vertices_to_points_")
     if against is not None:
         found |= compare(mesh, against)
     return found

@@ -52,7 +52,13 @@ class Topology:
     @property
     def faults(self) -> dict[str, int]:
         """Return the counts that are 0 on a closed, outward 2-manifold."""
-        names = ("boundary_edges", "nonmanifold_edges", "nonmanifold_vertices", "misoriented_edges", "inward_components")
+        names = (
+            "boundary_edges",
+            "nonmanifold_edges",
+            "nonmanifold_vertices",
+            "misoriented_edges",
+            "inward_components",
+        )
         return {name: getattr(self, name) for name in names}
 
     @property
@@ -157,7 +163,12 @@ def check_promise(mesh: TriMesh) -> None:
     for candidate in (mesh, joined):
         found = {name: count for name, count in topology(candidate).faults.items() if count}
         if found or len(candidate.vertices) != len(mesh.vertices):
-            named = ", ".join(f"{name} = {count}" for name, count in found.items()) or "vertices of equal position"
+            named = (
+                ", ".join(f"{name} = {count}" for name, count in found.items())
+                or "vertices of equal position"
+            )
             raise InternalCheckError(
-                "the mesh failed its own check", found=named, expected="closed, manifold and outward, also after welding"
+                "the mesh failed its own check",
+                found=named,
+                expected="closed, manifold and outward, also after welding",
             )

@@ -19,7 +19,7 @@ MARGIN = 256
 def keys_of(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     """Pack (c, 3) cells (x, y, z) into one integer each, ordered by z, then y, then x."""
     x, y, z = (cells + MARGIN).T
-    return (z * SIDE + y) * SIDE + x
+    return np.asarray((z * SIDE + y) * SIDE + x)
 
 
 def cells_of(keys: NDArray[np.int64]) -> NDArray[np.int64]:

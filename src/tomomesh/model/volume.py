@@ -64,7 +64,12 @@ class Volume:
 
     @classmethod
     def from_stored(
-        cls, stored: NDArray[Any], affine: NDArray[np.float64], *, unit: str = "stored", notes: tuple[str, ...] = ()
+        cls,
+        stored: NDArray[Any],
+        affine: NDArray[np.float64],
+        *,
+        unit: str = "stored",
+        notes: tuple[str, ...] = (),
     ) -> Volume:
         """Turn a stored array into canonical order without copying it.
 

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from ..model.lattice import Lattice
 
 
-def even_spacing(codebook: NDArray[np.float64], lattice: Lattice, bridge: float) -> NDArray[np.float64]:
+def even_spacing(
+    codebook: NDArray[np.float64], lattice: Lattice, *, bridge: float = 2.0
+) -> NDArray[np.float64]:
     """Slide the neurons of a chain or a ring along their own line until they are equally far apart.
 
     Neurons crowd where a band is thick. A bridged gap stays as wide as it was: each arc between two gaps keeps
@@ -24,7 +26,7 @@ def even_spacing(codebook: NDArray[np.float64], lattice: Lattice, bridge: float)
     lattice : Lattice
         Any but a chain or a ring is returned as it is.
     bridge : float
-        Edges over this many medians are gaps.
+        Edges over this many medians are gaps; see `CubeSettings.bridge`.
 
     Returns
     -------

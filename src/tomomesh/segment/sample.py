@@ -71,7 +71,7 @@ def sample(networks: Networks, volume: Volume, settings: CubeSettings) -> Sampli
     spacing = max(spacing, _across(points, settings.bridge))
     pixel = np.prod(volume.spacing_mm[:2])
     areas = np.array([abs(area(ring)) for ring in networks.codebooks]) * pixel if is_ring else np.empty(0)
-    return Sampling(points, spacing, bridged, areas, networks.slices * volume.spacing_mm[2])
+    return Sampling(points, spacing, bridged, areas, networks.slices * np.float64(volume.spacing_mm[2]))
 
 
 def _neurons(networks: Networks, volume: Volume) -> PointSet:

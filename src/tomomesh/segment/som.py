@@ -136,7 +136,9 @@ def _train_online(
     rng: np.random.Generator,
 ) -> None:
     shown = inputs[rng.integers(len(inputs), size=settings.iterations)]
-    alpha = settings.alpha[1] + (settings.alpha[0] - settings.alpha[1]) * _falling(len(shown), settings.alpha_power)
+    alpha = settings.alpha[1] + (settings.alpha[0] - settings.alpha[1]) * _falling(
+        len(shown), settings.alpha_power
+    )
     radius = radii[1] + (radii[0] - radii[1]) * _falling(len(shown), settings.radius_power)
     kernels.train_online(codebook, shown, lattice.hops, alpha, radius, settings.neighborhood == "gaussian")
 
@@ -153,7 +155,7 @@ def _train_batch(
         weights = (hop <= reach) * 1.0
     else:
         weights = np.exp(-0.5 * (hop / np.maximum(reach, 1e-6)) ** 2)
-    kernels.train_batch(codebook, by_axis, lattice.hops, weights)
+    kernels.train_batch(codebook, by_axis, lattice.hops, weights.astype(np.float64))
 
 
 def _without_strays(

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
     from ..settings import NetworkSettings
 
-EVEN_BRIDGE = 2.0
-"""Edges over this many medians are gaps, which even spacing leaves as they are."""
-
 
 def train_study(
     mask: NDArray[np.bool_],
@@ -73,7 +70,7 @@ def train_study(
                     shown, graph, settings, np.random.default_rng([seed, k]), pixel_area=pixel_area
                 )
                 if settings.even:
-                    codebook = even_spacing(codebook, graph, bridge=EVEN_BRIDGE)
+                    codebook = even_spacing(codebook, graph)
                 codebooks[k], strays[k] = codebook / pixel_mm, (~kept).sum()
 
     in_blocks(work, count, block=1, threads=threads, done=lambda done: progress("networks", done, count))
@@ -92,7 +89,11 @@ def train_study(
 
 
 def regions(
-    mask: NDArray[np.bool_], networks: Networks, *, pixel_mm: tuple[float, float] = (1.0, 1.0), threads: int = 0
+    mask: NDArray[np.bool_],
+    networks: Networks,
+    *,
+    pixel_mm: tuple[float, float] = (1.0, 1.0),
+    threads: int = 0,
 ) -> NDArray[np.uint16]:
     """Compare the networks with the image: give every window pixel its winner's label (Fig. 5).
 

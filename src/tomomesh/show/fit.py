@@ -43,6 +43,8 @@ def draw_fit(trace: Trace, *, tolerance: float | None = None, unit: str = "mm") 
     _curves(axes[2], {"kinetic": trace.kinetic, "potential": trace.potential}, log=True)
     heading(axes[2], "Energy", f"per unit of k_d, {unit}²")
     _curves(axes[3], {"clamped to one cube edge": trace.clamped, "without a point": trace.unattracted})
+    axes[3].set_ylim(0, max(1.0, axes[3].get_ylim()[1]))
+    axes[3].yaxis.set_major_locator(MaxNLocator(integer=True))
     heading(axes[3], "Vertices", "number of vertices held back or not attracted")
     for ax in axes[2:]:
         ax.set_xlabel("step")

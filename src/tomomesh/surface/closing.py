@@ -53,7 +53,9 @@ class Shell:
         return self.two_sided >= HELD
 
 
-def close_shell(occupied: NDArray[np.int64], closing: int | None = None, progress: Progress = silent) -> Shell:
+def close_shell(
+    occupied: NDArray[np.int64], closing: int | None = None, progress: Progress = silent
+) -> Shell:
     """Close the shell by a given number of cubes, or by the fewest that make it hold.
 
     Parameters
@@ -98,7 +100,12 @@ class _Band:
         table = neighbor_table(keys)
         dilated = np.isin(keys, inner, assume_unique=True)
         return cls(
-            keys, table, np.isin(keys, occupied, assume_unique=True), dilated, _outer_layer(table, dilated), steps
+            keys,
+            table,
+            np.isin(keys, occupied, assume_unique=True),
+            dilated,
+            _outer_layer(table, dilated),
+            steps,
         )
 
     def two_sided(self) -> float:

@@ -46,8 +46,14 @@ def _turns() -> NDArray[np.int32]:
     for direction in DIRECTIONS:
         for ahead in (d for d in DIRECTIONS if not np.dot(d, direction)):
             outward = tuple(np.add(ahead, direction).tolist())
-            back = DIRECTIONS.index(tuple(-n for n in ahead))  # type: ignore[arg-type]
-            columns = [column_of(outward), column_of(ahead), back, DIRECTIONS.index(ahead), column_of(direction)]
+            back = DIRECTIONS.index(tuple(-n for n in ahead))
+            columns = [
+                column_of(outward),
+                column_of(ahead),
+                back,
+                DIRECTIONS.index(ahead),
+                column_of(direction),
+            ]
             rows.append(columns)
     return np.array(rows, np.int32)
 

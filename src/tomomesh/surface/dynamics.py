@@ -2,8 +2,8 @@
 
 mu_i x_i'' + gamma_i x_i' + sum_j k (x_i - x_j) + k_d (x_i - x_d) = 0, natural lengths zero, explicit Euler.
 
-With masses mu_i = k_d + sum_j k every vertex has omega_i = 1, critical damping is gamma_i = 2 mu_i, and a step
-h <= 1 is stable on every mesh: nobody has to know the unit of a stiffness.
+With masses mu_i = k_d + sum_j k every vertex has omega_i = 1, critical damping is gamma_i = 2 mu_i, and
+a step h <= 1 is stable on every mesh: nobody has to know the unit of a stiffness.
 """
 
 from __future__ import annotations
@@ -89,10 +89,8 @@ def fit(
         progress("fit", len(motion.history), most)
     motion.match()
     progress("fit", most, most)
-    columns = list(zip(*motion.history, strict=True)) or [()] * 7
-    trace = Trace(*(np.array(column, np.float64) for column in columns[:5]),
-                  *(np.array(column, np.int64) for column in columns[5:]), motion.rests())  # fmt: skip
-    return Fit(grid.origin + motion.position, motion.nearest, trace)
+    trace = motion.trace()
+    return Fit(np.asarray(grid.origin + motion.position), motion.nearest, trace)
 
 
 class _Motion:
@@ -125,6 +123,13 @@ class _Motion:
         """Tell whether speed and acceleration have fallen below the tolerance."""
         return bool(self.history) and max(self.history[-1][:2]) < self.settings.tolerance
 
+    def trace(self) -> Trace:
+        """Return the history as arrays."""
+        steps = np.array(self.history).reshape(-1, 7).T
+        speed, acceleration, kinetic, potential, distance = steps[:5]
+        clamped, unattracted = steps[5:].astype(np.int64)
+        return Trace(speed, acceleration, kinetic, potential, distance, clamped, unattracted, self.rests())
+
     def match(self) -> None:
         """Assign its nearest point to every vertex."""
 
@@ -150,7 +155,7 @@ class _Motion:
         self.velocity = self.velocity + step * acceleration
 
     def _limited_step(self) -> tuple[float, int]:
-        """Return the time step, after slowing the vertices that would move too far or shortening it for all."""
+        """Return the time step, once vertices that would move too far are slowed or the step is shortened."""
         step = self.settings.step
         reach = step * _length(self.velocity) / self.edge
         far = reach > 1

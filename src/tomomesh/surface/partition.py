@@ -56,9 +56,9 @@ def partition(positions: NDArray[np.float64], cell_mm: NDArray[np.float64]) -> C
 def sampling_distance(positions: NDArray[np.float64], *, neighbors: int = 6) -> float:
     """Estimate the distance of neighboring samples of a surface, from their positions alone.
 
-    If points lie s apart, so that each owns s^2 of the surface, the k-th neighbor is about s sqrt(k / pi) away,
-    on a grid as well as for points thrown at random. The median over the points is returned; repeated points
-    count once.
+    If points lie s apart, so that each owns s^2 of the surface, the k-th neighbor is about s sqrt(k / pi)
+    away, on a grid as well as for points thrown at random. The median over the points is returned; repeated
+    points count once.
 
     Parameters
     ----------

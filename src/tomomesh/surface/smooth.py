@@ -43,4 +43,4 @@ def low_pass(vertices: NDArray[np.float64], edges: NDArray[np.int64], passes: in
     local = vertices - origin
     for _ in range(passes):
         local = OWN_WEIGHT * local + share * (neighbors @ local)
-    return origin + local
+    return np.asarray(origin + local)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import FormatError
 from ..gray import check_scale
-from ..source import third_party
+from ..source import first_bytes, third_party
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -81,8 +81,7 @@ class Frame:
 
 def is_dicom(path: Path) -> bool:
     """Tell from a file's first bytes whether it is DICOM, with or without its preamble."""
-    with path.open("rb") as file:
-        start = file.read(132)
+    start = first_bytes(path, 132)
     return start[128:] == b"DICM" or (
         start[:2] in (b"\x02\x00", b"\x08\x00") and start[3:4] == b"\0" and len(start) == 132
     )

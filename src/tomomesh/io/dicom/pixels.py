@@ -138,9 +138,9 @@ def _masked(pixels: NDArray[Any], data: Any, name: str) -> NDArray[Any]:
         return pixels
     spare = allocated - used
     if pixels.dtype.kind == "i":
-        return (pixels << spare) >> spare
+        return np.asarray((pixels << spare) >> spare)
     upper = pixels >> used
-    if upper.any() and set(np.unique(upper).tolist()) == {0, 2**spare - 1} and not _overlays(data):
+    if upper.any() and set(np.unique(upper).tolist()) <= {0, 2**spare - 1} and not _overlays(data):
         raise FormatError(
             "negative gray levels are stored as unsigned",
             file=name,
@@ -148,7 +148,7 @@ def _masked(pixels: NDArray[Any], data: Any, name: str) -> NDArray[Any]:
             expected="PixelRepresentation = 1",
             hint="a corrected header",
         )
-    return np.bitwise_and(pixels, pixels.dtype.type(2**used - 1))
+    return np.asarray(pixels & pixels.dtype.type(2**used - 1))
 
 
 def _overlays(data: Any) -> bool:
@@ -157,7 +157,7 @@ def _overlays(data: Any) -> bool:
 
 
 def _upright_gray(pixels: NDArray[Any], data: Any) -> NDArray[Any]:
-    """Turn MONOCHROME1 over, so that bright is high; the numbers of a CT have a meaning of their own: they stay."""
+    """Turn MONOCHROME1 over, so that bright is high; the numbers of a CT mean something: they stay."""
     if data.get("PhotometricInterpretation") != "MONOCHROME1" or data.get("Modality") == "CT":
         return pixels
     bits = int(data.get("BitsStored") or 8 * pixels.dtype.itemsize)

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 TELLING = (
     "EchoTime", "EchoNumbers", "TemporalPositionIdentifier", "AcquisitionNumber", "TriggerTime",
-    "DiffusionBValue", "InversionTime", "FlipAngle", "KVP", "ConvolutionKernel", "ImageType", "InstanceNumber",
+    "DiffusionBValue", "InversionTime", "FlipAngle", "KVP", "ConvolutionKernel", "ImageType",
+    "InstanceNumber",
 )  # fmt: skip
 """Fields that tell apart images at one position, the most telling first; none of them is personal."""
 
@@ -100,7 +101,7 @@ def _gray(stack: Stack, study: str) -> tuple[NDArray[Any], tuple[str, ...]]:
         if stack.levels[n].is_integer():
             voxels[int(stack.levels[n])] = here
         below = here
-    note = (f"{repeats} slices repeat another and were left out",) if repeats else ()
+    note = (f"slices that repeat another, left out: {repeats}",) if repeats else ()
     voxels, holes = without_holes(voxels, file=study)
     return voxels, note + holes
 

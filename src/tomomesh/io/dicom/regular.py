@@ -50,12 +50,11 @@ def regular(
     missing = bool(holes.min() >= 1 and (np.abs(gaps / step - holes) <= EVEN * holes).all())
     if not fill:
         raise _missing(heights, gaps, holes, study) if missing else _uneven(heights, gaps, study)
-    step = step if missing else float(gaps.min())
     count = max(1, round((heights[-1] - heights[0]) / step))
     levels = (heights - heights[0]) / (heights[-1] - heights[0]) * count
     levels = np.where(np.abs(levels - np.round(levels)) <= EVEN, np.round(levels), levels)
     added = count + 1 - int((levels == np.round(levels)).sum())
-    return levels, (f"{added} of {count + 1} slices were interpolated linearly",)
+    return levels, (f"slices interpolated linearly: {added} of {count + 1}",)
 
 
 def _missing(
@@ -63,7 +62,7 @@ def _missing(
 ) -> GeometryError:
     where = [f"{heights[n]:.6g} to {heights[n + 1]:.6g} mm" for n in np.flatnonzero(holes > 1)]
     return GeometryError(
-        f"{int(holes.sum() - len(holes))} slices are missing",
+        f"slices are missing: {int(holes.sum()) - len(holes)}",
         file=study,
         found=f"gap = {', '.join(where[:4])}{', ...' if len(where) > 4 else ''}",
         expected=f"a slice every {gaps.min():.4g} mm",

@@ -46,7 +46,7 @@ def choose(frames: list[Frame], wanted: int | None, *, folder: str) -> Choice:
     """
     images = [frame for frame in frames if not _is_localizer(frame)] or frames
     localizers = len(frames) - len(images)
-    notes = (f"{localizers} localizer images were left out",) if localizers else ()
+    notes = (f"localizers left out: {localizers}",) if localizers else ()
     series = _grouped(images)
     if wanted is not None:
         return Choice(_wanted(series, wanted, folder), notes)
@@ -100,7 +100,7 @@ def _row(members: list[Frame]) -> str:
     first = members[0]
     description = str(first.header.get("SeriesDescription") or "no description")
     spacing = "unknown" if first.spacing is None else " x ".join(f"{mm:.4g}" for mm in first.spacing)
-    return f"{description}, {len(members)} slices, {spacing}{_distance(members)} mm"
+    return f"{description}, slices {len(members)}, {spacing}{_distance(members)} mm"
 
 
 def _distance(members: list[Frame]) -> str:

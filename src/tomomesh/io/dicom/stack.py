@@ -152,7 +152,7 @@ def _along(
             expected="two positions and more, or the distance of the slices",
             hint="--spacing-z mm" if lost else "the folder of the series, or --spacing-z mm",
         )
-    note = f"{count} slices without positions, in the order of their numbers" if lost else "one slice"
+    note = "slices without positions, in the order of their numbers" if lost else "one slice"
     levels = np.arange(count, dtype=np.float64)
     return Course(origin, normal * distance, levels, (f"{note}: {distance:g} mm apart, as given",))
 

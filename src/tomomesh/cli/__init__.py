@@ -1,0 +1,67 @@
+"""The command line: parse, read, call, write."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Sequence
+from types import FrameType
+
+from ..errors import InternalCheckError, ResourceError, TomomeshError, UsageError
+from .options import build_parser
+
+INTERRUPTED, TERMINATED = 130, 143
+
+
+class _Terminated(BaseException):
+    """SIGTERM, raised where the program is, so that nothing is left behind."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run ``tomomesh`` and return its exit code; every fault is one line on stderr."""
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        chosen = build_parser().parse_args(arguments)
+        from . import commands
+
+        commands.run(chosen)
+        return 0
+    except TomomeshError as fault:
+        return _complain(fault)
+    except MemoryError:
+        return _complain(
+            ResourceError("the machine's memory is full", hint="a larger --cell-mm, or fewer slices")
+        )
+    except KeyboardInterrupt:
+        print("\ninterrupted; nothing was left behind", file=sys.stderr)
+        return INTERRUPTED
+    except _Terminated:
+        return TERMINATED
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+    except Exception as fault:  # a traceback shown to a user is a bug: say where it is instead
+        return _complain(
+            InternalCheckError(f"a bug: {type(fault).__name__} in {_place(fault)}", found=str(fault))
+        )
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    raise _Terminated
+
+
+def _complain(fault: TomomeshError) -> int:
+    print(f"error: {fault}", file=sys.stderr)
+    if isinstance(fault, UsageError):
+        print(
+            "`tomomesh --help` lists the commands, `tomomesh COMMAND --help` their options.", file=sys.stderr
+        )
+    return fault.exit_code
+
+
+def _place(fault: BaseException) -> str:
+    """Name the module and line where a fault arose, without any path."""
+    trace = fault.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return "nowhere" if trace is None else f"{trace.tb_frame.f_globals.get('__name__')}:{trace.tb_lineno}"

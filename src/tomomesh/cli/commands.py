@@ -1,0 +1,253 @@
+"""What each command does: read, call, write. Heavy imports happen here, once a command is known to run."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .. import io
+from ..errors import OutputError, UsageError
+from ..settings import Settings, parameters
+from . import summary
+from .bars import Bars
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ..model.volume import Volume
+    from ..pipeline import Segmentation, Surface
+
+
+def run(chosen: Namespace) -> None:
+    """Run the command that was parsed."""
+    _COMMANDS[chosen.command](chosen)
+
+
+def settings_of(chosen: Namespace) -> Settings:
+    """Build the settings: the defaults or the paper's, then a file's, then the options given."""
+    settings = Settings.for_paper() if getattr(chosen, "paper", False) else Settings()
+    if getattr(chosen, "settings", None):
+        settings = io.read_settings(chosen.settings, base=settings)
+    given = {
+        entry.name: getattr(chosen, entry.name) for _, entry in parameters() if hasattr(chosen, entry.name)
+    }
+    if getattr(chosen, "auto", False) and {"lower", "upper", "preset"} & set(given):
+        raise UsageError("two windows are asked for", found="--auto and a window", expected="one of them")
+    return settings.replace(**given)
+
+
+def _demo(chosen: Namespace) -> None:
+    settings = settings_of(chosen)
+    folder = _folder(chosen.output)
+    from ..phantom import phantom
+    from ..pipeline import reconstruct
+
+    with Bars(quiet=chosen.quiet) as progress:
+        progress("phantom", 0, 1)
+        head = phantom(seed=settings.run.seed)
+        progress("phantom", 1, 1)
+        settings = settings.replace(lower=head.lower, upper=head.upper)
+        surface = reconstruct(head.volume, settings, truth=head.truth, progress=progress)
+        io.write_mesh(head.truth, folder / "truth.ply")
+        outputs = Namespace(
+            output=folder / "mesh.stl", points=folder / "points.ply", labels=folder / "labels.nii.gz",
+            report=folder / "report.json", save_settings=folder / "settings.toml", figures=folder / "figures",
+        )  # fmt: skip
+        _write(outputs, surface, settings, progress)
+    _tell(chosen, surface.report, summary.of_surface(surface.report, str(chosen.output)))
+
+
+def _reconstruct(chosen: Namespace) -> None:
+    settings = settings_of(chosen)
+    _check_outputs(chosen, io.MESH_WRITERS, chosen.study)
+    from ..pipeline import reconstruct
+
+    with Bars(quiet=chosen.quiet) as progress:
+        volume = _read(chosen.study, settings, progress)
+        surface = reconstruct(volume, settings, progress=progress)
+        _write(chosen, surface, settings, progress)
+    _tell(chosen, surface.report, summary.of_surface(surface.report, chosen.output))
+
+
+def _segment(chosen: Namespace) -> None:
+    settings = settings_of(chosen)
+    _check_outputs(chosen, io.POINT_WRITERS, chosen.study)
+    from ..pipeline import segment
+
+    with Bars(quiet=chosen.quiet) as progress:
+        volume = _read(chosen.study, settings, progress)
+        found = segment(volume, settings, progress=progress)
+        io.write_points(found.points, chosen.output, unit=settings.run.units)
+        _write_stage_one(chosen, found)
+        _write_documents(chosen, found.report, settings)
+        _draw(chosen.figures, found, None, settings, progress)
+    _tell(chosen, found.report, summary.of_points(found.report, chosen.output))
+
+
+def _surface(chosen: Namespace) -> None:
+    settings = settings_of(chosen)
+    _check_outputs(chosen, io.MESH_WRITERS, chosen.cloud)
+    from ..pipeline import reconstruct_points
+
+    with Bars(quiet=chosen.quiet) as progress:
+        progress("read", 0, 1)
+        points = io.read_points(chosen.cloud)
+        progress("read", 1, 1)
+        surface = reconstruct_points(points, settings, progress=progress)
+        _write(chosen, surface, settings, progress)
+    _tell(chosen, surface.report, summary.of_surface(surface.report, chosen.output))
+
+
+def _network(chosen: Namespace) -> None:
+    settings = settings_of(chosen)
+    folder = _folder(chosen.output)
+    _check_files(chosen)
+    from ..segment.region import train_region
+    from ..segment.shapes import SHAPES, shape
+    from ..show import save
+    from ..show.topologies import draw_adapted, draw_update_regions
+
+    given = chosen.region in SHAPES
+    inputs = shape(chosen.region) if given else _window_of_picture(chosen.region, settings)
+    trained = train_region(inputs, settings.network, seed=settings.run.seed)
+    title = f"A network over a {chosen.region if given else 'picture'}"
+    save(draw_update_regions(), folder / "01-topologies.png")
+    figure = draw_adapted(inputs, trained.codebook, trained.lattice, start=trained.start, title=title)
+    save(figure, folder / "02-network.png")
+    report = {"network": trained.measures, "settings": settings.to_dict()}
+    _write_documents(chosen, report, settings)
+    _tell(chosen, report, summary.of_network(report, chosen.output))
+
+
+def _window_of_picture(path: str, settings: Settings) -> NDArray[np.float64]:
+    """Return the window's pixels of one picture as (column, -row), so that up stays up."""
+    import numpy as np
+
+    from ..segment.window import choose_window, window
+
+    picture = io.read_picture(path)
+    lower, upper = choose_window(picture, settings.window)
+    pixels = np.argwhere(window(picture, lower=lower, upper=upper)[0])
+    return np.asarray(pixels[:, ::-1] * np.array([1.0, -1.0]))
+
+
+def _inspect(chosen: Namespace) -> None:
+    from ..segment.survey import survey
+
+    volume = io.read_volume(chosen.study, settings=settings_of(chosen).read)
+    found = survey(volume)
+    print(json.dumps(found, indent=2) if chosen.json else "\n".join(summary.of_study(found)))
+
+
+def _check(chosen: Namespace) -> None:
+    if chosen.report:
+        io.check_output(chosen.report, (".json",), inputs=[chosen.mesh])
+    from ..measure.report import assess
+
+    other = io.read_mesh(chosen.against) if chosen.against else None
+    report = assess(io.read_mesh(chosen.mesh), against=other)
+    if chosen.report:
+        io.write_document(report, chosen.report)
+    print(json.dumps(report, indent=2) if chosen.json else "\n".join(summary.of_check(report)))
+
+
+_COMMANDS = {
+    "demo": _demo,
+    "reconstruct": _reconstruct,
+    "segment": _segment,
+    "surface": _surface,
+    "network": _network,
+    "inspect": _inspect,
+    "check": _check,
+}
+
+
+def _read(study: str, settings: Settings, progress: Bars) -> Volume:
+    progress("read", 0, 1)
+    volume = io.read_volume(study, settings=settings.read)
+    progress("read", 1, 1)
+    return volume
+
+
+def _folder(path: str) -> Path:
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise OutputError("the folder cannot be made", file=path, found=fault.strerror or "") from fault
+    return folder
+
+
+def _check_outputs(chosen: Namespace, writers: Any, source: str) -> None:
+    io.check_output(chosen.output, writers, inputs=[source])
+    _check_files(chosen, source)
+
+
+def _check_files(chosen: Namespace, *sources: str) -> None:
+    """Refuse further outputs that could not be written."""
+    kinds = {
+        "points": io.POINT_WRITERS,
+        "labels": io.LABEL_WRITERS,
+        "report": (".json",),
+        "save_settings": (".toml",),
+    }
+    for name, suffixes in kinds.items():
+        if getattr(chosen, name, None):
+            io.check_output(getattr(chosen, name), suffixes, inputs=sources)
+    if getattr(chosen, "figures", None):
+        _folder(chosen.figures)
+
+
+def _write(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> None:
+    """Write the mesh, and whatever else was asked for."""
+    unit, stage_one = settings.run.units, surface.segmentation
+    io.write_mesh(surface.mesh, chosen.output, unit=unit)
+    if getattr(chosen, "points", None):
+        io.write_points(surface.points, chosen.points, unit=unit)
+    if stage_one is not None:
+        _write_stage_one(chosen, stage_one)
+    _write_documents(chosen, surface.report, settings)
+    _draw(chosen.figures, stage_one, surface, settings, progress)
+
+
+def _write_stage_one(chosen: Namespace, found: Segmentation) -> None:
+    if getattr(chosen, "labels", None):
+        io.write_labels(found.labels, found.volume, chosen.labels)
+
+
+def _write_documents(chosen: Namespace, report: dict[str, Any], settings: Settings) -> None:
+    if chosen.report:
+        io.write_document(report, chosen.report)
+    if chosen.save_settings:
+        io.write_settings(settings, chosen.save_settings)
+
+
+def _draw(
+    folder: str | Path | None,
+    stage_one: Segmentation | None,
+    surface: Surface | None,
+    settings: Settings,
+    progress: Bars,
+) -> None:
+    """Draw the paper's figures of whatever stages there are."""
+    if folder is None:
+        return
+    from ..show import save
+    from .pictures import pictures
+
+    where = _folder(str(folder))
+    total = 9 if surface else 5
+    for count, (name, figure) in enumerate(pictures(stage_one, surface, settings)):
+        progress("pictures", count, total)
+        save(figure, where / f"{name}.png")
+    progress("pictures", total, total)
+
+
+def _tell(chosen: Namespace, report: dict[str, Any], lines: list[str]) -> None:
+    if chosen.json:
+        print(json.dumps(report, indent=2))
+    elif not chosen.quiet:
+        print("\n".join(lines))

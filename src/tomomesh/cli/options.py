@@ -1,0 +1,185 @@
+"""Build the parser from the table of settings. Imports nothing heavy, so that ``--help`` starts at once."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import Field, fields
+from typing import Any, NoReturn
+
+from .. import __version__
+from ..errors import UsageError
+from ..settings import Settings, limits_of, option_of, parameters
+
+STUDY = "a NIfTI file, a folder of DICOM slices, or a folder of PNG or TIFF slices (with --spacing)"
+POINTS = "an unoriented cloud: PLY, XYZ or CSV text, or NPY"
+MESH = "STL, PLY or OBJ"
+STAGE_ONE = ("read", "window", "network")
+STAGE_TWO = ("cubes", "fit")
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose faults are tomomesh's own one-line errors."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise instead of printing a page and leaving."""
+        raise UsageError(message, hint=f"`{self.prog} --help`")
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands."""
+    parser = _Parser(
+        prog="tomomesh",
+        description="Slices or points in, a closed surface mesh with its proof out.",
+        epilog="Exit codes: 0 ok, 2 usage, 3 not found, 4 bad file, 5 geometry needs a decision, 6 empty result, "
+        "7 over a limit, 8 output not written, 9 internal check failed, 130 interrupted.",
+    )
+    parser.add_argument("--version", action="version", version=f"tomomesh {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+
+    demo = _command(commands, "demo", "the built-in head, everything it can show")
+    demo.add_argument(
+        "-o", "--output", default="tomomesh-demo", metavar="FOLDER", help="default: %(default)s"
+    )
+    _add_settings(demo, ("network", *STAGE_TWO, "run"))
+
+    main = _command(commands, "reconstruct", "a study of slices in, a closed surface out")
+    main.add_argument("study", metavar="STUDY", help=STUDY)
+    main.add_argument("-o", "--output", required=True, metavar="MESH", help=MESH)
+    _add_outputs(main, "points", "labels", "figures")
+    _add_settings(main, (*STAGE_ONE, *STAGE_TWO, "run"))
+
+    stage_one = _command(commands, "segment", "stage one alone: the neurons of all slices as points")
+    stage_one.add_argument("study", metavar="STUDY", help=STUDY)
+    stage_one.add_argument("-o", "--output", required=True, metavar="POINTS", help="PLY, XYZ, CSV or NPY")
+    _add_outputs(stage_one, "labels", "figures")
+    _add_settings(stage_one, (*STAGE_ONE, "cubes", "run"))
+
+    stage_two = _command(commands, "surface", "stages two and three alone: points in, a closed surface out")
+    stage_two.add_argument("cloud", metavar="POINTS", help=POINTS)
+    stage_two.add_argument("-o", "--output", required=True, metavar="MESH", help=MESH)
+    _add_outputs(stage_two, "figures")
+    _add_settings(stage_two, (*STAGE_TWO, "run"))
+
+    network = _command(
+        commands, "network", "one network on a test region or a picture, as the paper's Fig. 1 and 2"
+    )
+    network.add_argument(
+        "region", metavar="REGION", help="square, triangle, cube, or one picture (PNG or TIFF)"
+    )
+    network.add_argument(
+        "-o", "--output", default="tomomesh-network", metavar="FOLDER", help="default: %(default)s"
+    )
+    _add_outputs(network)
+    _add_settings(network, ("window", "network", "run"))
+
+    inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
+    inspect.add_argument("study", metavar="STUDY", help=STUDY)
+    inspect.add_argument("--json", action="store_true", help="print the findings as JSON")
+    _add_settings(inspect, ("read",), paper=False)
+
+    check = _command(commands, "check", "the quality report of any mesh")
+    check.add_argument("mesh", metavar="MESH", help=f"{MESH} or OFF")
+    check.add_argument("--against", metavar="MESH", help="a mesh that it should equal: distances both ways")
+    check.add_argument("--report", metavar="FILE.json", help="write the report")
+    check.add_argument("--json", action="store_true", help="print the report as JSON")
+    return parser
+
+
+def _command(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=text, description=f"{text[0].upper()}{text[1:]}."
+    )
+    return parser
+
+
+def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
+    """Add the options that name further files; what is shown goes with `_add_settings`."""
+    kinds = {
+        "points": ("FILE", "write the points: PLY, XYZ, CSV or NPY"),
+        "labels": ("FILE", "write the regions on the study's own grid: NIfTI"),
+        "figures": ("FOLDER", "write the pictures"),
+    }
+    group = parser.add_argument_group("More results")
+    for name in files:
+        metavar, text = kinds[name]
+        group.add_argument(f"--{name}", metavar=metavar, help=text)
+    group.add_argument("--report", metavar="FILE.json", help="write the report")
+    group.add_argument(
+        "--save-settings", metavar="FILE.toml", help="write the settings of this run, to repeat it"
+    )
+
+
+def _add_settings(parser: argparse.ArgumentParser, groups: tuple[str, ...], *, paper: bool = True) -> None:
+    """Add an option for each parameter of some groups, and those that choose or show them all."""
+    sections = {
+        entry.name: parser.add_argument_group(_title(entry.name))
+        for entry in fields(Settings)
+        if entry.name in groups
+    }
+    for group, entry in parameters():
+        if group in sections:
+            _add_parameter(sections[group], entry)
+    if "window" in sections:
+        sections["window"].add_argument(
+            "--auto", action="store_true", help="take Otsu's threshold, as is done where no window is given"
+        )
+    if paper:
+        run = sections["run"]
+        run.add_argument("--paper", action="store_true", help="take the paper's own choices as defaults")
+        run.add_argument(
+            "--settings", metavar="FILE.toml", help="read settings; options given here win over them"
+        )
+        run.add_argument("--quiet", action="store_true", help="print nothing but errors")
+        run.add_argument(
+            "--json", action="store_true", help="print the report as JSON in place of the summary"
+        )
+
+
+def _title(section: str) -> str:
+    """Return the first line of a group's docstring."""
+    return (getattr(Settings(), section).__doc__ or section).splitlines()[0].rstrip(".")
+
+
+def _add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
+    meta, option, name = entry.metadata, option_of(entry.name), entry.name
+    if meta["kind"] is bool:
+        negated = option_of(f"no_{name}") if entry.default else option
+        action = "store_false" if entry.default else "store_true"
+        text = f"do not {meta['help']}" if entry.default else meta["help"]
+        group.add_argument(negated, dest=name, action=action, default=argparse.SUPPRESS, help=text)
+        return
+    several = {(): None, (1, 3): "+"}.get(meta["length"], meta["length"][0] if meta["length"] else None)
+    group.add_argument(
+        option,
+        dest=name,
+        type=meta["kind"],
+        nargs=several,
+        choices=meta["choices"] or None,
+        metavar=None if meta["choices"] else _metavar(name, meta),
+        default=argparse.SUPPRESS,
+        help=_help(entry),
+    )
+
+
+def _metavar(name: str, meta: Any) -> Any:
+    if meta["length"] in ((), (1, 3)):
+        return {int: "N", float: "X"}[meta["kind"]]
+    return (
+        tuple(name[0].upper() + str(n) for n in range(meta["length"][0]))
+        if meta["length"] == (2,)
+        else ("X", "Y", "Z")
+    )
+
+
+def _help(entry: Field[Any]) -> str:
+    """Put a parameter's text, unit, limits and default into one line."""
+    meta, default = entry.metadata, entry.default
+    if isinstance(default, tuple):
+        default = " ".join(f"{value:g}" for value in default)
+    facts = [meta["unit"], "" if meta["choices"] else limits_of(entry)]
+    facts += (
+        []
+        if default is None
+        else [f"default {default:g}" if isinstance(default, float) else f"default {default}"]
+    )
+    return f"{meta['help']} ({'; '.join(fact for fact in facts if fact)})".replace("%", "%%")

@@ -1,0 +1,50 @@
+"""Hand the stages of a result to the gallery."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from ..show import draw_all
+from ..show.plane import Plane
+from ..show.render import View
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..pipeline import Segmentation, Surface
+    from ..settings import Settings
+
+
+def pictures(
+    stage_one: Segmentation | None, surface: Surface | None, settings: Settings
+) -> Iterator[tuple[str, Figure]]:
+    """Yield every picture that the stages allow, with its name."""
+    stages: dict[str, Any] = {"bridge": settings.cubes.bridge, "tolerance": settings.fit.tolerance}
+    if stage_one is not None:
+        volume = stage_one.volume
+        plane = stage_one.report["study"]["plane"]
+        stages |= {
+            "images": volume.voxels,
+            "mask": stage_one.mask,
+            "networks": stage_one.networks,
+            "labels": stage_one.labels,
+            "points": stage_one.points,
+            "plane": Plane(spacing_mm=volume.spacing_mm[:2], upward=plane != "axial"),
+        }
+    if surface is not None:
+        stages |= {
+            "points": surface.points,
+            "cuberille": surface.cuberille,
+            "triangulated": surface.cuberille.triangulated(),
+            "smoothed": surface.smoothed,
+            "mesh": surface.mesh,
+            "trace": surface.trace,
+            "view": _view(stage_one, settings),
+        }
+    return draw_all(**stages)
+
+
+def _view(stage_one: Segmentation | None, settings: Settings) -> View:
+    """Name the axes of the patient where there is one, and plainly where there is a cloud."""
+    return View() if stage_one is not None else View(unit=settings.run.units, axes=("x", "y", "z"))

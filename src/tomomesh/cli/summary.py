@@ -1,0 +1,138 @@
+"""What is said at the end: fifteen lines at most."""
+
+from __future__ import annotations
+
+from typing import Any
+
+BARS = " ▁▂▃▄▅▆▇█"
+
+
+def of_surface(report: dict[str, Any], output: str) -> list[str]:
+    """Say what was reconstructed, and how good it is."""
+    quality, fit, cubes = report["quality"], report["fit"], report["cubes"]
+    unit = report["points"]["unit"]
+    shape = (
+        "closed and manifold"
+        if quality["sound"] and quality["sound_after_welding"]
+        else "NOT closed and manifold"
+    )
+    lines = [
+        *_of_stage_one(report),
+        f"points    {_of_points(report)}",
+        f"cubes     edge {_edges(cubes['cell_mm'])} {unit}, {cubes['occupied']} occupied, closed by {cubes['closing']}",
+        f"fit       {fit['iterations']} steps, {'at rest' if fit['converged'] else 'NOT at rest'}",
+        f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}",
+        f"          {quality['components']} component(s), genus {quality['genus']}, "
+        f"area {quality['area_mm2']:.6g} {unit}^2, volume {quality['volume_mm3']:.6g} {unit}^3{_of_rings(quality)}",
+        f"distance  points to surface: mean {quality['points_to_surface_mean_mm']:.3g}, "
+        f"95 % {quality['points_to_surface_p95_mm']:.3g}, largest {quality['points_to_surface_max_mm']:.3g} {unit}",
+    ]
+    if "truth" in report:
+        truth = report["truth"]
+        lines.append(
+            f"truth     error: mean {truth['mean_mm']:.3f} mm, 95 % {truth['p95_mm']:.3f} mm, "
+            f"largest {truth['max_mm']:.2f} mm (caps aside)"
+        )
+    return [*lines, *_ending(report, output)]
+
+
+def of_points(report: dict[str, Any], output: str) -> list[str]:
+    """Say what was segmented."""
+    return [*_of_stage_one(report), f"points    {_of_points(report)}", *_ending(report, output)]
+
+
+def of_network(report: dict[str, Any], output: str) -> list[str]:
+    """Say how a network lies over its region."""
+    network = report["network"]
+    return [
+        f"network   {network['topology']} of {network['neurons']} neurons on {network['inputs']} inputs",
+        f"          quantization error {network['quantization_error']:.4g}, dead neurons {network['dead_neurons']}, "
+        f"longest edge {network['longest_over_median_edge']:.2f} medians",
+        f"written   {output}",
+    ]
+
+
+def of_study(found: dict[str, Any]) -> list[str]:
+    """Say what is in a study."""
+    slices, rows, columns = found["slices_rows_columns"]
+    x, y, z = found["spacing_mm"]
+    tallest = max(max(found["histogram"]), 1)
+    bars = "".join(BARS[round((len(BARS) - 1) * (count / tallest) ** 0.5)] for count in found["histogram"])
+    windows = [f"{name}: k > {lower:g}" for name, (lower, _) in found["windows"].items()]
+    return [
+        f"size      {slices} slices x {rows} rows x {columns} columns (S x P x L), {found['layers']} layer(s) of {found['type']}",
+        f"spacing   {x:g} x {y:g} x {z:g} mm (L, P, S)",
+        f"extent    {' x '.join(f'{side:.1f}' for side in found['size_mm'])} mm, first voxel at "
+        f"({', '.join(f'{c:.1f}' for c in found['corner_mm'])}) mm LPS",
+        f"slices    stored {found['stored_plane']}, columns-rows-slices run {found['stored_axes']}; "
+        f"taken {found['default_plane']} by default",
+        f"levels    {found['lowest']:g} to {found['highest']:g} ({found['gray_unit']})",
+        f"          {bars}",
+        f"windows   {'; '.join(windows)}",
+        *(f"note      {note}" for note in found["notes"]),
+    ]
+
+
+def of_check(report: dict[str, Any]) -> list[str]:
+    """Say what a mesh is."""
+    faults = [f"{report[name]} {name.replace('_', ' ')}" for name in FAULTS if report[name]]
+    shape = "closed, manifold, outward" if report["sound"] else f"NOT sound: {', '.join(faults)}"
+    lines = [
+        f"mesh      {report['vertices']} vertices, {report['faces']} faces",
+        f"topology  {shape}; {'the same' if report['sound_after_welding'] == report['sound'] else 'NOT the same'} after welding at 32 bits",
+        f"          {report['components']} component(s), Euler number {report['euler_number']}, genus {report['genus']}",
+        f"size      area {report['area_mm2']:.6g}, volume {report['volume_mm3']:.6g}",
+        f"edges     {report['shortest_edge_mm']:.4g} to {report['longest_edge_mm']:.4g}, median {report['median_edge_mm']:.4g}",
+        f"angles    smallest {report['smallest_angle_deg']:.1f} deg, mean of the smallest {report['mean_smallest_angle_deg']:.1f} deg",
+    ]
+    if "mean_mm" in report:
+        lines += [
+            f"distance  to the other: mean {report['mean_mm']:.4g}, 95 % {report['p95_mm']:.4g}, largest {report['max_mm']:.4g}",
+            f"          from the other: mean {report['back_mean_mm']:.4g}, 95 % {report['back_p95_mm']:.4g}, "
+            f"largest {report['back_max_mm']:.4g}",
+        ]
+    return lines
+
+
+FAULTS = (
+    "boundary_edges",
+    "nonmanifold_edges",
+    "nonmanifold_vertices",
+    "misoriented_edges",
+    "inward_components",
+)
+
+
+def _of_stage_one(report: dict[str, Any]) -> list[str]:
+    if "study" not in report:
+        return []
+    study, window, networks = report["study"], report["window"], report["networks"]
+    lower = "any" if window["lower"] is None else f"{window['lower']:g}"
+    upper = "any" if window["upper"] is None else f"{window['upper']:g}"
+    chosen = {"otsu": "Otsu's, as no window was given", "preset": "the preset", "given": "as given"}
+    return [
+        f"study     {study['slices']} {study['plane']} slices of {study['columns']} x {study['rows']}",
+        f"window    {lower} < k <= {upper} ({chosen[window['chosen_by']]}), {100 * window['share']:.1f} % of the voxels",
+        f"networks  {networks['trained']} {networks['topology']}s of {networks['neurons']} neurons on the window's "
+        f"{'outline' if networks['signal'] == 'boundary' else 'pixels'}, {networks['strays']} stray pixels dropped",
+    ]
+
+
+def _of_points(report: dict[str, Any]) -> str:
+    points = report["points"]
+    made = f", {points['on_bridges']} on {points['bridged_gaps']} bridged gaps, {points['on_caps']} on caps"
+    return f"{points['count']}{made if points['on_bridges'] or points['on_caps'] else ''}, r = {points['spacing_mm']:.4g} {points['unit']}"
+
+
+def _of_rings(quality: dict[str, Any]) -> str:
+    ratio = quality.get("volume_over_rings")
+    return "" if ratio is None else f" ({100 * ratio:.1f} % of the rings')"
+
+
+def _edges(cell: list[float]) -> str:
+    return f"{cell[0]:.4g}" if len(set(cell)) == 1 else " x ".join(f"{edge:.4g}" for edge in cell)
+
+
+def _ending(report: dict[str, Any], output: str) -> list[str]:
+    warnings = [f"warning   {warning}" for warning in report["warnings"]]
+    return [*warnings[:3], f"written   {output} in {report['timings']['total_s']:.2f} s"]
