@@ -33,9 +33,7 @@ def write_reordered(path: Path, order: NDArray[np.float64], name: str = "oblique
     """Write the study with its axes permuted and flipped by nibabel, millimeters unchanged."""
     image = nibabel.Nifti1Image(sampled(AFFINES[name]).T, LPS_TO_RAS @ AFFINES[name])
     affine = image.affine @ inv_ornt_aff(order, image.shape)
-    turned = nibabel.Nifti1Image(
-        nibabel.orientations.apply_orientation(np.asarray(image.dataobj), order), affine
-    )
+    turned = nibabel.Nifti1Image(nibabel.orientations.apply_orientation(np.asarray(image.dataobj), order), affine)
     nibabel.save(turned, path)
     return turned
 
@@ -52,9 +50,7 @@ class TestMillimeters:
         assert volume.voxels.dtype == np.int16
 
     def test_all_axis_orders_give_the_same_canonical_array(self, tmp_path: Path) -> None:
-        reference = read_volume(
-            write_nifti(tmp_path / "a.nii", sampled(AFFINES["oblique"]), AFFINES["oblique"])
-        )
+        reference = read_volume(write_nifti(tmp_path / "a.nii", sampled(AFFINES["oblique"]), AFFINES["oblique"]))
         for order in ORDERS:
             write_reordered(tmp_path / "b.nii", order)
             volume = read_volume(tmp_path / "b.nii")
@@ -102,9 +98,7 @@ class TestMillimeters:
         def edit(header: Any) -> None:
             header["scl_slope"], header["scl_inter"] = 1, -1024
 
-        volume = read_volume(
-            write_nifti(tmp_path / "s.nii", np.full(SHAPE, 200, np.uint8), AFFINES["axial"], edit)
-        )
+        volume = read_volume(write_nifti(tmp_path / "s.nii", np.full(SHAPE, 200, np.uint8), AFFINES["axial"], edit))
         assert volume.voxels.dtype == np.int16
         assert (volume.voxels == -824).all()
 
@@ -230,9 +224,7 @@ class TestFaults:
         with pytest.raises(ResourceError):
             read_volume(tmp_path / "f.nii.gz")
 
-    def test_voxels_beyond_the_memory_are_refused(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_voxels_beyond_the_memory_are_refused(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         path = write_nifti(tmp_path / "f.nii", sampled(AFFINES["axial"]), AFFINES["axial"])
         monkeypatch.setattr(limits, "physical_memory", lambda: 100)
         with pytest.raises(ResourceError, match="at most 100 bytes"):
@@ -258,9 +250,7 @@ class TestHoles:
 
 class TestLabels:
     @pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])
-    def test_labels_lie_on_the_grid_of_the_file_for_all_axis_orders(
-        self, tmp_path: Path, suffix: str
-    ) -> None:
+    def test_labels_lie_on_the_grid_of_the_file_for_all_axis_orders(self, tmp_path: Path, suffix: str) -> None:
         for order in ORDERS:
             source = write_reordered(tmp_path / "s.nii", order)
             volume = read_volume(tmp_path / "s.nii")

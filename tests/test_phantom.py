@@ -115,9 +115,7 @@ class TestMaking:
         assert voxels.shape == shape
         np.testing.assert_allclose(made.volume.spacing_mm, spacing_mm)
         assert ((voxels > made.lower) & (voxels <= made.upper)).any(axis=(1, 2)).all()
-        corners = made.volume.to_mm(
-            np.array([[0.0, 0.0, 0.0], [shape[2] - 1.0, shape[1] - 1.0, shape[0] - 1.0]])
-        )
+        corners = made.volume.to_mm(np.array([[0.0, 0.0, 0.0], [shape[2] - 1.0, shape[1] - 1.0, shape[0] - 1.0]]))
         assert (np.abs(made.truth.vertices[:, :2]) < np.abs(corners[0, :2]) + np.array(spacing_mm[:2])).all()
         assert np.abs(head_of(made).skull(*made.truth.vertices.T)).max() < 1e-9 * max(spacing_mm)
 

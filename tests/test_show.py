@@ -178,10 +178,7 @@ class TestSpace:
         upper_left, lower_right = (
             figure.axes[0].transData.transform(place).astype(int) for place in ([-8, 8], [8, -12])
         )
-        assert (
-            seen[len(seen) - upper_left[1], upper_left[0]]
-            > 40 + seen[len(seen) - lower_right[1], lower_right[0]]
-        )
+        assert seen[len(seen) - upper_left[1], upper_left[0]] > 40 + seen[len(seen) - lower_right[1], lower_right[0]]
 
     def test_wireframe_hides_the_back(self, cube: QuadMesh) -> None:
         figure = draw_wireframe(cube.triangulated())
@@ -260,13 +257,9 @@ class TestSlices:
         assert (seen[len(seen) - 1 - spot[1], spot[0] - 40] == 0).all()
         assert figure.axes[0].transData.transform([[0, 0], [0, 70]])[:, 1].argmax() == int(upward)
 
-    def test_regions_keep_their_colors(
-        self, study: dict[str, NDArray[np.generic]], networks: Networks
-    ) -> None:
+    def test_regions_keep_their_colors(self, study: dict[str, NDArray[np.generic]], networks: Networks) -> None:
         labels = study["labels"][0]
-        figure = draw_regions(
-            study["images"][0], study["mask"][0], networks.codebooks[0], networks.lattice, labels
-        )
+        figure = draw_regions(study["images"][0], study["mask"][0], networks.codebooks[0], networks.lattice, labels)
         shown = np.asarray(figure.axes[3].images[0].get_array())
         colors = np.array([shown[labels == label][0] for label in range(17)])
         assert all((shown[labels == label] == colors[label]).all() for label in range(17))
@@ -274,18 +267,14 @@ class TestSlices:
         assert (colors[0] == 0).all()
         assert is_drawn(figure)
 
-    def test_contour_marks_the_bridged_gap(
-        self, study: dict[str, NDArray[np.generic]], networks: Networks
-    ) -> None:
+    def test_contour_marks_the_bridged_gap(self, study: dict[str, NDArray[np.generic]], networks: Networks) -> None:
         figure = draw_contour(study["mask"][1], networks.codebooks[1], networks.lattice, bridge=1.5)
         words = [text.get_text() for text in figure.axes[1].texts]
         assert "gap" in words
         assert "1 bridged gap (over 1.5 median edges)" in words
         assert is_drawn(figure)
 
-    def test_contour_without_gaps_has_no_arrow(
-        self, study: dict[str, NDArray[np.generic]], networks: Networks
-    ) -> None:
+    def test_contour_without_gaps_has_no_arrow(self, study: dict[str, NDArray[np.generic]], networks: Networks) -> None:
         figure = draw_contour(study["mask"][1], networks.codebooks[1], networks.lattice, bridge=0)
         assert "gap" not in [text.get_text() for text in figure.axes[1].texts]
 
@@ -413,8 +402,6 @@ class TestSaving:
         assert first.getvalue() == second.getvalue()
 
     def test_needs_no_display(self) -> None:
-        code = (
-            "import sys, tomomesh.show; print('matplotlib.pyplot' in sys.modules, 'tkinter' in sys.modules)"
-        )
+        code = "import sys, tomomesh.show; print('matplotlib.pyplot' in sys.modules, 'tkinter' in sys.modules)"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         assert done.stdout.split() == ["False", "False"]

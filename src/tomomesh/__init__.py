@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
@@ -31,6 +33,7 @@ __all__ = [
     "TomomeshError",
     "TriMesh",
     "Volume",
+    "__version__",
     "assess",
     "phantom",
     "read_mesh",
@@ -41,7 +44,6 @@ __all__ = [
     "segment",
     "window",
     "write_mesh",
-    "__version__",
 ]
 
 if TYPE_CHECKING:
@@ -64,3 +66,14 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(f"tomomesh.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
+
+
+class _Package(ModuleType):
+    """Keep a public name its function's, where a module of the same name is imported too."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name in _HOMES and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

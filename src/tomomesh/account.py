@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
@@ -15,6 +14,8 @@ from .measure.report import assess, compare
 from .model.points import BRIDGE, CAP, NEURON
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from .model.cubes import CubeGrid
@@ -109,7 +110,7 @@ class Account:
     def points(self, points: PointSet, spacing: float, bridged: int = 0) -> None:
         """Note how many points there are and how far apart."""
         self._sections["points"] = {
-            "unit": self._settings.run.units,
+            "unit": "mm" if "study" in self._sections else self._settings.run.units,
             "count": len(points),
             "measured": int((points.kinds == NEURON).sum()),
             "on_bridges": int((points.kinds == BRIDGE).sum()),

@@ -22,9 +22,7 @@ class TomomeshError(Exception):
 
     exit_code = 1
 
-    def __init__(
-        self, what: str, *, file: str = "", found: str = "", expected: str = "", hint: str = ""
-    ) -> None:
+    def __init__(self, what: str, *, file: str = "", found: str = "", expected: str = "", hint: str = "") -> None:
         where = f" File: {_plain(file)}" if file else ""
         where += (" " if where else " Found: ") + f"[{_plain(found)}]" if found else ""
         parts = [

@@ -156,9 +156,7 @@ class Head:
         middle = self.skull(x, y, z)
         scalp = inside(middle - self.half_width_mm - SCALP_WIDTH * self.scale)
         bone = inside(np.abs(middle) - self.half_width_mm) * (1 - part(NASAL_OPENING))
-        gray = contrast.air + (contrast.scalp - contrast.air) * np.maximum(
-            scalp, np.maximum(part(NOSE), part(EAR))
-        )
+        gray = contrast.air + (contrast.scalp - contrast.air) * np.maximum(scalp, np.maximum(part(NOSE), part(EAR)))
         layers = [
             (contrast.brain, inside(middle)),
             (contrast.fluid, part(VENTRICLE)),

@@ -10,7 +10,6 @@ import numpy as np
 from .account import Account
 from .errors import GeometryError
 from .measure.topology import check_promise
-from .model.mesh import QuadMesh, TriMesh
 from .model.points import CAP, PointSet
 from .model.volume import AXES, Volume
 from .progress import Progress, silent
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .model.cubes import CubeGrid
+    from .model.mesh import QuadMesh, TriMesh
     from .model.networks import Networks
     from .model.trace import Trace
 
@@ -172,9 +172,7 @@ def reconstruct_points(
     Surface
     """
     settings = (settings or Settings()).replace(**changes)
-    cloud = (
-        points if isinstance(points, PointSet) else PointSet.from_positions(np.asarray(points, np.float64))
-    )
+    cloud = points if isinstance(points, PointSet) else PointSet.from_positions(np.asarray(points, np.float64))
     account = Account(settings)
     with account.timed("points"):
         spacing = sampling_distance(cloud.positions)
@@ -205,7 +203,7 @@ def _segment(volume: Volume, settings: Settings, account: Account, progress: Pro
         labels = regions(mask, networks, pixel_mm=pixel_mm, threads=threads)
     account.networks(networks, len(mask))
     with account.timed("points"):
-        sampling = sample(networks, stack, settings.cubes)
+        sampling = sample(networks, stack, caps=settings.cubes.caps, bridge=settings.network.bridge)
     account.points(sampling.points, sampling.spacing_mm, sampling.bridged)
     return Segmentation(stack, mask, networks, labels, sampling.points, sampling, {})
 
@@ -216,9 +214,7 @@ def _slice_axis(volume: Volume, slices: str) -> int:
     return volume.stored_axis if slices == "stored" else AXES.index(slices)
 
 
-def _surface(
-    points: PointSet, spacing: float, settings: Settings, account: Account, progress: Progress
-) -> Surface:
+def _surface(points: PointSet, spacing: float, settings: Settings, account: Account, progress: Progress) -> Surface:
     with account.timed("cubes"):
         grid = partition(points.positions, _cell(spacing, settings))
         shell = close_shell(grid.keys, settings.cubes.closing, progress)

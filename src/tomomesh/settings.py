@@ -33,17 +33,17 @@ def param(
     `kind` is the type of one value; it follows from the default, except where that is None or a tuple.
     """
     kind = kind or (float if default is None or isinstance(default, tuple) else type(default))
-    meta = dict(
-        help=help,
-        kind=kind,
-        unit=unit,
-        choices=choices,
-        low=low,
-        above=above,
-        high=high,
-        length=length,
-        paper=paper,
-    )
+    meta = {
+        "help": help,
+        "kind": kind,
+        "unit": unit,
+        "choices": choices,
+        "low": low,
+        "above": above,
+        "high": high,
+        "length": length,
+        "paper": paper,
+    }
     return field(default=default, metadata=meta)
 
 
@@ -82,13 +82,9 @@ def _check(entry: Field[Any], value: Any) -> None:
     values = value if isinstance(value, tuple) else (value,)
     if meta["length"] and len(values) not in meta["length"]:
         counts = " or ".join(map(str, meta["length"]))
-        raise UsageError(
-            f"{option} has too few or too many values", found=f"{option} = {value}", expected=counts
-        )
+        raise UsageError(f"{option} has too few or too many values", found=f"{option} = {value}", expected=counts)
     if not all(_inside(meta, one) for one in values):
-        raise UsageError(
-            f"{option} is outside its limits", found=f"{option} = {value}", expected=limits_of(entry)
-        )
+        raise UsageError(f"{option} is outside its limits", found=f"{option} = {value}", expected=limits_of(entry))
 
 
 def _inside(meta: Mapping[str, Any], value: Any) -> bool:
@@ -116,9 +112,7 @@ def option_of(name: str) -> str:
 class ReadSettings(Group):
     """How a study is read where its files leave a choice."""
 
-    series: int | None = param(
-        None, "number of the series to take from a folder that holds several", kind=int, low=0
-    )
+    series: int | None = param(None, "number of the series to take from a folder that holds several", kind=int, low=0)
     spacing: tuple[float, ...] | None = param(
         None,
         "distance of the voxels along columns, rows and slices, for files that hold none",
@@ -194,23 +188,28 @@ class NetworkSettings(Group):
         choices=("auto", "bubble", "gaussian"),
         paper="bubble",
     )
-    alpha: tuple[float, float] = param(
-        (0.5, 0.01), "online: first and last learning rate", low=0, high=1, length=(2,)
-    )
+    alpha: tuple[float, float] = param((0.5, 0.01), "online: first and last learning rate", low=0, high=1, length=(2,))
     radius: tuple[float, float] | None = param(
         None,
         "first and last radius of the neighborhood (gaussian: its sigma); "
-        "by default from a quarter of the neurons down to 1 (online) or to what the thickness of the region needs (batch)",
+        "by default from half of the farthest hop down to 1 (online) or to what the region's thickness needs (batch)",
         unit="hops",
         low=0,
         length=(2,),
     )
     alpha_power: float = param(3.0, "online: power of the learning rate's fall; 1 is linear", above=0)
     radius_power: float = param(5.0, "power of the radius' fall; 1 is linear", above=0)
+    bridge: float = param(
+        2.0,
+        "an edge of the network over this many medians is a bridged gap, sampled along its line; 0 finds none",
+        unit="medians",
+        low=0,
+        paper=0.0,
+    )
     even: bool = param(True, "space the neurons of a chain or ring evenly along their line", paper=False)
     trim: float = param(
         2.5,
-        "pixels farther from their neuron than this many medians are strays: dropped, and the network fitted anew; 0 keeps all",
+        "pixels farther from their neuron than this many medians are strays, dropped in a second fit; 0 keeps all",
         unit="medians",
         low=0,
         paper=0.0,
@@ -226,10 +225,6 @@ class CubeSettings(Group):
         unit="mm", above=0, length=(1, 3),
     )  # fmt: skip
     cell_factor: float = param(1.0, "dilation factor on the edge of the cubes, for coarser models", above=0)
-    bridge: float = param(
-        2.0, "an edge of the network over this many medians is a bridged gap, sampled along its line; 0 samples none",
-        unit="medians", low=0, paper=0.0,
-    )  # fmt: skip
     caps: bool = param(True, "close the inside of rings that have nothing above or below")
     closing: int | None = param(
         None, "cubes by which gaps in the shell are closed; by default the fewest that keep the outside out",
@@ -237,21 +232,17 @@ class CubeSettings(Group):
     )  # fmt: skip
     allow_leaks: bool = param(False, "write the surface even where the outside leaks into the shell")
     surface: str = param("outer", "the outer surfaces, or all, cavities too", choices=("outer", "all"))
-    smoothing: int = param(
-        3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000
-    )
+    smoothing: int = param(3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000)
 
 
 @dataclass(frozen=True)
 class FitSettings(Group):
     """Dynamic mass-spring mesh (eq. 5-7)."""
 
-    stiffness: float = param(0.5, "sum of the structural stiffness at a vertex over k_d", low=0)
+    stiffness: float = param(0.25, "sum of the structural stiffness at a vertex over k_d", low=0)
     damping: float = param(1.0, "damping over critical damping", above=0)
     step: float = param(0.8, "time step, in units of 1/omega; the stable limit is 1", above=0, high=1)
-    tolerance: float = param(
-        1e-3, "speed and acceleration at which the mesh rests", unit="cube edges", above=0
-    )
+    tolerance: float = param(1e-3, "speed and acceleration at which the mesh rests", unit="cube edges", above=0)
     max_steps: int = param(200, "most steps", unit="steps", low=0)
     springs: str = param(
         "quads",
@@ -275,7 +266,7 @@ class RunSettings(Group):
     threads: int = param(0, "threads; 0 is one a core", low=0, high=1024)
     units: str = param(
         "mm",
-        "unit of the written coordinates; for a cloud, the unit that its numbers are in",
+        "unit that the numbers of a cloud are in; studies are always in mm",
         choices=("mm", "cm", "m", "unknown"),
     )
 
@@ -298,9 +289,7 @@ class Settings:
         return cls(**{name: replace(group, **group.paper()) for name, group in groups.items()})
 
     @classmethod
-    def from_dict(
-        cls, sections: Mapping[str, Any], *, base: Settings | None = None, file: str = ""
-    ) -> Settings:
+    def from_dict(cls, sections: Mapping[str, Any], *, base: Settings | None = None, file: str = "") -> Settings:
         """Take sections of values, as a TOML file holds them, over the defaults or over `base`.
 
         Raises
@@ -335,9 +324,7 @@ class Settings:
             own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
             groups[name] = replace(group, **own)
         if values:
-            raise UsageError(
-                "there is no such parameter", found=", ".join(values), expected="a field of Settings"
-            )
+            raise UsageError("there is no such parameter", found=", ".join(values), expected="a field of Settings")
         return Settings(**groups)
 
     def to_dict(self) -> dict[str, dict[str, Any]]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Sequence
-from types import FrameType
+from typing import TYPE_CHECKING
 
 from ..errors import InternalCheckError, ResourceError, TomomeshError, UsageError
 from .options import build_parser
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import FrameType
 
 INTERRUPTED, TERMINATED = 130, 143
 
@@ -29,9 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except TomomeshError as fault:
         return _complain(fault)
     except MemoryError:
-        return _complain(
-            ResourceError("the machine's memory is full", hint="a larger --cell-mm, or fewer slices")
-        )
+        return _complain(ResourceError("the machine's memory is full", hint="a larger --cell-mm, or fewer slices"))
     except KeyboardInterrupt:
         print("\ninterrupted; nothing was left behind", file=sys.stderr)
         return INTERRUPTED
@@ -41,9 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.close()
         return 0
     except Exception as fault:  # a traceback shown to a user is a bug: say where it is instead
-        return _complain(
-            InternalCheckError(f"a bug: {type(fault).__name__} in {_place(fault)}", found=str(fault))
-        )
+        return _complain(InternalCheckError(f"a bug: {type(fault).__name__} in {_place(fault)}", found=str(fault)))
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
@@ -53,9 +52,7 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 def _complain(fault: TomomeshError) -> int:
     print(f"error: {fault}", file=sys.stderr)
     if isinstance(fault, UsageError):
-        print(
-            "`tomomesh --help` lists the commands, `tomomesh COMMAND --help` their options.", file=sys.stderr
-        )
+        print("`tomomesh --help` lists the commands, `tomomesh COMMAND --help` their options.", file=sys.stderr)
     return fault.exit_code
 
 

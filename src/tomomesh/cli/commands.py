@@ -31,9 +31,7 @@ def settings_of(chosen: Namespace) -> Settings:
     settings = Settings.for_paper() if getattr(chosen, "paper", False) else Settings()
     if getattr(chosen, "settings", None):
         settings = io.read_settings(chosen.settings, base=settings)
-    given = {
-        entry.name: getattr(chosen, entry.name) for _, entry in parameters() if hasattr(chosen, entry.name)
-    }
+    given = {entry.name: getattr(chosen, entry.name) for _, entry in parameters() if hasattr(chosen, entry.name)}
     if getattr(chosen, "auto", False) and {"lower", "upper", "preset"} & set(given):
         raise UsageError("two windows are asked for", found="--auto and a window", expected="one of them")
     return settings.replace(**given)
@@ -80,7 +78,7 @@ def _segment(chosen: Namespace) -> None:
     with Bars(quiet=chosen.quiet) as progress:
         volume = _read(chosen.study, settings, progress)
         found = segment(volume, settings, progress=progress)
-        io.write_points(found.points, chosen.output, unit=settings.run.units)
+        io.write_points(found.points, chosen.output, **_frame(found, settings))
         _write_stage_one(chosen, found)
         _write_documents(chosen, found.report, settings)
         _draw(chosen.figures, found, None, settings, progress)
@@ -203,14 +201,21 @@ def _check_files(chosen: Namespace, *sources: str) -> None:
 
 def _write(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> None:
     """Write the mesh, and whatever else was asked for."""
-    unit, stage_one = settings.run.units, surface.segmentation
-    io.write_mesh(surface.mesh, chosen.output, unit=unit)
+    stage_one = surface.segmentation
+    io.write_mesh(surface.mesh, chosen.output, **_frame(stage_one, settings))
     if getattr(chosen, "points", None):
-        io.write_points(surface.points, chosen.points, unit=unit)
+        io.write_points(surface.points, chosen.points, **_frame(stage_one, settings))
     if stage_one is not None:
         _write_stage_one(chosen, stage_one)
     _write_documents(chosen, surface.report, settings)
     _draw(chosen.figures, stage_one, surface, settings, progress)
+
+
+def _frame(stage_one: Segmentation | None, settings: Settings) -> dict[str, str]:
+    """Name unit and frame: a study is written in patient millimeters, a cloud in whatever its numbers are in."""
+    if stage_one is not None:
+        return {"unit": "mm", "frame": "LPS"}
+    return {"unit": settings.run.units, "frame": "unknown"}
 
 
 def _write_stage_one(chosen: Namespace, found: Segmentation) -> None:

@@ -37,9 +37,7 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
 
     demo = _command(commands, "demo", "the built-in head, everything it can show")
-    demo.add_argument(
-        "-o", "--output", default="tomomesh-demo", metavar="FOLDER", help="default: %(default)s"
-    )
+    demo.add_argument("-o", "--output", default="tomomesh-demo", metavar="FOLDER", help="default: %(default)s")
     _add_settings(demo, ("network", *STAGE_TWO, "run"))
 
     main = _command(commands, "reconstruct", "a study of slices in, a closed surface out")
@@ -60,15 +58,9 @@ def build_parser() -> argparse.ArgumentParser:
     _add_outputs(stage_two, "figures")
     _add_settings(stage_two, (*STAGE_TWO, "run"))
 
-    network = _command(
-        commands, "network", "one network on a test region or a picture, as the paper's Fig. 1 and 2"
-    )
-    network.add_argument(
-        "region", metavar="REGION", help="square, triangle, cube, or one picture (PNG or TIFF)"
-    )
-    network.add_argument(
-        "-o", "--output", default="tomomesh-network", metavar="FOLDER", help="default: %(default)s"
-    )
+    network = _command(commands, "network", "one network on a test region or a picture, as the paper's Fig. 1 and 2")
+    network.add_argument("region", metavar="REGION", help="square, triangle, cube, or one picture (PNG or TIFF)")
+    network.add_argument("-o", "--output", default="tomomesh-network", metavar="FOLDER", help="default: %(default)s")
     _add_outputs(network)
     _add_settings(network, ("window", "network", "run"))
 
@@ -86,9 +78,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _command(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
-    parser: argparse.ArgumentParser = commands.add_parser(
-        name, help=text, description=f"{text[0].upper()}{text[1:]}."
-    )
+    parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
     return parser
 
 
@@ -104,17 +94,13 @@ def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
         metavar, text = kinds[name]
         group.add_argument(f"--{name}", metavar=metavar, help=text)
     group.add_argument("--report", metavar="FILE.json", help="write the report")
-    group.add_argument(
-        "--save-settings", metavar="FILE.toml", help="write the settings of this run, to repeat it"
-    )
+    group.add_argument("--save-settings", metavar="FILE.toml", help="write the settings of this run, to repeat it")
 
 
 def _add_settings(parser: argparse.ArgumentParser, groups: tuple[str, ...], *, paper: bool = True) -> None:
     """Add an option for each parameter of some groups, and those that choose or show them all."""
     sections = {
-        entry.name: parser.add_argument_group(_title(entry.name))
-        for entry in fields(Settings)
-        if entry.name in groups
+        entry.name: parser.add_argument_group(_title(entry.name)) for entry in fields(Settings) if entry.name in groups
     }
     for group, entry in parameters():
         if group in sections:
@@ -126,13 +112,9 @@ def _add_settings(parser: argparse.ArgumentParser, groups: tuple[str, ...], *, p
     if paper:
         run = sections["run"]
         run.add_argument("--paper", action="store_true", help="take the paper's own choices as defaults")
-        run.add_argument(
-            "--settings", metavar="FILE.toml", help="read settings; options given here win over them"
-        )
+        run.add_argument("--settings", metavar="FILE.toml", help="read settings; options given here win over them")
         run.add_argument("--quiet", action="store_true", help="print nothing but errors")
-        run.add_argument(
-            "--json", action="store_true", help="print the report as JSON in place of the summary"
-        )
+        run.add_argument("--json", action="store_true", help="print the report as JSON in place of the summary")
 
 
 def _title(section: str) -> str:
@@ -165,9 +147,7 @@ def _metavar(name: str, meta: Any) -> Any:
     if meta["length"] in ((), (1, 3)):
         return {int: "N", float: "X"}[meta["kind"]]
     return (
-        tuple(name[0].upper() + str(n) for n in range(meta["length"][0]))
-        if meta["length"] == (2,)
-        else ("X", "Y", "Z")
+        tuple(name[0].upper() + str(n) for n in range(meta["length"][0])) if meta["length"] == (2,) else ("X", "Y", "Z")
     )
 
 
@@ -177,9 +157,5 @@ def _help(entry: Field[Any]) -> str:
     if isinstance(default, tuple):
         default = " ".join(f"{value:g}" for value in default)
     facts = [meta["unit"], "" if meta["choices"] else limits_of(entry)]
-    facts += (
-        []
-        if default is None
-        else [f"default {default:g}" if isinstance(default, float) else f"default {default}"]
-    )
+    facts += [] if default is None else [f"default {default:g}" if isinstance(default, float) else f"default {default}"]
     return f"{meta['help']} ({'; '.join(fact for fact in facts if fact)})".replace("%", "%%")

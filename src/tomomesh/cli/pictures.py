@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from ..show import draw_all
@@ -10,6 +9,8 @@ from ..show.plane import Plane
 from ..show.render import View
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from matplotlib.figure import Figure
 
     from ..pipeline import Segmentation, Surface
@@ -20,7 +21,7 @@ def pictures(
     stage_one: Segmentation | None, surface: Surface | None, settings: Settings
 ) -> Iterator[tuple[str, Figure]]:
     """Yield every picture that the stages allow, with its name."""
-    stages: dict[str, Any] = {"bridge": settings.cubes.bridge, "tolerance": settings.fit.tolerance}
+    stages: dict[str, Any] = {"bridge": settings.network.bridge, "tolerance": settings.fit.tolerance}
     if stage_one is not None:
         volume = stage_one.volume
         plane = stage_one.report["study"]["plane"]

@@ -11,11 +11,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
     """Say what was reconstructed, and how good it is."""
     quality, fit, cubes = report["quality"], report["fit"], report["cubes"]
     unit = report["points"]["unit"]
-    shape = (
-        "closed and manifold"
-        if quality["sound"] and quality["sound_after_welding"]
-        else "NOT closed and manifold"
-    )
+    shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
     lines = [
         *_of_stage_one(report),
         f"points    {_of_points(report)}",
@@ -60,7 +56,8 @@ def of_study(found: dict[str, Any]) -> list[str]:
     bars = "".join(BARS[round((len(BARS) - 1) * (count / tallest) ** 0.5)] for count in found["histogram"])
     windows = [f"{name}: k > {lower:g}" for name, (lower, _) in found["windows"].items()]
     return [
-        f"size      {slices} slices x {rows} rows x {columns} columns (S x P x L), {found['layers']} layer(s) of {found['type']}",
+        f"size      {slices} slices x {rows} rows x {columns} columns (S x P x L), "
+        f"{found['layers']} layer(s) of {found['type']}",
         f"spacing   {x:g} x {y:g} x {z:g} mm (L, P, S)",
         f"extent    {' x '.join(f'{side:.1f}' for side in found['size_mm'])} mm, first voxel at "
         f"({', '.join(f'{c:.1f}' for c in found['corner_mm'])}) mm LPS",
@@ -77,17 +74,22 @@ def of_check(report: dict[str, Any]) -> list[str]:
     """Say what a mesh is."""
     faults = [f"{report[name]} {name.replace('_', ' ')}" for name in FAULTS if report[name]]
     shape = "closed, manifold, outward" if report["sound"] else f"NOT sound: {', '.join(faults)}"
+    same = "the same" if report["sound_after_welding"] == report["sound"] else "NOT the same"
     lines = [
         f"mesh      {report['vertices']} vertices, {report['faces']} faces",
-        f"topology  {shape}; {'the same' if report['sound_after_welding'] == report['sound'] else 'NOT the same'} after welding at 32 bits",
-        f"          {report['components']} component(s), Euler number {report['euler_number']}, genus {report['genus']}",
+        f"topology  {shape}; {same} after welding at 32 bits",
+        f"          {report['components']} component(s), Euler number {report['euler_number']}, "
+        f"genus {report['genus']}",
         f"size      area {report['area_mm2']:.6g}, volume {report['volume_mm3']:.6g}",
-        f"edges     {report['shortest_edge_mm']:.4g} to {report['longest_edge_mm']:.4g}, median {report['median_edge_mm']:.4g}",
-        f"angles    smallest {report['smallest_angle_deg']:.1f} deg, mean of the smallest {report['mean_smallest_angle_deg']:.1f} deg",
+        f"edges     {report['shortest_edge_mm']:.4g} to {report['longest_edge_mm']:.4g}, "
+        f"median {report['median_edge_mm']:.4g}",
+        f"angles    smallest {report['smallest_angle_deg']:.1f} deg, "
+        f"mean of the smallest {report['mean_smallest_angle_deg']:.1f} deg",
     ]
     if "mean_mm" in report:
         lines += [
-            f"distance  to the other: mean {report['mean_mm']:.4g}, 95 % {report['p95_mm']:.4g}, largest {report['max_mm']:.4g}",
+            f"distance  to the other: mean {report['mean_mm']:.4g}, 95 % {report['p95_mm']:.4g}, "
+            f"largest {report['max_mm']:.4g}",
             f"          from the other: mean {report['back_mean_mm']:.4g}, 95 % {report['back_p95_mm']:.4g}, "
             f"largest {report['back_max_mm']:.4g}",
         ]
@@ -112,7 +114,8 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
     chosen = {"otsu": "Otsu's, as no window was given", "preset": "the preset", "given": "as given"}
     return [
         f"study     {study['slices']} {study['plane']} slices of {study['columns']} x {study['rows']}",
-        f"window    {lower} < k <= {upper} ({chosen[window['chosen_by']]}), {100 * window['share']:.1f} % of the voxels",
+        f"window    {lower} < k <= {upper} ({chosen[window['chosen_by']]}), "
+        f"{100 * window['share']:.1f} % of the voxels",
         f"networks  {networks['trained']} {networks['topology']}s of {networks['neurons']} neurons on the window's "
         f"{'outline' if networks['signal'] == 'boundary' else 'pixels'}, {networks['strays']} stray pixels dropped",
     ]
@@ -121,7 +124,8 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
 def _of_points(report: dict[str, Any]) -> str:
     points = report["points"]
     made = f", {points['on_bridges']} on {points['bridged_gaps']} bridged gaps, {points['on_caps']} on caps"
-    return f"{points['count']}{made if points['on_bridges'] or points['on_caps'] else ''}, r = {points['spacing_mm']:.4g} {points['unit']}"
+    made = made if points["on_bridges"] or points["on_caps"] else ""
+    return f"{points['count']}{made}, r = {points['spacing_mm']:.4g} {points['unit']}"
 
 
 def _of_rings(quality: dict[str, Any]) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from .atomic import check_output, replacing
 from .documents import read_settings, write_document, write_settings
+from .images import read_picture
 from .labels import LABEL_WRITERS, write_labels
 from .meshes import MESH_READERS, MESH_WRITERS, read_mesh, write_mesh
 from .points import POINT_READERS, POINT_WRITERS, read_points, write_points
@@ -21,6 +22,7 @@ __all__ = [
     "VOLUME_READERS",
     "check_output",
     "read_mesh",
+    "read_picture",
     "read_points",
     "read_settings",
     "read_volume",

@@ -49,8 +49,8 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def read_settings(path: str | Path) -> Settings:
-    """Read a run's parameters from a TOML file.
+def read_settings(path: str | Path, *, base: Settings | None = None) -> Settings:
+    """Read a run's parameters from a TOML file, over the defaults or over `base`.
 
     Raises
     ------
@@ -68,10 +68,8 @@ def read_settings(path: str | Path) -> Settings:
     except UnicodeDecodeError:
         raise FormatError("the settings are no text", file=str(path), expected="TOML") from None
     except tomllib.TOMLDecodeError as fault:
-        raise FormatError(
-            "the settings cannot be read", file=str(path), found=str(fault), expected="TOML"
-        ) from None
-    return Settings.from_dict(sections, file=str(path))
+        raise FormatError("the settings cannot be read", file=str(path), found=str(fault), expected="TOML") from None
+    return Settings.from_dict(sections, base=base, file=str(path))
 
 
 def write_settings(settings: Settings, path: str | Path) -> None:

@@ -9,17 +9,17 @@ import numpy as np
 
 from ..errors import FormatError, GeometryError, ResourceError
 from ..model.volume import Volume
+from ..settings import ReadSettings
 from .affine import upright
 from .gray import native, without_holes
 from .limits import require_memory
-from .source import suffix_of, third_party
+from .source import existing_file, suffix_of, third_party
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from ..settings import ReadSettings
 
 FAMILIES = {".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF"}
 """Suffixes of slices, and the format behind each."""
@@ -83,6 +83,21 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
     return Volume.from_stored(voxels, upright(settings.spacing), notes=(note, *notes))
 
 
+def read_picture(path: str | Path) -> Volume:
+    """Read one PNG or TIFF picture as a slice of pixels of 1 mm.
+
+    Raises
+    ------
+    UnreadableError, FormatError
+        Where it is missing, or no such picture.
+    """
+    file = existing_file(path)
+    if suffix_of(file) not in FAMILIES:
+        found = f"suffix = {suffix_of(file) or 'none'}"
+        raise FormatError("the picture is of an unknown kind", file=str(path), found=found, expected="PNG or TIFF")
+    return read_images([file], ReadSettings(spacing=(1.0, 1.0, 1.0)), folder=str(path))
+
+
 def natural(path: Path) -> tuple[list[tuple[int, int, str]], str]:
     """Order names as people do: slice 2 before slice 10."""
     parts = re.split(r"([0-9]+)", path.name)
@@ -95,7 +110,7 @@ def _pixels(path: Path) -> NDArray[Any]:
 
     with third_party("Pillow", path.name):
         try:
-            image = Image.open(path)
+            image = Image.open(path, formats=("PNG", "TIFF"))
         except Image.DecompressionBombError:
             raise ResourceError("the slice is too large to be read", file=path.name) from None
         with image:

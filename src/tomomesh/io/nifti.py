@@ -141,9 +141,7 @@ def _int(start: bytes, order: str) -> int:
 def _layout(header: Any, name: str) -> Layout:
     dim, ndim = [int(size) for size in header["dim"]], int(header["dim"][0])
     if not 2 <= ndim <= 7 or min(dim[1 : ndim + 1]) < 1:
-        raise FormatError(
-            "the sizes of the volume are invalid", file=name, found=f"dim = {dim}", expected="all over 0"
-        )
+        raise FormatError("the sizes of the volume are invalid", file=name, found=f"dim = {dim}", expected="all over 0")
     sizes = [*dim[1 : ndim + 1], 1][: max(ndim, 3)]
     if any(size > 1 for size in sizes[3:]):
         raise FormatError(
@@ -179,9 +177,7 @@ def _frame(header: Any, settings: ReadSettings, name: str) -> tuple[NDArray[np.f
     forms = [form for form in ("sform", "qform") if int(header[f"{form}_code"]) > 0]
     broken = not forms or not all(SMALLEST_SPACING <= size < np.inf for size in pixdim)
     if settings.spacing and broken:
-        return upright(settings.spacing), (
-            "no frame in the file: --spacing, columns to the left, rows to the back",
-        )
+        return upright(settings.spacing), ("no frame in the file: --spacing, columns to the left, rows to the back",)
     check_spacing(pixdim, ["pixdim[1]", "pixdim[2]", "pixdim[3]"], file=name, hint=HINT)
     if not forms:
         raise GeometryError(

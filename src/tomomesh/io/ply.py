@@ -41,7 +41,8 @@ class Element:
     def least_bytes(self, text: bool) -> int:
         """Return the fewest bytes that all rows can take: lists are empty, numbers have one digit."""
         kinds = [words[1] if words[0] == "list" else words[0] for words in self.properties]
-        return self.count * sum(2 if text else BYTES[kind] for kind in kinds)
+        sizes = [BYTES[kind] for kind in kinds]
+        return self.count * (2 * len(sizes) if text else sum(sizes))
 
 
 @dataclass(frozen=True)

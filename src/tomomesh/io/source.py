@@ -137,9 +137,7 @@ def _passed_over(path: Path, folder: Path) -> str:
 
 
 def _refuse(fault: OSError) -> None:
-    raise UnreadableError(
-        "the folder cannot be read", file=str(fault.filename), found=_reason(fault)
-    ) from None
+    raise UnreadableError("the folder cannot be read", file=str(fault.filename), found=_reason(fault)) from None
 
 
 def _reason(fault: Exception) -> str:

@@ -14,9 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def parse_rows(
-    lines: Sequence[str], *, columns: Sequence[int], file: str, before: int = 0
-) -> NDArray[np.float64]:
+def parse_rows(lines: Sequence[str], *, columns: Sequence[int], file: str, before: int = 0) -> NDArray[np.float64]:
     """Return some columns of rows of equal length.
 
     Parameters
@@ -43,9 +41,7 @@ def parse_rows(
     """
     delimiter = delimiter_of(lines)
     try:
-        rows = (
-            np.loadtxt(lines, delimiter=delimiter, ndmin=2) if any(map(_content, lines)) else np.empty((0, 0))
-        )
+        rows = np.loadtxt(lines, delimiter=delimiter, ndmin=2) if any(map(_content, lines)) else np.empty((0, 0))
         if not rows.size or (rows.shape[1] > max(columns) and np.isfinite(rows[:, columns]).all()):
             return rows[:, columns] if rows.size else np.empty((0, len(columns)))
     except ValueError:

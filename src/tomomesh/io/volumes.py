@@ -99,9 +99,7 @@ def _read_folder(folder: Path, settings: ReadSettings) -> Volume:
     )
 
 
-def _read_images(
-    files: list[Path], others: Counter[str], folder: Path, settings: ReadSettings
-) -> Volume | None:
+def _read_images(files: list[Path], others: Counter[str], folder: Path, settings: ReadSettings) -> Volume | None:
     """Read DICOM where there is any, else PNG or TIFF slices."""
     dicom = [path for path in files if is_dicom(path)]
     if dicom:

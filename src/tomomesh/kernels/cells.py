@@ -189,7 +189,7 @@ def nearest_points(
     order, start : int64 arrays
         The points of cube q are ``order[start[q]:start[q + 1]]``.
     cube : (n,) int32 array
-        Where to look. Result: the cube that holds the point found; unchanged where there is none.
+        Where to look.
     nearest : (n,) int32 array
         Result: number of the point, -1 where the 27 cubes hold none. The point that comes first in `order`
         wins a tie.
@@ -198,10 +198,9 @@ def nearest_points(
     """
     for v in range(begin, end):
         best = 1e300
-        home = cube[v]
         nearest[v] = -1
         for s in range(table.shape[1]):
-            q = table[home, s]
+            q = table[cube[v], s]
             if q < 0:
                 continue
             for n in range(start[q], start[q + 1]):
@@ -212,4 +211,3 @@ def nearest_points(
                 if squared < best:
                     best = squared
                     nearest[v] = p
-                    cube[v] = q

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ..model.mesh import TriMesh
+if TYPE_CHECKING:
+    from ..model.mesh import TriMesh
 
 
 def triangle_shapes(mesh: TriMesh) -> dict[str, float]:

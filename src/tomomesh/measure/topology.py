@@ -102,7 +102,7 @@ def topology(mesh: TriMesh) -> Topology:
 
 
 def face_components(mesh: TriMesh) -> NDArray[np.int64]:
-    """Number the connected pieces of a mesh, (m,), in the order of their lowest vertex."""
+    """Return the number of the connected piece of each face, (m,), in the order of their lowest vertex."""
     n = len(mesh.vertices)
     links = sparse.coo_array((np.ones(len(mesh.half_edges), bool), tuple(mesh.half_edges.T)), shape=(n, n))
     _, label = connected_components(links, directed=False)
@@ -163,10 +163,7 @@ def check_promise(mesh: TriMesh) -> None:
     for candidate in (mesh, joined):
         found = {name: count for name, count in topology(candidate).faults.items() if count}
         if found or len(candidate.vertices) != len(mesh.vertices):
-            named = (
-                ", ".join(f"{name} = {count}" for name, count in found.items())
-                or "vertices of equal position"
-            )
+            named = ", ".join(f"{name} = {count}" for name, count in found.items()) or "vertices of equal position"
             raise InternalCheckError(
                 "the mesh failed its own check",
                 found=named,

@@ -54,9 +54,7 @@ def lattice(name: str, neurons: int) -> Lattice:
         For a topology that there is not.
     """
     if name not in _BUILDERS:
-        raise UsageError(
-            "there is no such network", found=f"--network = {name}", expected=" | ".join(_BUILDERS)
-        )
+        raise UsageError("there is no such network", found=f"--network = {name}", expected=" | ".join(_BUILDERS))
     return _BUILDERS[name](neurons)
 
 

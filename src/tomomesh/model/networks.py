@@ -24,6 +24,8 @@ class Networks:
         Slice number K of each network, rising.
     codebooks : (s, u, 2) float array
         Positions of the neurons as voxel indices (column i, row j) within their slice.
+    bridged : (s, e) bool array
+        Edges of the lattice that cross a gap in the pixels.
     outlined : (s,) bool array
         Whether the network saw the outline of the filled window, not the window's pixels.
     pixels : (s,) int64 array
@@ -35,6 +37,7 @@ class Networks:
     lattice: Lattice
     slices: NDArray[np.int32]
     codebooks: NDArray[np.float64]
+    bridged: NDArray[np.bool_]
     outlined: NDArray[np.bool_]
     pixels: NDArray[np.int64]
     strays: NDArray[np.int64]

@@ -1,4 +1,4 @@
-"""Space the neurons of a line evenly, and find the gaps that it bridges."""
+"""Find the gaps that a line of neurons bridges, and space its neurons evenly between them."""
 
 from __future__ import annotations
 
@@ -12,52 +12,69 @@ if TYPE_CHECKING:
     from ..model.lattice import Lattice
 
 
+def bridged_edges(codebook: NDArray[np.float64], lattice: Lattice, bridge: float) -> NDArray[np.bool_]:
+    """Tell which edges (e,) of a network are over `bridge` medians long: its "virtual lines" across gaps.
+
+    None where `bridge` is 0.
+    """
+    ends = codebook[lattice.edges]
+    lengths = np.sqrt(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1))
+    return np.asarray((lengths > bridge * np.median(lengths)) & (bridge > 0))
+
+
 def even_spacing(
-    codebook: NDArray[np.float64], lattice: Lattice, *, bridge: float = 2.0
-) -> NDArray[np.float64]:
+    codebook: NDArray[np.float64], lattice: Lattice, gaps: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Slide the neurons of a chain or a ring along their own line until they are equally far apart.
 
-    Neurons crowd where a band is thick. A bridged gap stays as wide as it was: each arc between two gaps keeps
-    its neurons and its ends, and a ring without gaps keeps its first neuron.
+    Neurons crowd where a band is thick. A gap stays as wide as it was: each arc between two gaps keeps its ends
+    and gets neurons by its length; a ring without gaps keeps its first neuron.
 
     Parameters
     ----------
     codebook : (u, d) float array
     lattice : Lattice
         Any but a chain or a ring is returned as it is.
-    bridge : float
-        Edges over this many medians are gaps; see `CubeSettings.bridge`.
+    gaps : (e,) bool array
+        The edges that bridge a gap.
 
     Returns
     -------
-    (u, d) float array
+    codebook : (u, d) float array
+    gaps : (e,) bool array
+        Where the gaps are now.
     """
-    if lattice.name not in ("chain", "ring"):
-        return codebook
-    edges = lattice.edges
-    gaps = np.flatnonzero(bridged(codebook[edges[:, 1]] - codebook[edges[:, 0]], bridge))
     if lattice.name == "chain":
         return _even_arcs(codebook, gaps)
-    if len(gaps) == 0:
-        return _even(np.concatenate([codebook, codebook[:1]]))[:-1]
-    shift = int(gaps[-1]) + 1
-    turned = _even_arcs(np.roll(codebook, -shift, axis=0), (gaps[:-1] - shift) % len(codebook))
-    return np.roll(turned, shift, axis=0)
+    if lattice.name != "ring":
+        return codebook, gaps
+    if not gaps.any():
+        return _even(np.concatenate([codebook, codebook[:1]]), len(codebook) + 1)[:-1], gaps
+    shift = int(np.flatnonzero(gaps)[-1]) + 1
+    turned, inner = _even_arcs(np.roll(codebook, -shift, axis=0), np.roll(gaps, -shift)[:-1])
+    return np.roll(turned, shift, axis=0), np.roll(np.append(inner, True), shift)
 
 
-def bridged(edges: NDArray[np.float64], bridge: float) -> NDArray[np.bool_]:
-    """Tell which edge vectors (e, d) of a network are over `bridge` medians long; none where that is 0."""
-    lengths = np.sqrt((edges**2).sum(axis=1))
-    return np.asarray((lengths > bridge * np.median(lengths)) & (bridge > 0))
+def _even_arcs(line: NDArray[np.float64], gaps: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Even out the runs of neurons between the gaps of an open line, the neurons shared by length."""
+    arcs = np.split(line, np.flatnonzero(gaps) + 1)
+    lengths = np.array([_along(arc)[-1] for arc in arcs])
+    edges = len(line) - len(arcs)
+    share = edges * lengths / max(lengths.sum(), 1e-300)
+    counts = np.floor(share).astype(int)
+    counts[np.argsort(counts - share, kind="stable")[: edges - counts.sum()]] += 1
+    moved = np.zeros_like(gaps)
+    moved[np.cumsum(counts + 1)[:-1] - 1] = True
+    return np.concatenate([_even(arc, n + 1) for arc, n in zip(arcs, counts, strict=True)]), moved
 
 
-def _even_arcs(line: NDArray[np.float64], gaps: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Even out each run of neurons between the edges that are gaps."""
-    return np.concatenate([_even(arc) for arc in np.split(line, np.sort(gaps) + 1)])
-
-
-def _even(line: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Place as many points as a line has at equal steps along it, its ends kept."""
-    along = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(line, axis=0) ** 2).sum(axis=1)))])
-    wanted = np.linspace(0.0, along[-1], len(line))
+def _even(line: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Place points at equal steps along a line, its ends kept; one point alone takes the middle."""
+    along = _along(line)
+    wanted = np.linspace(0.0, along[-1], count) if count > 1 else along[-1:] / 2
     return np.stack([np.interp(wanted, along, axis) for axis in line.T], axis=1)
+
+
+def _along(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance of each neuron from the first, along the line."""
+    return np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(line, axis=0) ** 2).sum(axis=1)))])

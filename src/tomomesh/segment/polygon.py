@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..kernels.polygons import distance_to_polygon, inside_polygon
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -20,22 +22,17 @@ def lattice_inside(ring: NDArray[np.float64], spacing: float) -> NDArray[np.floa
 
 
 def inside(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell which points lie inside a closed polygon, by the parity of the edges to their right."""
-    a, b = ring, np.roll(ring, -1, axis=0)
-    x, y = points[:, :1], points[:, 1:]
-    spans = (a[:, 1] > y) != (b[:, 1] > y)
-    rise = np.where(a[:, 1] == b[:, 1], 1.0, b[:, 1] - a[:, 1])
-    crossing = a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
-    return np.asarray((spans & (x < crossing)).sum(axis=1) % 2 == 1)
+    """Tell which points (n, 2) lie inside a closed polygon (u, 2)."""
+    found = np.empty(len(points), bool)
+    inside_polygon(ring, points, found)
+    return found
 
 
 def distance(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the distance of points to the line of a closed polygon."""
-    a, along = ring, np.roll(ring, -1, axis=0) - ring
-    length = np.maximum((along**2).sum(axis=1), 1e-300)
-    share = np.clip(((points[:, None] - a) * along).sum(axis=2) / length, 0, 1)
-    off = points[:, None] - (a + share[:, :, None] * along)
-    return np.asarray(np.sqrt((off**2).sum(axis=2).min(axis=1, initial=np.inf)))
+    """Return the distance of points (n, 2) to the line of a closed polygon (u, 2)."""
+    found = np.empty(len(points))
+    distance_to_polygon(ring, points, found)
+    return found
 
 
 def area(ring: NDArray[np.float64]) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import EmptyError
 from ..model.lattice import lattice
-from .even import even_spacing
+from .even import bridged_edges, even_spacing
 from .som import match, start_positions, train
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def train_region(inputs: NDArray[np.float64], settings: NetworkSettings, *, seed
     spacing = (np.prod(np.ptp(inputs, axis=0)) / len(inputs)) if inputs.shape[1] == 2 else 1.0
     codebook, kept = train(inputs, graph, settings, np.random.default_rng(seed), pixel_area=float(spacing))
     if settings.even:
-        codebook = even_spacing(codebook, graph)
+        codebook, _ = even_spacing(codebook, graph, bridged_edges(codebook, graph, settings.bridge))
     return TrainedNetwork(inputs, graph, start, codebook, _measures(inputs, graph, codebook, kept))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
     from ..model.networks import Networks
     from ..model.volume import Volume
-    from ..settings import CubeSettings
 
 REACH = 2
 """Rings at most this many slices apart count as neighbors: one slice without a network between them is bridged."""
@@ -46,7 +46,7 @@ class Sampling:
     distance_mm: NDArray[np.float64]
 
 
-def sample(networks: Networks, volume: Volume, settings: CubeSettings) -> Sampling:
+def sample(networks: Networks, volume: Volume, *, caps: bool = True, bridge: float = 2.0) -> Sampling:
     """Place the neurons of all slices in space, sample bridged gaps, and close the ends of rings.
 
     Parameters
@@ -54,24 +54,32 @@ def sample(networks: Networks, volume: Volume, settings: CubeSettings) -> Sampli
     networks : Networks
     volume : Volume
         Its slices K are those of the networks.
-    settings : CubeSettings
-        ``bridge`` and ``caps`` are read.
+    caps : bool
+        Whether to close the inside of rings that have nothing above or below.
+    bridge : float
+        Gaps between slices over this many medians do not widen r; 0 takes the widest.
 
     Returns
     -------
     Sampling
     """
     neurons = _neurons(networks, volume)
-    bridges, bridged, in_ring = _bridges(networks, volume, settings.bridge)
+    bridges, in_ring = _bridges(networks, volume)
     points = neurons.joined(bridges)
     is_ring = networks.lattice.name == "ring"
     spacing = max(in_ring, _slice_step(networks, volume))
-    if is_ring and settings.caps:
+    if is_ring and caps:
         points = points.joined(_caps(networks, volume, spacing))
-    spacing = max(spacing, _across(points, settings.bridge))
+    spacing = max(spacing, _across(points, bridge))
     pixel = np.prod(volume.spacing_mm[:2])
     areas = np.array([abs(area(ring)) for ring in networks.codebooks]) * pixel if is_ring else np.empty(0)
-    return Sampling(points, spacing, bridged, areas, networks.slices * np.float64(volume.spacing_mm[2]))
+    return Sampling(
+        points,
+        spacing,
+        int(networks.bridged.sum()),
+        areas,
+        networks.slices * np.float64(volume.spacing_mm[2]),
+    )
 
 
 def _neurons(networks: Networks, volume: Volume) -> PointSet:
@@ -92,16 +100,14 @@ def _made(indices: NDArray[np.float64], slices: NDArray[np.int32], volume: Volum
     return PointSet(_place(indices, slices, volume), slices, none, np.full(len(slices), kind, np.uint8))
 
 
-def _bridges(networks: Networks, volume: Volume, bridge: float) -> tuple[PointSet, int, float]:
-    """Sample each edge over `bridge` medians of its slice; return also how many, and the widest gap left."""
-    pixel = np.array(volume.spacing_mm[:2])
+def _bridges(networks: Networks, volume: Volume) -> tuple[PointSet, float]:
+    """Sample the bridged gaps as densely as the other edges of their slice; return also the widest gap left."""
     ends = networks.codebooks[:, networks.lattice.edges]
-    lengths = np.sqrt((((ends[:, :, 1] - ends[:, :, 0]) * pixel) ** 2).sum(axis=2))
-    median = np.median(lengths, axis=1, keepdims=True)
+    lengths = np.sqrt((((ends[:, :, 1] - ends[:, :, 0]) * volume.spacing_mm[:2]) ** 2).sum(axis=2))
+    usual = np.where(networks.bridged, 0.0, lengths).max(axis=1, keepdims=True)
     pieces = np.ones(lengths.shape, np.int64)
-    if bridge > 0:
-        wide = (lengths > bridge * median) & (median > 0)
-        pieces[wide] = np.ceil((lengths / np.where(median > 0, median, 1))[wide])
+    sampled = networks.bridged & (usual > 0)
+    pieces[sampled] = np.ceil((lengths / np.where(usual > 0, usual, 1.0))[sampled])
     which, edge = np.nonzero(pieces > 1)
     inner = pieces[which, edge] - 1
     owner = np.repeat(np.arange(len(which)), inner)
@@ -110,7 +116,7 @@ def _bridges(networks: Networks, volume: Volume, bridge: float) -> tuple[PointSe
     first, last = ends[which, edge, 0][owner], ends[which, edge, 1][owner]
     indices = first + share * (last - first)
     points = _made(indices, networks.slices[which][owner], volume, BRIDGE)
-    return points, len(which), float((lengths / pieces).max())
+    return points, float((lengths / pieces).max())
 
 
 def _slice_step(networks: Networks, volume: Volume) -> float:
@@ -127,7 +133,7 @@ def _across(points: PointSet, limit: float) -> float:
     """
     gaps = []
     present = np.unique(points.slices)
-    for here, there in zip(present[:-1], present[1:], strict=True):
+    for here, there in pairwise(present):
         if there - here > REACH:
             continue
         lower, upper = points.slices == here, points.slices == there

@@ -16,6 +16,9 @@ SOLID = 0.5
 An annulus of inner over outer radius q fills (1 - q^2) / (1 + q^2): a skull about 0.2, a head's skin 0.6 to 1.
 """
 
+NARROW = 0.06
+"""Width of the openings that the outside does not pass, over the square root of the window's area."""
+
 
 def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
     """Tell whether the window of a study is a solid, like skin, and not a wall, like a skull.
@@ -33,8 +36,23 @@ def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
 
 
 def outline(plane: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the border pixels of a (J, I) mask whose holes are filled; pixels at the image's edge count."""
-    framed = np.pad(plane, 1)
-    background, _ = ndimage.label(~framed)
-    filled = (background != background[0, 0])[1:-1, 1:-1]
+    """Return the border pixels (J, I) of a filled window.
+
+    What the outside cannot reach is filled, also where only a narrow opening leads there, as between scalp and
+    brain at the edge of an image: the outside is taken as one that passes no opening narrower than `NARROW` of
+    the window's size (a morphological closing).
+    """
+    reach = round(NARROW / 2 * float(np.sqrt(np.count_nonzero(plane))))
+    framed = np.pad(plane, reach + 1)
+    wide = _grown(framed, reach)
+    background, _ = ndimage.label(~wide)
+    inside = ~_grown(background == background[0, 0], reach)
+    filled = (inside | framed)[reach + 1 : -reach - 1, reach + 1 : -reach - 1]
     return np.asarray(filled & ~ndimage.binary_erosion(filled))
+
+
+def _grown(mask: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+    """Dilate by an octagon: crosses and squares in turn."""
+    for step in range(steps):
+        mask = ndimage.binary_dilation(mask, ndimage.generate_binary_structure(2, 1 + step % 2))
+    return mask

@@ -136,9 +136,7 @@ def _train_online(
     rng: np.random.Generator,
 ) -> None:
     shown = inputs[rng.integers(len(inputs), size=settings.iterations)]
-    alpha = settings.alpha[1] + (settings.alpha[0] - settings.alpha[1]) * _falling(
-        len(shown), settings.alpha_power
-    )
+    alpha = settings.alpha[1] + (settings.alpha[0] - settings.alpha[1]) * _falling(len(shown), settings.alpha_power)
     radius = radii[1] + (radii[0] - radii[1]) * _falling(len(shown), settings.radius_power)
     kernels.train_online(codebook, shown, lattice.hops, alpha, radius, settings.neighborhood == "gaussian")
 
@@ -158,9 +156,7 @@ def _train_batch(
     kernels.train_batch(codebook, by_axis, lattice.hops, weights.astype(np.float64))
 
 
-def _without_strays(
-    codebook: NDArray[np.float64], by_axis: NDArray[np.float64], trim: float
-) -> NDArray[np.bool_]:
+def _without_strays(codebook: NDArray[np.float64], by_axis: NDArray[np.float64], trim: float) -> NDArray[np.bool_]:
     """Keep the inputs that are nearer to their neuron than `trim` times the median; all where `trim` is 0."""
     if trim == 0:
         return np.ones(by_axis.shape[1], bool)
@@ -168,9 +164,7 @@ def _without_strays(
     return np.asarray(squared <= trim**2 * np.median(squared))
 
 
-def match(
-    codebook: NDArray[np.float64], by_axis: NDArray[np.float64]
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+def match(codebook: NDArray[np.float64], by_axis: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Return the winner of each input and the squared distance to it (eq. 1); arrays are (d, u) and (d, n)."""
     winners, squared = np.empty(by_axis.shape[1], np.int32), np.empty(by_axis.shape[1])
     kernels.best_matching_units(codebook, by_axis, winners, squared)

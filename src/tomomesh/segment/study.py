@@ -11,7 +11,7 @@ from ..kernels.threads import in_blocks
 from ..model.lattice import lattice
 from ..model.networks import Networks
 from ..progress import Progress, silent
-from .even import even_spacing
+from .even import bridged_edges, even_spacing
 from .signal import fills_most, outline
 from .som import match, train
 
@@ -58,7 +58,7 @@ def train_study(
     outlined = settings.signal == "boundary" or (settings.signal == "auto" and fills_most(mask))
     count = len(mask)
     pixel_area = pixel_mm[0] * pixel_mm[1]
-    codebooks = np.zeros((count, len(graph), 2))
+    codebooks, bridged = np.zeros((count, len(graph), 2)), np.zeros((count, len(graph.edges)), bool)
     pixels, strays = np.zeros(count, np.int64), np.zeros(count, np.int64)
 
     def work(start: int, stop: int) -> None:
@@ -66,12 +66,12 @@ def train_study(
             shown = np.argwhere(outline(mask[k]) if outlined else mask[k])[:, ::-1] * np.array(pixel_mm)
             pixels[k] = len(shown)
             if len(shown) >= len(graph):
-                codebook, kept = train(
-                    shown, graph, settings, np.random.default_rng([seed, k]), pixel_area=pixel_area
-                )
+                rng = np.random.default_rng([seed, k])
+                found, kept = train(shown, graph, settings, rng, pixel_area=pixel_area)
+                gaps = bridged_edges(found, graph, settings.bridge)
                 if settings.even:
-                    codebook = even_spacing(codebook, graph)
-                codebooks[k], strays[k] = codebook / pixel_mm, (~kept).sum()
+                    found, gaps = even_spacing(found, graph, gaps)
+                codebooks[k], bridged[k], strays[k] = found / pixel_mm, gaps, (~kept).sum()
 
     in_blocks(work, count, block=1, threads=threads, done=lambda done: progress("networks", done, count))
     trained = pixels >= len(graph)
@@ -84,7 +84,13 @@ def train_study(
         )
     slices = np.flatnonzero(trained).astype(np.int32)
     return Networks(
-        graph, slices, codebooks[trained], np.full(len(slices), outlined), pixels[trained], strays[trained]
+        graph,
+        slices,
+        codebooks[trained],
+        bridged[trained],
+        np.full(len(slices), outlined),
+        pixels[trained],
+        strays[trained],
     )
 
 

@@ -63,9 +63,7 @@ def small_print(
     ax.annotate(text, (place[0], place[1]), shift, color=color, **look)
 
 
-def arrow(
-    ax: Axes, tail: Floats, tip: Floats, *, color: str = ACCENT, text: str = "", head: str = "-|>"
-) -> None:
+def arrow(ax: Axes, tail: Floats, tip: Floats, *, color: str = ACCENT, text: str = "", head: str = "-|>") -> None:
     """Point from one (x, y) place to another."""
     look: Any = {
         "arrowstyle": head,
@@ -75,6 +73,4 @@ def arrow(
         "shrinkA": 8,
         "shrinkB": 3,
     }
-    ax.annotate(
-        text, (tip[0], tip[1]), (tail[0], tail[1]), color=color, ha="center", va="center", arrowprops=look
-    )
+    ax.annotate(text, (tip[0], tip[1]), (tail[0], tail[1]), color=color, ha="center", va="center", arrowprops=look)

@@ -90,9 +90,7 @@ def contrast(levels: Floats) -> tuple[float, float]:
     return (float(low), float(high)) if low < high else (float(levels.min()), float(levels.max()))
 
 
-def panels(
-    width: float, count: int, size: Floats, more: float, gap: float = 0.02
-) -> tuple[Figure, list[Axes]]:
+def panels(width: float, count: int, size: Floats, more: float, gap: float = 0.02) -> tuple[Figure, list[Axes]]:
     """Open a row of panels as high as their content (x, y) needs, and `more` inches for what is written."""
     ratio = float(np.clip(size[1] / size[0], 0.4, 1.8))
     return canvas(width, width / count * ratio + more, 1, count, gap=gap)

@@ -111,9 +111,7 @@ def draw_contour(
     plane.draw(axes[0], np.where(np.asarray(mask, bool)[:, :, None], PALE, 1.0))
     lines(axes[0], places[network.edges], color="black", width=0.9)
     dots(axes[0], places, size=15, color="black", marker="D")
-    heading(
-        axes[0], "a  Neurons and virtual lines", f"{network.name} of {len(network)} neurons over the window"
-    )
+    heading(axes[0], "a  Neurons and virtual lines", f"{network.name} of {len(network)} neurons over the window")
     dots(axes[1], places, size=20, color="white", rim=NETWORK, width=1.1)
     _mark(axes[1], places, gaps)
     found = {0: "no bridged gap", 1: "1 bridged gap"}.get(len(gaps), f"{len(gaps)} bridged gaps")

@@ -47,9 +47,7 @@ def _slices(points: PointSet) -> int:
     return len(np.unique(points.slices[points.slices >= 0]))
 
 
-def _scatter(
-    ax: Axes, positions: NDArray[np.float64], kinds: NDArray[np.uint8], view: View
-) -> ScalarMappable:
+def _scatter(ax: Axes, positions: NDArray[np.float64], kinds: NDArray[np.uint8], view: View) -> ScalarMappable:
     """Draw the points from far to near, and return the scale of their heights."""
     seen = view.camera.project(positions)
     order = np.argsort(seen[:, 2], kind="stable")
@@ -60,11 +58,7 @@ def _scatter(
         chosen = order[kinds[order] == kind]
         if not len(chosen):
             continue
-        paint = (
-            scale.to_rgba(positions[chosen, 2])
-            if kind == NEURON
-            else np.tile(to_rgba(color), (len(chosen), 1))
-        )
+        paint = scale.to_rgba(positions[chosen, 2]) if kind == NEURON else np.tile(to_rgba(color), (len(chosen), 1))
         paint[:, 3] = 0.25 + 0.75 * nearness[chosen] ** 1.5
         spread = size * (0.35 + 0.65 * nearness[chosen]) * (1.0 if kind == NEURON else 0.6)
         dots(ax, seen[chosen, :2], size=spread, color=paint, marker=marker)

@@ -53,9 +53,7 @@ class Shell:
         return self.two_sided >= HELD
 
 
-def close_shell(
-    occupied: NDArray[np.int64], closing: int | None = None, progress: Progress = silent
-) -> Shell:
+def close_shell(occupied: NDArray[np.int64], closing: int | None = None, progress: Progress = silent) -> Shell:
     """Close the shell by a given number of cubes, or by the fewest that make it hold.
 
     Parameters

@@ -52,9 +52,7 @@ def _critical_blocks(present: NDArray[np.bool_]) -> list[tuple[list[Offset], NDA
     """
     pairs = [pair for a, b in combinations(range(3), 2) for pair in _signed(a, b)]
     blocks = [_edge_block(present, first, second) for first, second in pairs]
-    return blocks + [
-        found for x, y, z in product((-1, 1), repeat=3) for found in _corner_blocks(present, (x, y, z))
-    ]
+    return blocks + [found for x, y, z in product((-1, 1), repeat=3) for found in _corner_blocks(present, (x, y, z))]
 
 
 def _signed(a: int, b: int) -> list[tuple[Offset, Offset]]:
@@ -67,18 +65,14 @@ def _unit(axis: int, sign: int) -> Offset:
     return x, y, z
 
 
-def _edge_block(
-    present: NDArray[np.bool_], first: Offset, second: Offset
-) -> tuple[list[Offset], NDArray[np.bool_]]:
+def _edge_block(present: NDArray[np.bool_], first: Offset, second: Offset) -> tuple[list[Offset], NDArray[np.bool_]]:
     """Find cubes whose diagonal neighbor is present, and neither of the two between."""
     across = (first[0] + second[0], first[1] + second[1], first[2] + second[2])
     here, between, beside = (present[column_of(cell)] for cell in (across, first, second))
     return [first, second], here & ~between & ~beside
 
 
-def _corner_blocks(
-    present: NDArray[np.bool_], corner: Offset
-) -> list[tuple[list[Offset], NDArray[np.bool_]]]:
+def _corner_blocks(present: NDArray[np.bool_], corner: Offset) -> list[tuple[list[Offset], NDArray[np.bool_]]]:
     """Find 2 x 2 x 2 blocks where two opposite cells alone are present, or alone are missing."""
     x, y, z = corner
     cells = [(x * a, y * b, z * c) for a, b, c in product((0, 1), repeat=3)][1:]

@@ -59,7 +59,7 @@ def _turns() -> NDArray[np.int32]:
 
 
 def _corners() -> NDArray[np.int64]:
-    """Return the four corners (x, y, z) of each face of the unit cube, counter-clockwise from outside, (6, 4, 3)."""
+    """Return the corners (x, y, z) of the unit cube's faces, counter-clockwise from outside, (6, 4, 3)."""
     square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
     faces = np.zeros((6, 4, 3), np.int64)
     for n, direction in enumerate(DIRECTIONS):
@@ -134,10 +134,8 @@ def _outermost(
     return np.asarray(outward & (inside == 0))
 
 
-def _quads(
-    grid: CubeGrid, cells: NDArray[np.int64], cube: NDArray[np.int64], direction: NDArray[np.int64]
-) -> QuadMesh:
-    """Number the corners of the faces; equal corners become one vertex."""
+def _quads(grid: CubeGrid, cells: NDArray[np.int64], cube: NDArray[np.int64], direction: NDArray[np.int64]) -> QuadMesh:
+    """Make one vertex of the corners that faces share."""
     corners = (cells[cube][:, None, :] + CORNERS[direction]).reshape(-1, 3)
     keys, quads = np.unique(keys_of(corners), return_inverse=True)
     vertices = grid.origin + cells_of(keys) * grid.cell_mm

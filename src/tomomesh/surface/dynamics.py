@@ -115,7 +115,10 @@ class _Motion:
         self.stiffness = settings.stiffness / max(self.degree.mean(), 1.0)
         self.table = neighbor_table(grid.keys)
         self.cube = cubes.astype(np.int32)
+        self.cube_of_point = np.empty(len(points), np.int32)
+        self.cube_of_point[grid.order] = np.repeat(np.arange(len(grid.keys)), np.diff(grid.start))
         self.nearest = np.full(len(vertices), -1, np.int32)
+        self.left = self.nearest
         self.edge = float(grid.cell_mm.min())
         self.history: list[tuple[float, ...]] = []
 
@@ -131,15 +134,24 @@ class _Motion:
         return Trace(speed, acceleration, kinetic, potential, distance, clamped, unattracted, self.rests())
 
     def match(self) -> None:
-        """Assign its nearest point to every vertex."""
+        """Assign its nearest point to every vertex.
+
+        A vertex does not go back to the point it left last: half way between two points, explicit Euler could
+        swing between them for ever.
+        """
+        found = np.empty_like(self.nearest)
 
         def work(start: int, stop: int) -> None:
             nearest_points(
                 self.position, self.points, self.table, self.grid.order, self.grid.start,
-                self.cube, self.nearest, start, stop,
+                self.cube, found, start, stop,
             )  # fmt: skip
 
         in_blocks(work, len(self.position), block=BLOCK, threads=self.threads)
+        moves = (found != self.nearest) & ((found != self.left) | (found < 0))
+        self.left = np.where(moves, self.nearest, self.left)
+        self.nearest = np.where(moves, found, self.nearest)
+        self.cube = np.where(self.nearest >= 0, self.cube_of_point[self.nearest], self.cube)
 
     def advance(self) -> None:
         """Take one step: x += h x', x' += h x''; no vertex moves more than one cube edge."""

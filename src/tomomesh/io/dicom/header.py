@@ -33,6 +33,13 @@ FIELDS = (
 )  # fmt: skip
 """Fields that are read later on."""
 
+TELLING = (
+    "EchoTime", "EchoNumbers", "TemporalPositionIdentifier", "AcquisitionNumber", "TriggerTime",
+    "DiffusionBValue", "InversionTime", "FlipAngle", "KVP", "ConvolutionKernel", "ImageType",
+    "InstanceNumber",
+)  # fmt: skip
+"""Fields that tell apart images at one position, the most telling first; none of them is personal."""
+
 NOT_DICOM = "not DICOM"
 WITHOUT_PIXELS = "DICOM without pixels"
 
@@ -118,7 +125,7 @@ def _read_header(path: Path) -> Any:
 
     with third_party("pydicom", path.name):
         header = pydicom.dcmread(path, force=True, stop_before_pixels=True)
-        for keyword in FIELDS:  # values are converted when they are first asked for, and may fail then
+        for keyword in FIELDS + TELLING:  # values are converted when they are first asked for, and may fail then
             header.get(keyword)
         kind = header.get("SOPClassUID") or header.file_meta.get("MediaStorageSOPClassUID")
     promises_image = kind is not None and "Image Storage" in str(getattr(kind, "name", ""))
@@ -141,16 +148,16 @@ def frames_of(path: Path, header: Any) -> list[Frame]:
     FormatError
         For fields that are no numbers, too short or too long, or of no meaning.
     """
-    name = path.name
-    count = _count(header, "NumberOfFrames", name, missing=1)
-    per_frame = header.get("PerFrameFunctionalGroupsSequence") or []
-    if len(per_frame) not in (0, count):
-        raise FormatError(
-            "the frames do not match their descriptions",
-            file=name,
-            found=f"NumberOfFrames = {count}, descriptions = {len(per_frame)}",
-        )
-    return [_frame(path, header, number) for number in range(count)]
+    with third_party("pydicom", path.name):
+        count = _count(header, "NumberOfFrames", path.name, missing=1)
+        per_frame = header.get("PerFrameFunctionalGroupsSequence") or []
+        if len(per_frame) not in (0, count):
+            raise FormatError(
+                "the frames do not match their descriptions",
+                file=path.name,
+                found=f"NumberOfFrames = {count}, descriptions = {len(per_frame)}",
+            )
+        return [_frame(path, header, number) for number in range(count)]
 
 
 def _frame(path: Path, header: Any, number: int) -> Frame:
@@ -197,9 +204,7 @@ def _count(header: Any, keyword: str, name: str, missing: int = 0) -> int:
     value = numbers(header.get(keyword), 1, keyword, name)
     count = missing if value is None else value[0]
     if not (count >= 1 and float(count).is_integer()):
-        raise FormatError(
-            "a size is invalid", file=name, found=f"{keyword} = {count:g}", expected="at least 1"
-        )
+        raise FormatError("a size is invalid", file=name, found=f"{keyword} = {count:g}", expected="at least 1")
     return int(count)
 
 

@@ -52,7 +52,7 @@ def _decoded(frame: Frame) -> NDArray[Any]:
         data = pydicom.dcmread(frame.path, force=True)
         _check_kind(data, name)
         _check_length(data, frame, name)
-        pixels = pixel_array(data)
+        pixels = pixel_array(data, correct_unused_bits=False)  # they tell of overlays and of wrong signs
     count = int(data.get("NumberOfFrames") or 1)
     shape = (count, *frame.size, *([3] if int(data.get("SamplesPerPixel") or 1) == 3 else []))
     if pixels.size != np.prod(shape):
@@ -76,9 +76,7 @@ def _check_kind(data: Any, name: str) -> None:
             expected="MONOCHROME or RGB with a linear scale",
         )
     if not any(field in data for field in PIXEL_FIELDS):
-        raise FormatError(
-            "the file holds no pixels", file=name, found="PixelData = missing", hint="a fresh copy"
-        )
+        raise FormatError("the file holds no pixels", file=name, found="PixelData = missing", hint="a fresh copy")
     _check_compression(data, name)
 
 

@@ -12,7 +12,7 @@ from ...model.volume import Volume
 from ..gray import native, scaled, scaled_dtype, without_holes
 from ..limits import require_memory
 from ..source import counted
-from .header import frames_of, read_headers
+from .header import TELLING, frames_of, read_headers
 from .pixels import Decoder
 from .series import choose
 from .stack import Stack, stacked
@@ -25,17 +25,8 @@ if TYPE_CHECKING:
     from ...settings import ReadSettings
     from .header import Frame
 
-TELLING = (
-    "EchoTime", "EchoNumbers", "TemporalPositionIdentifier", "AcquisitionNumber", "TriggerTime",
-    "DiffusionBValue", "InversionTime", "FlipAngle", "KVP", "ConvolutionKernel", "ImageType",
-    "InstanceNumber",
-)  # fmt: skip
-"""Fields that tell apart images at one position, the most telling first; none of them is personal."""
 
-
-def read_dicom(
-    files: list[Path], settings: ReadSettings, *, study: str, others: Counter[str] | None = None
-) -> Volume:
+def read_dicom(files: list[Path], settings: ReadSettings, *, study: str, others: Counter[str] | None = None) -> Volume:
     """Read one series of slices.
 
     Parameters

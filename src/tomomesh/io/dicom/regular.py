@@ -15,9 +15,7 @@ EVEN = 0.01
 """Distances that differ by less than this part are even."""
 
 
-def regular(
-    heights: NDArray[np.float64], *, fill: bool, study: str
-) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+def regular(heights: NDArray[np.float64], *, fill: bool, study: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Give the slices numbers by their height.
 
     Parameters
