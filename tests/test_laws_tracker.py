@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     Face = tuple[tuple[int, ...], tuple[int, ...]]
 
 FACES, WHOLE = ndimage.generate_binary_structure(3, 1), ndimage.generate_binary_structure(3, 3)
-EDGES = ndimage.generate_binary_structure(3, 2)
 
 
 def composed(solid: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 import time
 from contextlib import contextmanager
@@ -138,7 +139,7 @@ class Account:
             "cavities": int((tracked.volumes < 0).sum()),
             "taken": int(tracked.taken.sum()),
             "square_faces": len(tracked.mesh.quads),
-            "enclosed_cubes": int(tracked.volumes[tracked.taken].sum()),
+            "enclosed_cubes": tracked.enclosed,
         }
 
     def fit(self, trace: Trace) -> None:
@@ -163,11 +164,10 @@ class Account:
 
     def rings(self, sampling: Sampling) -> None:
         """Compare the volume of the mesh with the areas of the rings times the distance of their slices."""
-        if len(sampling.ring_area_mm2) > 1:
-            volume = float(np.trapezoid(sampling.ring_area_mm2, sampling.distance_mm))
+        if math.isfinite(sampling.volume_mm3) and sampling.volume_mm3 > 0:
             quality = self._sections["quality"]
-            quality["rings_volume_mm3"] = volume
-            quality["volume_over_rings"] = quality["volume_mm3"] / volume
+            quality["rings_volume_mm3"] = sampling.volume_mm3
+            quality["volume_over_rings"] = quality["volume_mm3"] / sampling.volume_mm3
 
     def truth(self, mesh: TriMesh, caps: NDArray[np.bool_], truth: TriMesh) -> None:
         """Measure the distance to the exact surface, both ways; the caps are no part of it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
     from .model.mesh import QuadMesh, TriMesh
     from .model.networks import Networks
     from .model.trace import Trace
+
+LEAST = 0.5
+"""Share of the rings' volume that a shell must enclose where it is too thin to be seen to hold."""
 
 
 @dataclass(frozen=True)
@@ -130,8 +134,11 @@ def reconstruct(
     settings = (settings or Settings()).replace(**changes)
     account = Account(settings)
     segmentation = _segment(volume, settings, account, progress)
-    surface = _surface(segmentation.points, segmentation.sampling.spacing_mm, settings, account, progress)
-    account.rings(segmentation.sampling)
+    sampling = segmentation.sampling
+    surface = _surface(
+        sampling.points, sampling.spacing_mm, settings, account, progress, expected_mm3=sampling.volume_mm3
+    )
+    account.rings(sampling)
     if truth is not None:
         account.truth(surface.mesh, surface.cap_faces, truth)
     report = account.report()
@@ -214,18 +221,26 @@ def _slice_axis(volume: Volume, slices: str) -> int:
     return volume.stored_axis if slices == "stored" else AXES.index(slices)
 
 
-def _surface(points: PointSet, spacing: float, settings: Settings, account: Account, progress: Progress) -> Surface:
+def _surface(
+    points: PointSet,
+    spacing: float,
+    settings: Settings,
+    account: Account,
+    progress: Progress,
+    *,
+    expected_mm3: float = math.inf,
+) -> Surface:
     with account.timed("cubes"):
         grid = partition(points.positions, _cell(spacing, settings))
         shell = close_shell(grid.keys, settings.cubes.closing, progress)
         cubes = grid.with_cubes(well_composed(shell.keys))
     account.cubes(grid, shell, cubes)
-    if not shell.holds:
-        _leaks(account, settings)
     with account.timed("cuberille"):
         tracked = track(cubes, surface=settings.cubes.surface)
         cuberille = tracked.mesh
     account.surface(tracked)
+    if not shell.holds and tracked.enclosed * float(cubes.cell_mm.prod()) < LEAST * expected_mm3:
+        _leaks(account, settings)
     with account.timed("smooth"):
         rough = cuberille.triangulated()
         smoothed = rough.moved(low_pass(cuberille.vertices, cuberille.edges, settings.cubes.smoothing))

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 AXES = ("sagittal", "coronal", "axial")
 """The plane whose normal is patient axis 0 (left), 1 (posterior), 2 (superior)."""
 
+SLAB = 8
+"""A study with this many times fewer slices than rows and columns is a slab."""
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -110,9 +113,18 @@ class Volume:
         return 2 - self.grid.axes.index(0)
 
     def thickest_axis(self) -> int:
-        """Return the patient axis of the widest spacing; superior where two are equal within 0.1 %."""
+        """Return the patient axis across which slices are taken by default.
+
+        That of the widest spacing; superior where it is not wider than the others by 0.1 %. A slab of few slices
+        is never cut across its width, whatever its spacing.
+        """
+        counts = self.shape[::-1]
+        thin = [axis for axis in range(3) if counts[axis] * SLAB < min(counts[:axis] + counts[axis + 1 :])]
+        if thin:
+            return thin[0]
         spacing = self.spacing_mm
-        return max((2, 1, 0), key=lambda axis: (spacing[axis] > 1.001 * min(spacing), spacing[axis]))
+        widest = int(np.argmax(spacing))
+        return widest if spacing[widest] > 1.001 * max(spacing[:widest] + spacing[widest + 1 :]) else 2
 
     def along(self, axis: int) -> Volume:
         """Return a view whose slices K are stacked along a patient axis (0 left, 1 posterior, 2 superior).

@@ -45,6 +45,13 @@ class Sampling:
     ring_area_mm2: NDArray[np.float64]
     distance_mm: NDArray[np.float64]
 
+    @property
+    def volume_mm3(self) -> float:
+        """Volume between the rings: their areas times the distance of the slices; infinite without rings."""
+        if len(self.ring_area_mm2) < 2:
+            return float("inf")
+        return float(np.trapezoid(self.ring_area_mm2, self.distance_mm))
+
 
 def sample(networks: Networks, volume: Volume, *, caps: bool = True, bridge: float = 2.0) -> Sampling:
     """Place the neurons of all slices in space, sample bridged gaps, and close the ends of rings.
@@ -162,7 +169,7 @@ def _caps(networks: Networks, volume: Volume, spacing: float) -> PointSet:
                 bare |= outside
             else:
                 bare |= True
-        bare[bare] = distance(ring, lattice[bare]) > spacing / 2
+        bare[bare] = distance(ring, lattice[bare]) > spacing / 4
         found.append(lattice[bare] / pixel)
     slices = np.repeat(networks.slices, [len(f) for f in found])
     return _made(np.concatenate(found), slices, volume, CAP)

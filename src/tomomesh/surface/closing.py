@@ -20,8 +20,12 @@ if TYPE_CHECKING:
 
 WIDEST = 8
 """Largest closing that is tried by itself, cubes."""
+LEAKING = 1
+"""Closing of a shell that none makes hold, as of a sheet or a thin slab: it fills single holes."""
 HELD = 0.5
-"""Share of a component's occupied cubes that must see enclosed space for the shell to hold."""
+"""Share of a component's occupied cubes that must be near the inside for the shell to hold."""
+NEAR = 2
+"""Steps from the inside within which an occupied cube counts as seeing it: noise may make a shell two cubes thick."""
 DEBRIS = 0.01
 """Components with less than this share of the occupied cubes have no say."""
 
@@ -39,7 +43,7 @@ class Shell:
     closing : int
         Cubes by which the shell was dilated and eroded.
     two_sided : float
-        Smallest share, over the components, of occupied cubes that see enclosed space: near 1 where the
+        Smallest share, over the components, of occupied cubes that are near the inside: near 1 where the
         shell holds, near 0 where the outside leaks in and the surface would be two-walled.
     """
 
@@ -66,7 +70,7 @@ def close_shell(occupied: NDArray[np.int64], closing: int | None = None, progres
     Returns
     -------
     Shell
-        Where no closing up to `WIDEST` holds, the unclosed cubes; see `Shell.holds`.
+        Where no closing up to `WIDEST` holds, closed by `LEAKING`; see `Shell.holds`.
     """
     tried = range(WIDEST + 1) if closing is None else [closing]
     for count, steps in enumerate(tried):
@@ -77,7 +81,8 @@ def close_shell(occupied: NDArray[np.int64], closing: int | None = None, progres
             progress("closing", len(tried), len(tried))
             return Shell(band.closed(), steps, share)
     progress("closing", len(tried), len(tried))
-    return Shell(occupied, 0, _Band.around(occupied, 0).two_sided())
+    band = _Band.around(occupied, LEAKING)
+    return Shell(band.closed(), LEAKING, band.two_sided())
 
 
 @dataclass(frozen=True)
@@ -106,23 +111,31 @@ class _Band:
             steps,
         )
 
+    def eroded(self) -> NDArray[np.bool_]:
+        """Tell which cubes the outside takes back: those it reaches within the dilation, past no occupied cube."""
+        depth = np.where(self.outside, 0, -1).astype(np.int32)
+        spread(self.table, self.dilated & ~self.occupied, depth, self.steps)
+        return depth >= 0
+
+    def closed(self) -> NDArray[np.int64]:
+        """Return the keys of the closed shell."""
+        return self.keys[self.dilated & ~self.eroded()]
+
     def two_sided(self) -> float:
-        """Return the smallest share, over the components, of occupied cubes near enclosed space or inside a solid."""
-        depth = np.where(~self.dilated & ~self.outside, 0, -1).astype(np.int32)
-        spread(self.table, self.dilated, depth, self.steps + 1)
-        filled = np.append(self.occupied, False)[self.table].all(axis=1)
-        inside = (depth >= 0) | (np.append(filled, False)[self.table].any(axis=1))
+        """Return the smallest share, over the components, of occupied cubes that are near the inside.
+
+        The inside is whatever is not occupied and shares no face with the outside, and the depth of a solid.
+        """
+        outside = np.append(self.eroded(), False)
+        inside = ~self.occupied & ~outside[:-1] & ~outside[self.table[:, FACE_COLUMNS]].any(axis=1)
+        inside |= np.append(self.occupied, False)[self.table].all(axis=1)
+        depth = np.where(inside, 0, -1).astype(np.int32)
+        spread(self.table, self.occupied, depth, NEAR)
         labels = np.full(len(self.keys), -1, np.int32)
         label_components(self.table, self.dilated, labels)
         cubes = np.bincount(labels[self.occupied])
-        seeing = np.bincount(labels[self.occupied], weights=inside[self.occupied])
-        return float((seeing / cubes)[cubes >= DEBRIS * cubes.sum()].min())
-
-    def closed(self) -> NDArray[np.int64]:
-        """Take away again what the outside reaches within the dilation, never passing an occupied cube."""
-        depth = np.where(self.outside, 0, -1).astype(np.int32)
-        spread(self.table, self.dilated & ~self.occupied, depth, self.steps)
-        return self.keys[self.dilated & (depth < 0)]
+        seeing = np.bincount(labels[self.occupied], weights=depth[self.occupied] >= 0)
+        return float((seeing / np.maximum(cubes, 1))[cubes >= DEBRIS * cubes.sum()].min())
 
 
 def _outer_layer(table: NDArray[np.int32], dilated: NDArray[np.bool_]) -> NDArray[np.bool_]:

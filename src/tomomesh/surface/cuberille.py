@@ -39,6 +39,11 @@ class Cuberille:
     volumes: NDArray[np.int64]
     taken: NDArray[np.bool_]
 
+    @property
+    def enclosed(self) -> int:
+        """Cubes inside the surfaces that were taken."""
+        return int(self.volumes[self.taken].sum())
+
 
 def _turns() -> NDArray[np.int32]:
     """List, for each direction and side of a face, where tracking may go on (see `track_surfaces`)."""

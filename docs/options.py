@@ -1,0 +1,50 @@
+"""Write the tables of options in docs/command-line.md anew, from the settings: ``python docs/options.py``."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import Field
+from pathlib import Path
+from typing import Any
+
+from tomomesh.settings import UNSET, limits_of, option_of, parameters
+
+PAGE = Path(__file__).parent / "command-line.md"
+HEAD = ["| option | what | unit | allowed | default | `--paper` |", "|---|---|---|---|---|---|"]
+COUNTS = {(): "", (1, 3): "one or three: ", (2,): "two: ", (3,): "three: "}
+
+
+def write() -> None:
+    """Fill each pair of marks, ``<!-- group -->`` and ``<!-- end group -->``."""
+    text = PAGE.read_text(encoding="utf-8")
+    for group in dict(parameters()):
+        table = "\n".join([*HEAD, *(row(entry) for name, entry in parameters() if name == group)])
+        marked = re.compile(rf"(<!-- {group} -->\n).*?(<!-- end {group} -->)", re.DOTALL)
+        text = marked.sub(lambda found, table=table: f"{found[1]}{table}\n{found[2]}", text)  # type: ignore[misc]
+    PAGE.write_text(text, encoding="utf-8")
+
+
+def row(entry: Field[Any]) -> str:
+    """Put a parameter into a row."""
+    meta = entry.metadata
+    switch = meta["kind"] is bool
+    negated = switch and entry.default
+    option = option_of(f"no_{entry.name}" if negated else entry.name)
+    what = f"do not {meta['help']}" if negated else meta["help"]
+    allowed = ", ".join(meta["choices"]) or f"{COUNTS[meta['length']]}{limits_of(entry)}"
+    default, paper = _value(entry.default), _value(meta["paper"])
+    if switch:
+        allowed, default, paper = "switch", "off", "" if meta["paper"] is UNSET else "given"
+    return f"| `{option}` | {what} | {meta['unit']} | {allowed} | {default} | {paper} |"
+
+
+def _value(value: Any) -> str:
+    if value is None or value is UNSET:
+        return ""
+    if isinstance(value, tuple):
+        return " ".join(map(_value, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+if __name__ == "__main__":
+    write()

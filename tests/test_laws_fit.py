@@ -1,0 +1,251 @@
+"""The dynamic mesh: forces in balance, rest at the sparse solution, no step beyond a cube's edge."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import keys_in, law, seeds, size, solids, sphere
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import spsolve
+
+from tomomesh.errors import UsageError
+from tomomesh.model.cubes import CubeGrid, cells_of
+from tomomesh.settings import FitSettings
+from tomomesh.surface.closing import close_shell
+from tomomesh.surface.composition import well_composed
+from tomomesh.surface.cuberille import track
+from tomomesh.surface.dynamics import Fit, fit
+from tomomesh.surface.partition import partition
+from tomomesh.surface.smooth import adjacency, low_pass
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tomomesh.model.mesh import QuadMesh
+
+    Floats = NDArray[np.float64]
+
+LIMITS = ["clamp", "shorten"]
+
+
+def shell_of(points: Floats, cell_mm: float, closing: int | None = None) -> tuple[CubeGrid, QuadMesh]:
+    """Return the cubes of a cloud, and their surface."""
+    grid = partition(points, np.full(3, cell_mm))
+    cubes = grid.with_cubes(well_composed(close_shell(grid.keys, closing).keys))
+    return cubes, track(cubes).mesh
+
+
+def rested(points: Floats, cell_mm: float, settings: FitSettings, *, threads: int = 1) -> tuple[QuadMesh, Fit]:
+    """Fit the smoothed surface of a cloud to it."""
+    cubes, mesh = shell_of(points, cell_mm)
+    start = low_pass(mesh.vertices, mesh.edges, 3)
+    return mesh, fit(start, mesh.edges, mesh.vertex_cubes, points, cubes, settings, threads=threads)
+
+
+def ball(count: int = size(1500, 300)) -> tuple[Floats, float]:
+    """Return points of a sphere and a cell about their distance."""
+    return sphere(count), float(np.sqrt(4 * np.pi / count) * 10) * 1.3
+
+
+@st.composite
+def meshes(draw: st.DrawFn) -> tuple[QuadMesh, CubeGrid, Floats]:
+    """Draw a small closed surface whose vertices were moved, and the partition of those."""
+    keys = well_composed(keys_in(draw(solids(3))))
+    none = np.zeros(len(keys) + 1, np.int64)
+    quads = track(CubeGrid(keys, np.zeros(3), np.ones(3), none[:0], none)).mesh
+    rng = np.random.default_rng(draw(seeds))
+    places = quads.vertices + rng.uniform(-0.3, 0.3, quads.vertices.shape)
+    return quads, partition(places, np.ones(3)), places
+
+
+def cubes_under(points: Floats, grid: CubeGrid) -> NDArray[np.int64]:
+    """Return the cube that holds each point."""
+    found = np.empty(len(points), np.int64)
+    found[grid.order] = np.repeat(np.arange(len(grid.keys)), np.diff(grid.start))
+    return found
+
+
+class TestLowPass:
+    @law(80)
+    @given(made=meshes(), passes=st.integers(0, 20), seed=seeds)
+    def test_stays_in_the_convex_hull(
+        self, made: tuple[QuadMesh, CubeGrid, Floats], passes: int, seed: int
+    ) -> None:
+        quads, _, places = made
+        directions = np.random.default_rng(seed).normal(size=(3, 40))
+        reach = (places @ directions).max(axis=0)
+        assert (low_pass(places, quads.edges, passes) @ directions <= reach + 1e-12).all()
+
+    @law(40)
+    @given(made=meshes(), passes=st.integers(0, 20), place=st.floats(-1e9, 1e9))
+    def test_keeps_a_constant(
+        self, made: tuple[QuadMesh, CubeGrid, Floats], passes: int, place: float
+    ) -> None:
+        still = np.full_like(made[2], place)
+        np.testing.assert_array_equal(low_pass(still, made[0].edges, passes), still)
+
+    @law(40)
+    @given(made=meshes(), passes=st.integers(1, 5))
+    def test_takes_half_of_its_own_place_and_half_of_its_neighbors_mean(
+        self, made: tuple[QuadMesh, CubeGrid, Floats], passes: int
+    ) -> None:
+        quads, _, places = made
+        beside: list[list[int]] = [[] for _ in places]
+        for a, b in quads.edges.tolist():
+            beside[a].append(b)
+            beside[b].append(a)
+        wanted = places
+        for _ in range(passes):
+            wanted = np.array([0.5 * p + 0.5 * wanted[n].mean(axis=0) for p, n in zip(wanted, beside, strict=True)])
+        np.testing.assert_allclose(low_pass(places, quads.edges, passes), wanted, rtol=0, atol=1e-12)
+
+
+class TestForces:
+    @law(60)
+    @given(made=meshes(), stiffness=st.floats(0.01, 3))
+    def test_of_the_springs_add_up_to_nothing(
+        self, made: tuple[QuadMesh, CubeGrid, Floats], stiffness: float
+    ) -> None:
+        """From rest, two steps h move a vertex by h^2 a; with points at the vertices only springs pull."""
+        quads, grid, places = made
+        step = 0.05
+        settings = FitSettings(stiffness=stiffness, step=step, max_steps=2, tolerance=1e-12)
+        moved = fit(places, quads.edges, cubes_under(places, grid), places, grid, settings)
+        degree = np.bincount(quads.edges.ravel(), minlength=len(places))[:, None]
+        mass = 1 + stiffness / degree.mean() * degree
+        force = mass * (moved.vertices - places) / step**2
+        np.testing.assert_allclose(force.sum(axis=0), 0, atol=1e-9 * len(places))
+        assert moved.trace.clamped.sum() == 0
+
+    @law(40)
+    @given(made=meshes(), limit=st.sampled_from(LIMITS))
+    def test_are_none_at_rest(self, made: tuple[QuadMesh, CubeGrid, Floats], limit: str) -> None:
+        quads, grid, places = made
+        settings = FitSettings(stiffness=0.0, limit=limit)
+        still = fit(places, quads.edges, cubes_under(places, grid), places, grid, settings)
+        np.testing.assert_allclose(still.vertices, places, rtol=0, atol=1e-14)
+        np.testing.assert_array_equal(still.nearest, np.arange(len(places)))
+        assert still.trace.converged
+        assert still.trace.kinetic[-1] == 0.0
+
+    @pytest.mark.parametrize("stiffness", [0.0, 0.5])
+    def test_without_points_in_reach_are_those_of_the_springs(self, stiffness: float) -> None:
+        """A wide closing adds cubes with no point around; such a vertex has no k_d, and with no springs stays."""
+        points, cell = ball()
+        points = points[points[:, 2] < 7]
+        cubes, mesh = shell_of(points, cell, closing=6)
+        settings = FitSettings(stiffness=stiffness)
+        found = fit(mesh.vertices, mesh.edges, mesh.vertex_cubes, points, cubes, settings)
+        free = found.nearest < 0
+        assert free.any()
+        assert np.isfinite(found.vertices).all()
+        if stiffness == 0:
+            np.testing.assert_allclose(found.vertices[free], mesh.vertices[free], rtol=0, atol=1e-12)
+
+
+class TestRest:
+    @pytest.mark.parametrize("stiffness", [0.0, 0.5, 1.0])
+    @pytest.mark.parametrize("limit", LIMITS)
+    def test_is_the_sparse_solution(self, stiffness: float, limit: str) -> None:
+        """The forces vanish where (k L + k_d) x = k_d x_d (METHOD: the limit is known)."""
+        points, cell = ball()
+        mesh, rest = rested(points, cell, FitSettings(stiffness=stiffness, limit=limit))
+        assert rest.trace.converged
+        degree = np.bincount(mesh.edges.ravel()).astype(float)
+        k = stiffness / degree.mean()
+        drawn = (rest.nearest >= 0) * 1.0
+        laplacian = diags_array(degree) - adjacency(mesh.edges, len(degree))
+        system = (k * laplacian + diags_array(drawn)).tocsc()
+        wanted = spsolve(system, drawn[:, None] * points[rest.nearest])
+        assert np.linalg.norm(rest.vertices - wanted, axis=1).max() < 0.01 * cell
+
+    def test_lies_on_the_points_without_springs(self) -> None:
+        points, cell = ball()
+        _, rest = rested(points, cell, FitSettings(stiffness=0.0, tolerance=1e-9, max_steps=500))
+        np.testing.assert_allclose(rest.vertices, points[rest.nearest], atol=1e-6)
+
+    @pytest.mark.parametrize("limit", LIMITS)
+    def test_is_the_same_for_any_number_of_threads(self, limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("tomomesh.surface.dynamics.BLOCK", 97)
+        points, cell = ball()
+        one, two = (rested(points, cell, FitSettings(limit=limit), threads=n)[1] for n in (1, 2))
+        assert one.vertices.tobytes() == two.vertices.tobytes()
+        assert one.nearest.tobytes() == two.nearest.tobytes()
+
+    def test_comes_within_the_paper_s_twenty_to_thirty_steps(self) -> None:
+        points, cell = ball()
+        _, rest = rested(points, cell, FitSettings())
+        assert len(rest.trace.speed) <= 30
+
+    def test_is_not_claimed_where_there_were_too_few_steps(self) -> None:
+        points, cell = ball()
+        _, rest = rested(points, cell, FitSettings(max_steps=3))
+        assert not rest.trace.converged
+        assert len(rest.trace.speed) == 3
+
+    @pytest.mark.parametrize("max_steps", [0, 1])
+    def test_needs_a_step_to_move(self, max_steps: int) -> None:
+        points, cell = ball()
+        mesh, rest = rested(points, cell, FitSettings(max_steps=max_steps))
+        start = low_pass(mesh.vertices, mesh.edges, 3)
+        np.testing.assert_allclose(rest.vertices, start, rtol=0, atol=1e-12)
+
+
+class TestEnergy:
+    @pytest.mark.parametrize("step", [0.05, 0.2, 0.8])
+    def test_falls_once_the_kinetic_energy_has_peaked(self, step: float) -> None:
+        """From rest the kinetic energy must rise first; explicit Euler adds to the sum while it does."""
+        points, cell = ball()
+        _, rest = rested(points, cell, FitSettings(step=step))
+        kinetic, total = rest.trace.kinetic, rest.trace.kinetic + rest.trace.potential
+        assert kinetic[0] == 0 < kinetic.max()
+        assert (np.diff(total[kinetic.argmax() :]) <= 1e-9 * total[0]).all()
+
+    @pytest.mark.parametrize("damping", [0.25, 0.7, 1.0, 1.25, 3.0])
+    @pytest.mark.parametrize("step", [0.2, 0.8, 1.0])
+    def test_never_explodes_within_the_settings_limits(self, damping: float, step: float) -> None:
+        """Such a pair is either refused or stable: explicit Euler needs step < damping and step < 1 / damping."""
+        points, cell = ball(300)
+        try:
+            settings = FitSettings(damping=damping, step=step)
+        except UsageError:
+            assert step > min(damping, 1 / damping)
+            return
+        _, rest = rested(points, cell, settings)
+        assert rest.trace.distance_mm[-1] < rest.trace.distance_mm[0]
+
+
+class TestLimit:
+    @pytest.mark.parametrize("limit", LIMITS)
+    @pytest.mark.parametrize("stiffness", [0.0, 0.5])
+    def test_no_vertex_moves_more_than_a_cube_s_edge_in_a_step(self, limit: str, stiffness: float) -> None:
+        """Steps are told apart by runs that end one step later each."""
+        points, cell = ball(size(400, 100))
+        cubes, mesh = shell_of(points, cell)
+        far = mesh.vertices * 3.0
+        settings = FitSettings(stiffness=stiffness, limit=limit, step=1.0)
+        before, clamped = far, 0
+        for steps in range(1, 9):
+            now = fit(
+                far, mesh.edges, mesh.vertex_cubes, points, cubes, replace(settings, max_steps=steps)
+            )
+            assert np.linalg.norm(now.vertices - before, axis=1).max() <= cell * (1 + 1e-9)
+            before, clamped = now.vertices, int(now.trace.clamped.sum())
+        assert clamped > 0
+
+    def test_uses_the_shortest_edge(self) -> None:
+        points, _ = ball(size(1500, 500))
+        cell_mm = np.array([1.5, 2.5, 3.0])
+        grid = partition(points, cell_mm)
+        assert cells_of(grid.keys).max() > 2
+        cubes = grid.with_cubes(well_composed(close_shell(grid.keys).keys))
+        mesh = track(cubes).mesh
+        far = mesh.vertices * 3.0
+        settings = FitSettings(step=1.0, max_steps=2)
+        moved = fit(far, mesh.edges, mesh.vertex_cubes, points, cubes, settings).vertices - far
+        assert np.linalg.norm(moved, axis=1).max() == pytest.approx(1.5)

@@ -1,0 +1,154 @@
+"""The whole way from points: the same for any order, repetition and place of the points, and always sound."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from conftest import law, seeds, size, sphere, torus
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tomomesh.errors import EmptyError, GeometryError, TomomeshError
+from tomomesh.measure.topology import topology
+from tomomesh.pipeline import Surface, reconstruct, reconstruct_points
+from tomomesh.model.volume import Volume
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+COUNT = size(1200, 500)
+
+
+def bytes_of(surface: Surface) -> tuple[bytes, bytes]:
+    return surface.mesh.vertices.tobytes(), surface.mesh.faces.tobytes()
+
+
+def dyadic(points: Floats) -> Floats:
+    """Round so that moving by whole numbers up to 2^30 loses nothing."""
+    return np.round(points * 2**16) / 2**16
+
+
+def hollow_head() -> Volume:
+    """Return a few slices of a thick-walled ball."""
+    z, y, x = np.mgrid[-14:15, -14:15, -14:15]
+    gray = 100.0 * (np.abs(np.sqrt(x**2 + y**2 + z**2) - 11) < 1.6)
+    return Volume.from_stored(gray, np.diag([1.0, 1.0, 1.0, 1.0]))
+
+
+class TestOrder:
+    @law(8)
+    @given(seed=seeds, shape=st.sampled_from([sphere, torus]))
+    def test_changes_no_byte(self, seed: int, shape: Any) -> None:
+        points = shape(COUNT)
+        shuffled = np.random.default_rng(seed).permutation(points)
+        assert bytes_of(reconstruct_points(points)) == bytes_of(reconstruct_points(shuffled))
+
+    @law(8)
+    @given(seed=seeds)
+    def test_nor_do_repetitions(self, seed: int) -> None:
+        points = sphere(COUNT)
+        rng = np.random.default_rng(seed)
+        again = rng.permutation(np.concatenate([points, points[rng.integers(COUNT, size=COUNT // 2)]]))
+        assert bytes_of(reconstruct_points(points)) == bytes_of(reconstruct_points(again))
+
+    def test_nor_do_threads(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("tomomesh.surface.dynamics.BLOCK", 101)
+        one, two = (reconstruct_points(sphere(COUNT), threads=n) for n in (1, 2))
+        assert bytes_of(one) == bytes_of(two)
+
+    def test_nor_do_equal_points_on_a_lattice_with_many_ties(self) -> None:
+        points = np.unique(np.round(sphere(COUNT, 8.0)), axis=0)
+        shuffled = np.random.default_rng(0).permutation(points)
+        one, two = (reconstruct_points(p, cell_mm=(1.5,)) for p in (points, shuffled))
+        assert bytes_of(one) == bytes_of(two)
+
+    def test_nor_does_a_second_run(self) -> None:
+        assert bytes_of(reconstruct_points(torus(COUNT))) == bytes_of(reconstruct_points(torus(COUNT)))
+
+    @pytest.mark.parametrize("training", ["online", "batch"])
+    def test_nor_do_threads_on_the_way_from_a_study(self, training: str) -> None:
+        kind: dict[str, Any] = {"training": training, "neurons": 24, "iterations": size(5000, 500)}
+        one, two = (reconstruct(hollow_head(), threads=n, signal="region", **kind) for n in (1, 2))
+        assert bytes_of(one) == bytes_of(two)
+
+
+class TestPlace:
+    @pytest.mark.parametrize("far", [1e6, 1e9, -1e9])
+    def test_far_away_costs_no_precision_beyond_that_of_the_numbers(self, far: float) -> None:
+        points = dyadic(torus(COUNT))
+        here, there = reconstruct_points(points), reconstruct_points(points + far)
+        assert here.mesh.faces.tobytes() == there.mesh.faces.tobytes()
+        assert here.cubes.keys.tobytes() == there.cubes.keys.tobytes()
+        off = there.mesh.vertices - far - here.mesh.vertices
+        assert np.abs(off).max() <= 4 * np.spacing(abs(far))
+
+    @pytest.mark.parametrize("scale", [2.0**-20, 2.0**20])
+    def test_the_unit_of_the_points_does_not_matter(self, scale: float) -> None:
+        here, there = reconstruct_points(torus(COUNT)), reconstruct_points(torus(COUNT) * scale)
+        assert here.mesh.faces.tobytes() == there.mesh.faces.tobytes()
+        np.testing.assert_allclose(there.mesh.vertices, here.mesh.vertices * scale, rtol=1e-12)
+
+
+class TestSound:
+    @law(10)
+    @given(seed=seeds, noise=st.sampled_from([0.0, 0.05, 0.3]), factor=st.floats(1.0, 2.0))
+    def test_whatever_the_noise(self, seed: int, noise: float, factor: float) -> None:
+        points = sphere(COUNT) + noise * np.random.default_rng(seed).normal(size=(COUNT, 3))
+        surface = reconstruct_points(points, cell_factor=factor)
+        assert topology(surface.mesh).sound
+        assert len(np.unique(surface.mesh.vertices, axis=0)) == len(surface.mesh.vertices)
+
+    @pytest.mark.parametrize("changes", [{"smoothing": 0}, {"stiffness": 0.0}, {"max_steps": 0}, {"springs": "triangles"}])
+    def test_whatever_the_settings(self, changes: dict[str, Any]) -> None:
+        surface = reconstruct_points(torus(COUNT), **changes)
+        assert topology(surface.mesh).sound
+        assert topology(surface.mesh).genus == 1
+
+    def test_all_surfaces_of_a_hollow_shell_can_be_asked_for(self) -> None:
+        """The surface of a cavity looks into it, and so encloses a negative volume: that is no fault."""
+        outer, both = (reconstruct_points(sphere(COUNT), surface=kind) for kind in ("outer", "all"))
+        assert both.report["surface"]["taken"] == 2 == 2 * outer.report["surface"]["taken"]
+        assert topology(both.mesh).components == 2
+        assert topology(both.mesh).boundary_edges == topology(both.mesh).nonmanifold_edges == 0
+
+    def test_two_objects_give_two_components(self) -> None:
+        pair = np.concatenate([sphere(COUNT // 2, 6.0), sphere(COUNT // 2, 6.0) + [30, 0, 0]])
+        assert topology(reconstruct_points(pair).mesh).components == 2
+
+    def test_a_leak_is_refused_unless_allowed(self) -> None:
+        x, y = np.mgrid[:20, :20] * 1.0
+        sheet = np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()])
+        with pytest.raises(GeometryError, match="leaks") as refused:
+            reconstruct_points(sheet)
+        assert refused.value.exit_code == 5
+        surface = reconstruct_points(sheet, allow_leaks=True)
+        assert topology(surface.mesh).sound
+        assert any("leaks" in warning for warning in surface.report["warnings"])
+
+
+class TestRefuses:
+    def test_no_points(self) -> None:
+        with pytest.raises(EmptyError):
+            reconstruct_points(np.empty((0, 3)))
+
+    @pytest.mark.parametrize(
+        "points",
+        [
+            np.full((5, 3), np.nan),
+            np.concatenate([sphere(50), [[np.inf, 0, 0]]]),
+            np.zeros((5, 2)),
+            np.zeros(7),
+        ],
+    )
+    def test_what_are_no_points_in_space(self, points: Floats) -> None:
+        with pytest.raises(TomomeshError):
+            reconstruct_points(points)
+
+    @pytest.mark.parametrize("count", [1, 2, 3])
+    def test_too_few_points_to_enclose_anything(self, count: int) -> None:
+        with pytest.raises(GeometryError):
+            reconstruct_points(sphere(count))
