@@ -16,6 +16,8 @@ from tomomesh.segment.study import train_study
 from tomomesh.settings import NetworkSettings
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     Inputs = list[NDArray[np.float64]]
@@ -25,25 +27,25 @@ ONLINE = NetworkSettings(training="online", iterations=PRESENTATIONS, trim=0)
 GAUSSIAN = NetworkSettings(training="online", iterations=PRESENTATIONS, trim=0, neighborhood="gaussian")
 BATCH = NetworkSettings()
 SOME = slice(0, 54, 18)
-"""The slices that MiniSom is timed on; every slice has the same number of presentations."""
+"""The slices that are timed; every slice has the same number of presentations."""
 
 
 def main() -> None:
     header("The networks of 54 slices, 58 neurons and 10,000 presentations each", "minisom")
     head = phantom()
     mask = window(head.volume, lower=head.lower, upper=head.upper)
-    inputs = [np.argwhere(plane)[:, ::-1].astype(float) for plane in mask]
-    bubble, gaussian, batch = (_ours(inputs, settings) for settings in (ONLINE, GAUSSIAN, BATCH))
-    peer = _minisom(inputs[SOME], "gaussian")
-    peer_bubble = _minisom(inputs[SOME], "bubble")
-    for name, seconds in (
-        ("online, bubble", bubble),
-        ("online, Gaussian", gaussian),
-        ("batch, 10 epochs", batch),
-        ("MiniSom, Gaussian", peer),
-        ("MiniSom, bubble", peer_bubble),
-    ):
-        note(f"{name}: CPU time a slice", f"{1e3 * seconds:.3g} ms")
+    inputs = [np.argwhere(plane)[:, ::-1].astype(float) for plane in mask[SOME]]
+    calls = {
+        "online, bubble": _ours(inputs, ONLINE),
+        "online, Gaussian": _ours(inputs, GAUSSIAN),
+        "batch, 10 epochs": _ours(inputs, BATCH),
+        "MiniSom, Gaussian": _minisom(inputs, "gaussian"),
+        "MiniSom, bubble": _minisom(inputs, "bubble"),
+    }
+    times = median_times(*calls.values(), repeats=7, clock=time.process_time)
+    for name, seconds in zip(calls, times, strict=True):
+        note(f"{name}: CPU time a slice", f"{1e3 * seconds / len(inputs):.3g} ms")
+    bubble, gaussian, batch, peer, peer_bubble = times
     at_least("online against MiniSom, each with its default neighborhood", peer / bubble, 200, "x")
     note("online against MiniSom, bubble both", f"{peer_bubble / bubble:.3g} x")
     note("online against MiniSom, Gaussian both", f"{peer / gaussian:.3g} x")
@@ -53,21 +55,18 @@ def main() -> None:
         holds(f"{name}: the same bytes with 1 and 2 threads", one == two)
 
 
-def _ours(inputs: Inputs, settings: NetworkSettings) -> float:
-    """Return the CPU seconds a slice."""
+def _ours(inputs: Inputs, settings: NetworkSettings) -> Callable[[], None]:
     ring = lattice("ring", NEURONS)
 
-    def study() -> None:
+    def run() -> None:
         for k, pixels in enumerate(inputs):
             train(pixels, ring, settings, np.random.default_rng([0, k]))
 
-    return median_times(study, clock=time.process_time)[0] / len(inputs)
+    return run
 
 
-def _minisom(inputs: Inputs, neighborhood: str) -> float:
-    """Return the CPU seconds a slice, of the training alone."""
-
-    def study() -> None:
+def _minisom(inputs: Inputs, neighborhood: str) -> Callable[[], None]:
+    def run() -> None:
         for pixels in inputs:
             som = MiniSom(
                 NEURONS, 1, 2, sigma=NEURONS // 4, learning_rate=0.5,
@@ -75,7 +74,7 @@ def _minisom(inputs: Inputs, neighborhood: str) -> float:
             )  # fmt: skip
             som.train_random(pixels, PRESENTATIONS)
 
-    return median_times(study, repeats=3, clock=time.process_time)[0] / len(inputs)
+    return run
 
 
 if __name__ == "__main__":

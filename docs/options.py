@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import Field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tomomesh.settings import UNSET, limits_of, option_of, parameters
+
+if TYPE_CHECKING:
+    from dataclasses import Field
 
 PAGE = Path(__file__).parent / "command-line.md"
 HEAD = ["| option | what | unit | allowed | default | `--paper` |", "|---|---|---|---|---|---|"]

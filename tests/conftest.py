@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from hypothesis import HealthCheck, settings
@@ -14,11 +14,13 @@ from tomomesh.model.cubes import CubeGrid, keys_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+Number = TypeVar("Number", int, float)
+
 COMPILED = not config.DISABLE_JIT
 """Whether the kernels run as machine code; where they do not, the tests are smaller."""
 
 
-def size(compiled: int, plain: int) -> int:
+def size(compiled: Number, plain: Number) -> Number:
     """Return the first size for compiled kernels, the second for kernels in plain Python."""
     return compiled if COMPILED else plain
 

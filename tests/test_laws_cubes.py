@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import keys_in, law, seeds, size, solids
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from conftest import keys_in, law, seeds, size, solids
 from tomomesh.errors import EmptyError, ResourceError
 from tomomesh.model.cubes import MARGIN, SIDE, cells_of, key_step, keys_of
 from tomomesh.surface.composition import well_composed

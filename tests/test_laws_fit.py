@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import keys_in, law, seeds, size, solids, sphere
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import spsolve
 
+from conftest import keys_in, law, seeds, size, solids, sphere
 from tomomesh.errors import UsageError
 from tomomesh.model.cubes import CubeGrid, cells_of
 from tomomesh.settings import FitSettings
@@ -73,9 +73,7 @@ def cubes_under(points: Floats, grid: CubeGrid) -> NDArray[np.int64]:
 class TestLowPass:
     @law(80)
     @given(made=meshes(), passes=st.integers(0, 20), seed=seeds)
-    def test_stays_in_the_convex_hull(
-        self, made: tuple[QuadMesh, CubeGrid, Floats], passes: int, seed: int
-    ) -> None:
+    def test_stays_in_the_convex_hull(self, made: tuple[QuadMesh, CubeGrid, Floats], passes: int, seed: int) -> None:
         quads, _, places = made
         directions = np.random.default_rng(seed).normal(size=(3, 40))
         reach = (places @ directions).max(axis=0)
@@ -83,9 +81,7 @@ class TestLowPass:
 
     @law(40)
     @given(made=meshes(), passes=st.integers(0, 20), place=st.floats(-1e9, 1e9))
-    def test_keeps_a_constant(
-        self, made: tuple[QuadMesh, CubeGrid, Floats], passes: int, place: float
-    ) -> None:
+    def test_keeps_a_constant(self, made: tuple[QuadMesh, CubeGrid, Floats], passes: int, place: float) -> None:
         still = np.full_like(made[2], place)
         np.testing.assert_array_equal(low_pass(still, made[0].edges, passes), still)
 
@@ -108,9 +104,7 @@ class TestLowPass:
 class TestForces:
     @law(60)
     @given(made=meshes(), stiffness=st.floats(0.01, 3))
-    def test_of_the_springs_add_up_to_nothing(
-        self, made: tuple[QuadMesh, CubeGrid, Floats], stiffness: float
-    ) -> None:
+    def test_of_the_springs_add_up_to_nothing(self, made: tuple[QuadMesh, CubeGrid, Floats], stiffness: float) -> None:
         """From rest, two steps h move a vertex by h^2 a; with points at the vertices only springs pull."""
         quads, grid, places = made
         step = 0.05
@@ -231,9 +225,7 @@ class TestLimit:
         settings = FitSettings(stiffness=stiffness, limit=limit, step=1.0)
         before, clamped = far, 0
         for steps in range(1, 9):
-            now = fit(
-                far, mesh.edges, mesh.vertex_cubes, points, cubes, replace(settings, max_steps=steps)
-            )
+            now = fit(far, mesh.edges, mesh.vertex_cubes, points, cubes, replace(settings, max_steps=steps))
             assert np.linalg.norm(now.vertices - before, axis=1).max() <= cell * (1 + 1e-9)
             before, clamped = now.vertices, int(now.trace.clamped.sum())
         assert clamped > 0

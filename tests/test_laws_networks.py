@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import law, seeds, size
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
+from conftest import law, seeds, size
 from tomomesh.errors import EmptyError
 from tomomesh.model.lattice import lattice
 from tomomesh.segment.region import train_region

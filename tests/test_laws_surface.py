@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import law, seeds, size, sphere, torus
 from hypothesis import given
 from hypothesis import strategies as st
 
+from conftest import law, seeds, size, sphere, torus
 from tomomesh.errors import EmptyError, GeometryError, TomomeshError
 from tomomesh.measure.topology import topology
-from tomomesh.pipeline import Surface, reconstruct, reconstruct_points
 from tomomesh.model.volume import Volume
+from tomomesh.pipeline import Surface, reconstruct, reconstruct_points
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -102,7 +102,9 @@ class TestSound:
         assert topology(surface.mesh).sound
         assert len(np.unique(surface.mesh.vertices, axis=0)) == len(surface.mesh.vertices)
 
-    @pytest.mark.parametrize("changes", [{"smoothing": 0}, {"stiffness": 0.0}, {"max_steps": 0}, {"springs": "triangles"}])
+    @pytest.mark.parametrize(
+        "changes", [{"smoothing": 0}, {"stiffness": 0.0}, {"max_steps": 0}, {"springs": "triangles"}]
+    )
     def test_whatever_the_settings(self, changes: dict[str, Any]) -> None:
         surface = reconstruct_points(torus(COUNT), **changes)
         assert topology(surface.mesh).sound
@@ -116,7 +118,8 @@ class TestSound:
         assert topology(both.mesh).boundary_edges == topology(both.mesh).nonmanifold_edges == 0
 
     def test_two_objects_give_two_components(self) -> None:
-        pair = np.concatenate([sphere(COUNT // 2, 6.0), sphere(COUNT // 2, 6.0) + [30, 0, 0]])
+        one = sphere(COUNT // 2, 6.0)
+        pair = np.concatenate([one, one + np.array([30, 0, 0])])
         assert topology(reconstruct_points(pair).mesh).components == 2
 
     def test_a_leak_is_refused_unless_allowed(self) -> None:

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import cubes_of, keys_in, law, solids
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
+from conftest import cubes_of, keys_in, law, solids
 from tomomesh.measure.topology import topology
 from tomomesh.model.cubes import cells_of, keys_of
 from tomomesh.surface.composition import well_composed
@@ -52,7 +52,7 @@ def euler_number(solid: NDArray[np.bool_]) -> int:
 def faces_of(mesh: QuadMesh) -> list[Face]:
     """Return each face as its middle, doubled, and its outward normal."""
     a, b, c, d = (mesh.vertices[mesh.quads[:, n]] for n in range(4))
-    middle, normal = np.rint((a + c)).astype(int), np.rint(np.cross(b - a, d - a)).astype(int)
+    middle, normal = np.rint(a + c).astype(int), np.rint(np.cross(b - a, d - a)).astype(int)
     np.testing.assert_array_equal(a + c, b + d)
     return [(tuple(m), tuple(n)) for m, n in zip(middle.tolist(), normal.tolist(), strict=True)]
 
@@ -151,7 +151,7 @@ def ball(center: tuple[int, int, int], radius: float, hollow: float = 0.0) -> ND
     """Return the cells of a ball, or of a hollow ball."""
     cells = np.argwhere(np.ones([2 * int(radius) + 3] * 3, bool)) - int(radius) - 1
     far = np.linalg.norm(cells, axis=1)
-    return cells[(far <= radius) & (far >= hollow)] + center
+    return np.asarray(cells[(far <= radius) & (far >= hollow)] + center)
 
 
 def taken(*parts: NDArray[np.int64], surface: str = "outer") -> tuple[list[int], list[bool]]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import Field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 import tomli_w
 
 from tomomesh.errors import UsageError
 from tomomesh.settings import Settings, WindowSettings, limits_of, option_of, parameters
+
+if TYPE_CHECKING:
+    from dataclasses import Field
 
 PARAMETERS = {entry.name: entry for _, entry in parameters()}
 NUMBERS = {

@@ -29,7 +29,7 @@ from tomomesh.show.gallery import median_slice
 from tomomesh.show.plane import Plane, gray
 from tomomesh.show.relief import draw_relief
 from tomomesh.show.render import View, nice_length
-from tomomesh.show.slices import bridged, draw_contour, draw_regions, draw_window
+from tomomesh.show.slices import draw_contour, draw_regions, draw_window
 from tomomesh.show.space import draw_points, draw_shaded, draw_surfaces, draw_wireframe
 from tomomesh.show.topologies import draw_adapted, draw_update_regions
 
@@ -73,7 +73,9 @@ def study() -> dict[str, NDArray[np.generic]]:
 def networks(study: dict[str, NDArray[np.float64]]) -> Networks:
     nothing = np.zeros(3, np.int64)
     books = np.stack([study["codebook"]] * 3)
-    return Networks(lattice("ring", 16), np.arange(3, dtype=np.int32), books, nothing > 0, nothing, nothing)
+    gaps = np.zeros((3, 16), bool)
+    gaps[1, [2, 7]] = True
+    return Networks(lattice("ring", 16), np.arange(3, dtype=np.int32), books, gaps, nothing > 0, nothing, nothing)
 
 
 @pytest.fixture(scope="module")
@@ -267,22 +269,16 @@ class TestSlices:
         assert (colors[0] == 0).all()
         assert is_drawn(figure)
 
-    def test_contour_marks_the_bridged_gap(self, study: dict[str, NDArray[np.generic]], networks: Networks) -> None:
-        figure = draw_contour(study["mask"][1], networks.codebooks[1], networks.lattice, bridge=1.5)
+    @pytest.mark.parametrize(("slice_", "found"), [(1, "2 bridged gaps"), (0, "no bridged gap")])
+    def test_contour_marks_the_bridged_gaps(
+        self, study: dict[str, NDArray[np.generic]], networks: Networks, slice_: int, found: str
+    ) -> None:
+        ring, gaps = networks.codebooks[slice_], networks.bridged[slice_]
+        figure = draw_contour(study["mask"][1], ring, networks.lattice, bridged=gaps)
         words = [text.get_text() for text in figure.axes[1].texts]
-        assert "gap" in words
-        assert "1 bridged gap (over 1.5 median edges)" in words
+        assert found in words
+        assert ("gap" in words) == gaps.any()
         assert is_drawn(figure)
-
-    def test_contour_without_gaps_has_no_arrow(self, study: dict[str, NDArray[np.generic]], networks: Networks) -> None:
-        figure = draw_contour(study["mask"][1], networks.codebooks[1], networks.lattice, bridge=0)
-        assert "gap" not in [text.get_text() for text in figure.axes[1].texts]
-
-    def test_gaps_come_longest_first(self) -> None:
-        places = np.array([[0.0, 0], [1, 0], [2, 0], [5, 0], [6, 0], [6, 9], [5, 9]])
-        edges = lattice("chain", 7).edges
-        np.testing.assert_array_equal(bridged(places, edges, 2.0), [[4, 5], [2, 3]])
-        assert not len(bridged(places, edges, 0.0))
 
     @pytest.mark.parametrize("shape", [(40, 48), (300, 130), (1, 1), (2, 2), (5, 6, 3)])
     def test_relief_of_any_shape(self, shape: tuple[int, ...]) -> None:

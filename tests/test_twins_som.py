@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import law, seeds, size
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import shortest_path
 
+from conftest import law, seeds, size
 from tomomesh.errors import UsageError
 from tomomesh.kernels import som as kernels
 from tomomesh.model.lattice import Lattice, lattice

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import law, seeds
 from hypothesis import given
 from hypothesis import strategies as st
 
+from conftest import law, seeds
 from tomomesh.model.volume import Volume
 
 if TYPE_CHECKING:

@@ -155,7 +155,7 @@ class Account:
                 "clamped": int(trace.clamped.sum()),
                 "unattracted": int(trace.unattracted[-1]),
             }
-        if not trace.converged:
+        if steps and not trace.converged:
             self.warn(f"the mesh had not come to rest after {steps} steps")
 
     def quality(self, mesh: TriMesh, points: PointSet) -> None:

@@ -240,7 +240,7 @@ def _surface(
         cuberille = tracked.mesh
     account.surface(tracked)
     if not shell.holds and tracked.enclosed * float(cubes.cell_mm.prod()) < LEAST * expected_mm3:
-        _leaks(account, settings)
+        settings = _without_fit(account, settings)
     with account.timed("smooth"):
         rough = cuberille.triangulated()
         smoothed = rough.moved(low_pass(cuberille.vertices, cuberille.edges, settings.cubes.smoothing))
@@ -264,11 +264,14 @@ def _cell(spacing: float, settings: Settings) -> NDArray[np.float64]:
     return np.broadcast_to(np.array(asked, np.float64) * settings.cubes.cell_factor, 3).copy()
 
 
-def _leaks(account: Account, settings: Settings) -> None:
-    """Refuse a shell that the outside leaks into, unless that was allowed."""
+def _without_fit(account: Account, settings: Settings) -> Settings:
+    """Refuse a shell that the outside leaks into, unless that was allowed: then its two walls must not be fitted.
+
+    Both would rest on the same points, and the mesh would fall flat.
+    """
     if settings.cubes.allow_leaks:
-        account.warn("the outside leaks into the shell: the surface is two-walled in places")
-        return
+        account.warn("the outside leaks into the shell: its surface has two walls, and is smoothed but not fitted")
+        return settings.replace(max_steps=0)
     raise GeometryError(
         "the outside leaks into the shell of cubes, so its surface would have two walls",
         found=f"cell = {account.cell_mm:.4g} mm",

@@ -57,7 +57,7 @@ class Group:
             if isinstance(value, list):
                 value = tuple(value)
                 object.__setattr__(self, entry.name, value)
-            if value is not None:
+            if value is not None or entry.default is not None:
                 _check(entry, value)
 
     def paper(self) -> Mapping[str, Any]:
@@ -80,8 +80,8 @@ def _check(entry: Field[Any], value: Any) -> None:
             raise UsageError(f"{option} is a switch", found=f"{option} = {value}", expected="true or false")
         return
     values = value if isinstance(value, tuple) else (value,)
-    if meta["length"] and len(values) not in meta["length"]:
-        counts = " or ".join(map(str, meta["length"]))
+    if len(values) not in (meta["length"] or (1,)) or (isinstance(value, tuple) and not meta["length"]):
+        counts = " or ".join(map(str, meta["length"] or ("one",)))
         raise UsageError(f"{option} has too few or too many values", found=f"{option} = {value}", expected=counts)
     if not all(_inside(meta, one) for one in values):
         raise UsageError(f"{option} is outside its limits", found=f"{option} = {value}", expected=limits_of(entry))

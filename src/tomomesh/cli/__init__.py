@@ -6,7 +6,7 @@ import signal
 import sys
 from typing import TYPE_CHECKING
 
-from ..errors import InternalCheckError, ResourceError, TomomeshError, UsageError
+from ..errors import InternalCheckError, ResourceError, TomomeshError
 from .options import build_parser
 
 if TYPE_CHECKING:
@@ -51,8 +51,6 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 def _complain(fault: TomomeshError) -> int:
     print(f"error: {fault}", file=sys.stderr)
-    if isinstance(fault, UsageError):
-        print("`tomomesh --help` lists the commands, `tomomesh COMMAND --help` their options.", file=sys.stderr)
     return fault.exit_code
 
 

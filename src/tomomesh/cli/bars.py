@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, NoReturn
+import time
+from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
 if TYPE_CHECKING:
     from types import TracebackType
+    from typing import NoReturn
+
+FORMAT = "{desc} {bar:30} {n_fmt}/{total_fmt} {elapsed}"
 
 
 class Bars:
-    """Show one bar a stage on stderr, where that is a terminal; one line a stage where it is not."""
+    """Show one bar a stage on stderr where that is a terminal, and one line a finished stage where it is not."""
 
     def __init__(self, *, quiet: bool = False) -> None:
         self._quiet = quiet
-        self._bar: tqdm[NoReturn] | None = None
+        self._drawn = sys.stderr.isatty()
         self._stage = ""
+        self._since = 0.0
+        self._bar: tqdm[NoReturn] | None = None
 
     def __enter__(self) -> Bars:
         return self
@@ -33,15 +39,13 @@ class Bars:
             return
         if stage != self._stage:
             self._close()
-            self._stage = stage
-            self._bar = tqdm(
-                total=total, desc=f"{stage:10s}", file=sys.stderr, leave=True, dynamic_ncols=True,
-                bar_format="{desc} {bar:30} {n_fmt}/{total_fmt} {elapsed}",
-                mininterval=0.1 if sys.stderr.isatty() else float("inf"),
-            )  # fmt: skip
+            self._stage, self._since = stage, time.perf_counter()
+            self._bar = tqdm(total=total, desc=f"{stage:10s}", bar_format=FORMAT) if self._drawn else None
         if self._bar is not None:
             self._bar.total = total
             self._bar.update(done - self._bar.n)
+        elif done == total:
+            print(f"{stage:10s} {total}/{total} {time.perf_counter() - self._since:.1f} s", file=sys.stderr)
 
     def _close(self) -> None:
         if self._bar is not None:

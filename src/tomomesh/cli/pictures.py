@@ -21,7 +21,7 @@ def pictures(
     stage_one: Segmentation | None, surface: Surface | None, settings: Settings
 ) -> Iterator[tuple[str, Figure]]:
     """Yield every picture that the stages allow, with its name."""
-    stages: dict[str, Any] = {"bridge": settings.network.bridge, "tolerance": settings.fit.tolerance}
+    stages: dict[str, Any] = {"tolerance": settings.fit.tolerance}
     if stage_one is not None:
         volume = stage_one.volume
         plane = stage_one.report["study"]["plane"]

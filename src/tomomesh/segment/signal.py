@@ -36,20 +36,24 @@ def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
     return bool(areas) and sum(len(p) for p in pixels if len(p) > 2) > solid * sum(areas)
 
 
-def outline(plane: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the border pixels (J, I) of a filled window.
+def outline(plane: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the pixels on both sides of the border of a filled window, (n, 2) columns and rows.
 
-    What the outside cannot reach is filled, also where only a narrow opening leads there, as between scalp and
-    brain at the edge of an image: the outside is taken as one that passes no opening narrower than `NARROW` of
-    the window's size (a morphological closing).
+    With the last pixels inside and the first outside, which may lie just off the image, the middle of the
+    signal is the border itself. What the outside cannot reach is filled, also where only a narrow opening leads
+    there, as between scalp and brain at the edge of an image: the outside passes no opening narrower than
+    `NARROW` of the window's size (a morphological closing).
+
+    Parameters
+    ----------
+    plane : (J, I) bool array
     """
     reach = round(NARROW / 2 * float(np.sqrt(np.count_nonzero(plane))))
     framed = np.pad(plane, reach + 1)
-    wide = _grown(framed, reach)
-    background, _ = ndimage.label(~wide)
-    inside = ~_grown(background == background[0, 0], reach)
-    filled = (inside | framed)[reach + 1 : -reach - 1, reach + 1 : -reach - 1]
-    return np.asarray(filled & ~ndimage.binary_erosion(filled))
+    background, _ = ndimage.label(~_grown(framed, reach))
+    filled = framed | ~_grown(background == background[0, 0], reach)
+    border = ndimage.binary_dilation(filled) & ~ndimage.binary_erosion(filled)
+    return np.argwhere(border)[:, ::-1] - (reach + 1)
 
 
 def _grown(mask: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:

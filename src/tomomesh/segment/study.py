@@ -63,7 +63,7 @@ def train_study(
 
     def work(start: int, stop: int) -> None:
         for k in range(start, stop):
-            shown = np.argwhere(outline(mask[k]) if outlined else mask[k])[:, ::-1] * np.array(pixel_mm)
+            shown = (outline(mask[k]) if outlined else np.argwhere(mask[k])[:, ::-1]) * np.array(pixel_mm)
             pixels[k] = len(shown)
             if len(shown) >= len(graph):
                 rng = np.random.default_rng([seed, k])

@@ -39,7 +39,6 @@ def draw_all(
     trace: Trace | None = None,
     plane: Plane = Plane(),  # noqa: B008
     view: View = View(),  # noqa: B008
-    bridge: float = 2.0,
     tolerance: float | None = None,
 ) -> Iterator[tuple[str, Figure]]:
     """Draw every picture whose stages are given, numbered as the paper's figures.
@@ -60,8 +59,6 @@ def draw_all(
         Spacing and sense of the slices.
     view : View
         How space is looked at, its unit and axes.
-    bridge : float
-        Edges over this many medians are bridged gaps.
     tolerance : float, optional
         Where the fit rests.
 
@@ -72,7 +69,7 @@ def draw_all(
     figure : Figure
     """
     if images is not None and mask is not None:
-        yield from _of_slice(images, mask, networks, labels, plane, bridge)
+        yield from _of_slice(images, mask, networks, labels, plane)
     if points is not None and len(points):
         yield "07-points", draw_points(points, view)
     if cuberille is not None or triangulated is not None or smoothed is not None:
@@ -90,7 +87,6 @@ def _of_slice(
     networks: Networks | None,
     labels: NDArray[Any] | None,
     plane: Plane,
-    bridge: float,
 ) -> Iterator[tuple[str, Figure]]:
     k = median_slice(mask, None if networks is None else networks.slices)
     note = f"slice {k + 1} of {len(images)}"
@@ -98,13 +94,14 @@ def _of_slice(
     yield "04-window", draw_window(images[k], mask[k], plane, note=note)
     if networks is None or k not in networks.slices:
         return
-    codebook = networks.codebooks[np.flatnonzero(networks.slices == k)[0]]
+    n = int(np.flatnonzero(networks.slices == k)[0])
+    codebook = networks.codebooks[n]
     if labels is not None:
         yield (
             "05-regions",
             draw_regions(images[k], mask[k], codebook, networks.lattice, labels[k], plane),
         )
-    yield "06-network", draw_contour(mask[k], codebook, networks.lattice, plane, bridge=bridge)
+    yield "06-network", draw_contour(mask[k], codebook, networks.lattice, plane, bridged=networks.bridged[n])
 
 
 def median_slice(mask: NDArray[np.bool_], among: NDArray[np.int32] | None = None) -> int:

@@ -99,14 +99,14 @@ def _colored(labels: Pixels, neurons: int) -> Floats:
 
 @styled
 def draw_contour(
-    mask: Pixels, codebook: Floats, network: Lattice, plane: Plane = FLAT, *, bridge: float = 2.0
+    mask: Pixels, codebook: Floats, network: Lattice, plane: Plane = FLAT, *, bridged: NDArray[np.bool_]
 ) -> Figure:
     """Draw the network over the window, and alone with its bridged gaps (Fig. 6).
 
-    A gap is bridged by an edge over `bridge` times the median edge; the longest is pointed at.
+    `bridged` (e,) tells which edges of the network bridge a gap; the longest is pointed at.
     """
     places = plane.place(codebook)
-    bounds, gaps = plane.bounds(mask, places), bridged(places, network.edges, bridge)
+    bounds, gaps = plane.bounds(mask, places), _longest_first(places, network.edges[bridged])
     figure, axes = panels(8.6, 2, bounds[1] - bounds[0], 0.3)
     plane.draw(axes[0], np.where(np.asarray(mask, bool)[:, :, None], PALE, 1.0))
     lines(axes[0], places[network.edges], color="black", width=0.9)
@@ -115,18 +115,16 @@ def draw_contour(
     dots(axes[1], places, size=20, color="white", rim=NETWORK, width=1.1)
     _mark(axes[1], places, gaps)
     found = {0: "no bridged gap", 1: "1 bridged gap"}.get(len(gaps), f"{len(gaps)} bridged gaps")
-    heading(axes[1], "b  Neurons only", f"{found} (over {bridge:g} median edges)" if bridge else "")
+    heading(axes[1], "b  Neurons only", found)
     for ax in axes:
         plane.crop(ax, bounds)
     plane.rule(axes)
     return figure
 
 
-def bridged(places: Floats, edges: NDArray[np.int64], bridge: float) -> NDArray[np.int64]:
-    """Return the edges over `bridge` times the median, the longest first; none where `bridge` is 0."""
+def _longest_first(places: Floats, edges: NDArray[np.int64]) -> NDArray[np.int64]:
     length = np.sqrt(((places[edges[:, 0]] - places[edges[:, 1]]) ** 2).sum(axis=1))
-    order = np.argsort(-length, kind="stable")
-    return np.asarray(edges[order][(length[order] > bridge * np.median(length)) & (bridge > 0)])
+    return edges[np.argsort(-length, kind="stable")]
 
 
 def _mark(ax: Axes, places: Floats, gaps: NDArray[np.int64]) -> None:

@@ -1,0 +1,258 @@
+"""The whole way, with numbers: the built-in head in, a closed surface out."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import trimesh
+from studies import shared
+
+import tomomesh
+from tomomesh import reconstruct, reconstruct_points, segment
+from tomomesh.account import SECTIONS
+from tomomesh.errors import EmptyError, GeometryError
+from tomomesh.model.points import BRIDGE, CAP, NEURON
+from tomomesh.model.volume import Volume
+from tomomesh.settings import Settings
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tomomesh.phantom import Phantom
+    from tomomesh.pipeline import Surface
+
+
+@pytest.fixture(scope="module")
+def head() -> Phantom:
+    return tomomesh.phantom()
+
+
+@pytest.fixture(scope="module")
+def surface(head: Phantom) -> Surface:
+    return reconstruct(head.volume, truth=head.truth, lower=head.lower, upper=head.upper)
+
+
+def judged(surface: Surface) -> trimesh.Trimesh:
+    """Weld at 32 bits, as an STL reader does, and let trimesh judge."""
+    return trimesh.Trimesh(surface.mesh.vertices.astype(np.float32), surface.mesh.faces, process=True)
+
+
+def ball(shape: tuple[int, int, int] = (40, 48, 44), radius: float = 15.0) -> NDArray[np.int16]:
+    axes = np.meshgrid(*(np.arange(n) - (n - 1) / 2 for n in shape), indexing="ij")
+    return (100 * (sum(a**2 for a in axes) < radius**2)).astype(np.int16)
+
+
+def stacked(voxels: NDArray[Any], spacing: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Volume:
+    return Volume.from_stored(voxels, np.diag([*spacing, 1.0]))
+
+
+class TestDemo:
+    def test_surface_is_closed_and_near_the_truth(self, surface: Surface) -> None:
+        mesh = judged(surface)
+        assert mesh.is_watertight
+        assert mesh.is_winding_consistent
+        assert mesh.body_count == 1
+        assert mesh.euler_number == 2
+        assert mesh.volume > 0
+        assert surface.report["truth"]["mean_mm"] <= 0.6
+        assert surface.report["truth"]["p95_mm"] <= 1.5
+        assert 0.9 < surface.report["quality"]["volume_over_rings"] < 1.1
+
+    def test_another_judge_measures_the_same_error(self, surface: Surface, head: Phantom) -> None:
+        truth = head.truth.vertices[::50]
+        mesh = judged(surface)
+        distance = np.abs(trimesh.proximity.closest_point_naive(mesh, truth[::8])[1])
+        assert distance.mean() == pytest.approx(surface.report["truth"]["back_mean_mm"], rel=0.25)
+
+    def test_fit_comes_to_rest_within_thirty_steps(self, surface: Surface) -> None:
+        assert surface.trace.converged
+        assert len(surface.trace.speed) <= 30
+
+    def test_more_neurons_halve_the_error(self, surface: Surface, head: Phantom) -> None:
+        finer = reconstruct(head.volume, truth=head.truth, lower=head.lower, upper=head.upper, neurons=200)
+        assert finer.report["truth"]["mean_mm"] <= 0.5 * surface.report["truth"]["mean_mm"]
+
+    def test_the_papers_choices_close_too(self, head: Phantom) -> None:
+        paper = reconstruct(head.volume, Settings.for_paper(), truth=head.truth, lower=head.lower, upper=head.upper)
+        mesh = judged(paper)
+        assert mesh.is_watertight
+        assert mesh.euler_number == 2
+        assert paper.report["truth"]["mean_mm"] < 3
+
+    def test_same_bytes_on_any_number_of_threads(self, surface: Surface, head: Phantom) -> None:
+        single = reconstruct(head.volume, lower=head.lower, upper=head.upper, threads=1)
+        assert single.mesh.vertices.tobytes() == surface.mesh.vertices.tobytes()
+        assert single.mesh.faces.tobytes() == surface.mesh.faces.tobytes()
+        assert single.points.positions.tobytes() == surface.points.positions.tobytes()
+
+    def test_points_are_told_apart(self, surface: Surface) -> None:
+        kinds = surface.points.kinds
+        assert (kinds == NEURON).sum() == 54 * 58
+        assert (kinds == BRIDGE).any()
+        assert (kinds == CAP).any()
+        assert np.isfinite(surface.points.positions).all()
+        assert (surface.points.neurons[kinds != NEURON] == -1).all()
+
+    def test_labels_name_the_nearest_neuron(self, surface: Surface) -> None:
+        stage_one = surface.segmentation
+        assert stage_one is not None
+        k = 30
+        pixel = np.array(stage_one.volume.spacing_mm[:2])
+        places = np.argwhere(stage_one.mask[k])[:, ::-1] * pixel
+        neurons = stage_one.networks.codebooks[k] * pixel
+        nearest = ((places[:, None] - neurons) ** 2).sum(axis=2).argmin(axis=1)
+        assert (stage_one.labels[k][stage_one.mask[k]] == nearest + 1).all()
+        assert (stage_one.labels[~stage_one.mask] == 0).all()
+
+
+class TestReport:
+    def test_sections_stand_in_their_order(self, surface: Surface) -> None:
+        assert tuple(surface.report) == SECTIONS
+
+    def test_every_key_is_documented_and_every_documented_key_is_there(self, surface: Surface) -> None:
+        page = (Path(__file__).parents[1] / "docs" / "report.md").read_text(encoding="utf-8")
+        described = set(re.findall(r"^\| `([a-z_]+\.[a-z0-9_]+)` \|", page, re.MULTILINE))
+        sections = {name: found for name, found in surface.report.items() if name not in ("settings", "warnings")}
+        present = {f"{name}.{key}" for name, found in sections.items() for key in found}
+        assert {key for key in described if key.split(".")[0] in sections} == present
+
+    def test_it_repeats_but_for_the_times(self, surface: Surface, head: Phantom) -> None:
+        again = reconstruct(head.volume, truth=head.truth, lower=head.lower, upper=head.upper)
+        first, second = dict(surface.report), dict(again.report)
+        assert first.pop("timings").keys() == second.pop("timings").keys()
+        assert first == second
+
+
+class TestStudies:
+    def test_a_ball_keeps_its_volume(self) -> None:
+        found = reconstruct(stacked(ball()))
+        assert found.report["networks"]["signal"] == "boundary"
+        assert found.report["quality"]["sound"]
+        assert found.report["quality"]["genus"] == 0
+        assert found.report["quality"]["volume_mm3"] == pytest.approx(4 / 3 * np.pi * 15**3, rel=0.12)
+
+    def test_any_axis_order_gives_the_same_mesh(self) -> None:
+        voxels = ball((30, 40, 36), 13.0)
+        voxels[:, :20, :18] //= 2
+        reference = reconstruct(stacked(voxels))
+        turned = np.flip(voxels, (0, 2)).transpose(2, 0, 1)
+        affine = np.zeros((4, 4))
+        affine[1, 0] = 1.0
+        affine[2, 1] = -1.0
+        affine[0, 2] = -1.0
+        affine[:, 3] = [35, 0, 29, 1]
+        found = reconstruct(Volume.from_stored(turned, affine))
+        assert found.mesh.faces.tobytes() == reference.mesh.faces.tobytes()
+        np.testing.assert_allclose(found.mesh.vertices, reference.mesh.vertices, atol=1e-9)
+
+    def test_a_window_that_keeps_everything_gives_a_closed_box(self) -> None:
+        found = reconstruct(stacked(np.ones((12, 40, 30), np.uint8)), lower=0)
+        assert judged(found).is_watertight
+        assert found.report["window"]["touches_border"]
+        assert found.report["warnings"]
+        assert found.report["quality"]["volume_mm3"] == pytest.approx(11 * 39 * 29, rel=0.2)
+
+    def test_a_window_that_keeps_nothing_names_the_range(self) -> None:
+        with pytest.raises(EmptyError, match="between 0 and 100"):
+            reconstruct(stacked(ball()), lower=500)
+
+    def test_a_slice_without_pixels_has_no_network(self) -> None:
+        voxels = ball()
+        voxels[20] = 0
+        found = reconstruct(stacked(voxels))
+        assert 20 in found.report["networks"]["slices_without"]
+        assert "20" in found.report["warnings"][0]
+        assert judged(found).is_watertight
+        assert found.report["quality"]["components"] == 1
+
+    def test_slices_with_fewer_pixels_than_neurons_are_left_out(self) -> None:
+        with pytest.raises(EmptyError, match="fewer --neurons"):
+            segment(stacked(ball(radius=3.0)), neurons=500)
+
+    def test_kept_zero_stays_kept(self) -> None:
+        found = segment(stacked(100 - ball()), lower=-1, upper=50)
+        assert found.mask.sum() == (ball() > 0).sum()
+
+    def test_oblong_pixels_keep_a_ball_round(self) -> None:
+        axes = np.meshgrid(np.arange(21) * 2.0 - 20, np.arange(81) * 0.7 - 28, np.arange(101) * 0.5 - 25, indexing="ij")
+        voxels = (100 * (sum(a**2 for a in axes) < 18**2)).astype(np.uint8)
+        found = reconstruct(stacked(voxels, (0.5, 0.7, 2.0)))
+        extent = np.ptp(found.mesh.vertices, axis=0)
+        np.testing.assert_allclose(extent[:2], 36, atol=2)
+
+    def test_progress_is_told_and_can_stop_the_work(self) -> None:
+        told: list[str] = []
+
+        def stop(stage: str, done: int, total: int) -> None:
+            told.append(stage)
+            assert 0 <= done <= total
+            if stage == "fit":
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            reconstruct(stacked(ball()), progress=stop)
+        assert {"networks", "closing", "fit"} <= set(told)
+
+
+class TestClouds:
+    def test_a_sheet_is_refused_and_allowed(self) -> None:
+        sheet = np.column_stack([np.random.default_rng(0).random((2000, 2)), np.zeros(2000)])
+        with pytest.raises(GeometryError, match="two walls"):
+            reconstruct_points(sheet)
+        assert judged(reconstruct_points(sheet, allow_leaks=True)).is_watertight
+
+    def test_contours_of_two_bodies_close(self) -> None:
+        points = tomomesh.read_points(shared("clouds/contours/torus_sphere_5to1.xyz"))
+        quality = reconstruct_points(points).report["quality"]
+        assert quality["components"] == 2
+        assert quality["genus"] == 1
+        assert quality["volume_mm3"] == pytest.approx(243_103, rel=0.05)
+
+
+class TestRealStudies:
+    @pytest.mark.parametrize(
+        ("name", "options"),
+        [
+            ("derived/dev54_t1/dev54_t1.nii.gz", {}),
+            ("derived/dev54_t1/dev54_t1.nii.gz", {"lower": 140.0}),
+            ("volrender/seg3D/MR.nii.gz", {}),
+            ("dicom2stl/ct_example.nii.gz", {"preset": "bone"}),
+        ],
+    )
+    def test_closed_and_manifold_with_a_plausible_volume(self, name: str, options: dict[str, Any]) -> None:
+        found = reconstruct(tomomesh.read_volume(shared(name)), **options)
+        mesh = judged(found)
+        assert mesh.is_watertight
+        assert mesh.is_winding_consistent
+        assert 1.0e6 < mesh.volume < 5.0e6
+        assert found.report["cubes"]["holds"]
+        assert 0.8 < found.report["quality"]["volume_over_rings"] < 1.25
+
+    def test_a_vendors_slab_of_four_slices_is_closed(self) -> None:
+        found = reconstruct(tomomesh.read_volume(shared("dicom2nifti/siemens/anatomical/001")))
+        assert judged(found).is_watertight
+        assert found.report["quality"]["genus"] == 0
+        assert 0.8 < found.report["quality"]["volume_over_rings"] < 1.2
+
+    def test_axis_orders_and_image_stacks_give_the_same_mesh(self) -> None:
+        from tomomesh.settings import ReadSettings
+
+        nifti = tomomesh.read_volume(shared("derived/dev54_t1/dev54_t1.nii.gz"))
+        spacing = ReadSettings(spacing=nifti.spacing_mm)
+        for folder in ("derived/dev54_t1/png", "derived/dev54_t1/tif"):
+            assert_same_but_for_the_place(nifti, tomomesh.read_volume(shared(folder), settings=spacing))
+        first, *others = (tomomesh.read_volume(p) for p in sorted(shared("niivue/nifti_space").iterdir())[:4])
+        for other in others:
+            assert_same_but_for_the_place(first, other)
+
+
+def assert_same_but_for_the_place(one: Volume, other: Volume) -> None:
+    first, second = reconstruct(one).mesh, reconstruct(other).mesh
+    assert first.faces.tobytes() == second.faces.tobytes()
+    np.testing.assert_allclose(
+        first.vertices - first.vertices.min(axis=0), second.vertices - second.vertices.min(axis=0), atol=1e-6
+    )

@@ -1,0 +1,243 @@
+"""What is counted on a mesh: trimesh agrees on good ones, and every fault that is put in is found."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+
+from conftest import cubes_of, keys_in, law, seeds, size, solids
+from tomomesh.errors import InternalCheckError
+from tomomesh.measure.topology import (
+    Topology,
+    check_promise,
+    face_components,
+    face_volumes,
+    topology,
+    welded,
+)
+from tomomesh.model.mesh import QuadMesh, TriMesh
+from tomomesh.surface.composition import well_composed
+from tomomesh.surface.cuberille import track
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+FAULTS = ("boundary_edges", "nonmanifold_edges", "nonmanifold_vertices", "misoriented_edges", "inward_components")
+
+
+def of(made: trimesh.Trimesh) -> TriMesh:
+    return TriMesh(np.array(made.vertices, np.float64), np.array(made.faces, np.int64))
+
+
+def ball() -> TriMesh:
+    return of(trimesh.creation.icosphere(subdivisions=1))
+
+
+def ring() -> TriMesh:
+    return of(trimesh.creation.torus(4.0, 1.0, major_sections=size(24, 12), minor_sections=8))
+
+
+def beside(mesh: TriMesh, other: TriMesh) -> TriMesh:
+    """Put two meshes into one, without joining them."""
+    faces = np.concatenate([mesh.faces, other.faces + len(mesh.vertices)])
+    return TriMesh(np.concatenate([mesh.vertices, other.vertices]), faces)
+
+
+def faults(mesh: TriMesh) -> dict[str, int]:
+    """Return the faults that were found, and how many."""
+    found = topology(mesh)
+    assert tuple(found.faults) == FAULTS
+    assert found.sound == (not any(found.faults.values()))
+    return {name: count for name, count in found.faults.items() if count}
+
+
+class TestGood:
+    @pytest.mark.parametrize(
+        ("mesh", "components", "genus"),
+        [
+            (ball(), 1, 0),
+            (ring(), 1, 1),
+            (beside(ball(), ring()), 2, 1),
+            (beside(ring(), ring().moved(ring().vertices + 20)), 2, 2),
+        ],
+    )
+    def test_is_sound(self, mesh: TriMesh, components: int, genus: int) -> None:
+        judge = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+        found = topology(mesh)
+        assert faults(mesh) == {}
+        assert (found.components, found.genus) == (components, genus)
+        assert found.euler_number == judge.euler_number == 2 * components - 2 * genus
+        assert judge.is_watertight
+        assert judge.is_winding_consistent
+        assert face_volumes(mesh).sum() == pytest.approx(judge.volume)
+        assert mesh.face_areas.sum() == pytest.approx(judge.area)
+        np.testing.assert_array_equal(np.sort(mesh.edges, axis=0), np.sort(judge.edges_unique, axis=0))
+        check_promise(mesh)
+
+    @law(60)
+    @given(solid=solids())
+    def test_trimesh_says_the_same_of_a_cuberille(self, solid: NDArray[np.bool_]) -> None:
+        keys = well_composed(keys_in(solid))
+        mesh = track(cubes_of(keys), surface="all").mesh.triangulated()
+        judge = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+        assert topology(mesh).euler_number == judge.euler_number
+        assert topology(mesh).components == judge.body_count
+        assert judge.is_watertight
+        assert judge.is_winding_consistent
+        assert judge.volume == pytest.approx(len(keys))
+        np.testing.assert_allclose(mesh.face_vectors / 2, judge.face_normals * judge.area_faces[:, None])
+        np.testing.assert_allclose(np.linalg.norm(mesh.vertex_normals, axis=1), 1)
+
+    @law(40)
+    @given(solid=solids(), seed=seeds)
+    def test_knows_no_order(self, solid: NDArray[np.bool_], seed: int) -> None:
+        mesh = track(cubes_of(well_composed(keys_in(solid)))).mesh.triangulated()
+        rng = np.random.default_rng(seed)
+        number = rng.permutation(len(mesh.vertices))
+        vertices = np.empty_like(mesh.vertices)
+        vertices[number] = mesh.vertices
+        faces = np.roll(number[rng.permutation(mesh.faces)], 1, axis=1)
+        assert topology(TriMesh(vertices, faces)) == topology(mesh)
+
+    def test_vertices_without_a_face_do_not_count(self) -> None:
+        mesh = ball()
+        assert topology(mesh.moved(np.vstack([mesh.vertices, [[9.0, 9, 9]]]))) == topology(mesh)
+
+    def test_of_nothing_is_nothing(self) -> None:
+        nothing = TriMesh(np.empty((0, 3)), np.empty((0, 3), np.int64))
+        assert topology(nothing) == Topology(**{entry.name: 0 for entry in fields(Topology)})
+
+
+class TestBroken:
+    def test_a_missing_face_opens_three_edges(self) -> None:
+        mesh = ball()
+        assert faults(TriMesh(mesh.vertices, mesh.faces[1:])) == {"boundary_edges": 3}
+
+    def test_a_duplicated_face_makes_three_edges_of_three_faces(self) -> None:
+        mesh = ball()
+        found = faults(TriMesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[:1]])))
+        assert found["nonmanifold_edges"] == 3
+
+    def test_a_flipped_face_makes_three_edges_of_one_direction(self) -> None:
+        mesh = ball()
+        faces = mesh.faces.copy()
+        faces[5] = faces[5, ::-1]
+        assert faults(TriMesh(mesh.vertices, faces)) == {"misoriented_edges": 3}
+
+    def test_two_balls_that_share_a_vertex_make_a_bow_tie(self) -> None:
+        one = ball()
+        other = one.moved(2 * one.vertices[0] - one.vertices)
+        other = TriMesh(other.vertices, other.faces[:, ::-1])
+        pair = beside(one, other)
+        faces = np.where(pair.faces == len(one.vertices), 0, pair.faces)
+        assert faults(TriMesh(pair.vertices, faces)) == {"nonmanifold_vertices": 1}
+
+    def test_two_balls_that_share_an_edge_make_an_edge_of_four_faces(self) -> None:
+        one = ball()
+        a, b = one.faces[0, :2]
+        pair = beside(one, one)
+        faces = pair.faces.copy()
+        for vertex in (a, b):
+            faces[faces == vertex + len(one.vertices)] = vertex
+        assert faults(TriMesh(pair.vertices, faces))["nonmanifold_edges"] == 1
+
+    @pytest.mark.parametrize("which", ["one", "both"])
+    def test_an_inside_out_component_is_inward(self, which: str) -> None:
+        mesh = ball()
+        inner = TriMesh(mesh.vertices, mesh.faces[:, ::-1])
+        pair = beside(inner, mesh.moved(mesh.vertices + 5) if which == "one" else inner.moved(mesh.vertices + 5))
+        assert faults(pair) == {"inward_components": 1 if which == "one" else 2}
+
+    @law(60)
+    @given(seed=seeds, kind=st.sampled_from(["drop", "double", "flip"]))
+    def test_any_single_fault_is_found_far_away_too(self, seed: int, kind: str) -> None:
+        rng = np.random.default_rng(seed)
+        mesh = ring()
+        faces = mesh.faces.copy()
+        n = int(rng.integers(len(faces)))
+        if kind == "drop":
+            faces = np.delete(faces, n, axis=0)
+        elif kind == "double":
+            faces = np.insert(faces, n, faces[n], axis=0)
+        else:
+            faces[n] = faces[n, [1, 0, 2]]
+        broken = TriMesh(mesh.vertices + rng.choice([0.0, 1e9]), faces)
+        assert not topology(broken).sound
+        assert not trimesh.Trimesh(mesh.vertices, faces, process=False).is_volume
+        with pytest.raises(InternalCheckError):
+            check_promise(broken)
+
+
+class TestPromise:
+    def test_refuses_coincident_vertices(self) -> None:
+        mesh = ball()
+        vertices = mesh.vertices.copy()
+        far = int(np.argmax(np.linalg.norm(vertices - vertices[0], axis=1)))
+        vertices[far] = vertices[0]
+        assert topology(mesh.moved(vertices)).boundary_edges == 0
+        with pytest.raises(InternalCheckError) as refused:
+            check_promise(mesh.moved(vertices))
+        assert refused.value.exit_code == 9
+
+    def test_refuses_an_edge_of_no_length(self) -> None:
+        mesh = ball()
+        vertices = mesh.vertices.copy()
+        vertices[mesh.faces[0, 1]] = vertices[mesh.faces[0, 0]]
+        with pytest.raises(InternalCheckError, match="equal position"):
+            check_promise(mesh.moved(vertices))
+
+    @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+    def test_refuses_coordinates_that_are_not_finite(self, value: float) -> None:
+        mesh = ball()
+        vertices = mesh.vertices.copy()
+        vertices[3, 1] = value
+        with pytest.raises(InternalCheckError, match="finite"):
+            check_promise(mesh.moved(vertices))
+
+    def test_refuses_two_cubes_that_share_an_edge(self) -> None:
+        """The smallest case of a surface that is manifold by its cubes and not by its vertices."""
+        solid = np.zeros((2, 2, 1), bool)
+        solid[0, 0], solid[1, 1] = True, True
+        mesh = track(cubes_of(keys_in(solid))).mesh.triangulated()
+        assert faults(mesh)["nonmanifold_edges"] == 1
+        with pytest.raises(InternalCheckError, match="nonmanifold_edges = 1"):
+            check_promise(mesh)
+
+
+class TestWelded:
+    @law(30)
+    @given(seed=seeds)
+    def test_a_soup_of_triangles_becomes_the_mesh_again(self, seed: int) -> None:
+        mesh = ring()
+        faces = np.random.default_rng(seed).permutation(mesh.faces)
+        soup = TriMesh(mesh.vertices[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3))
+        assert topology(soup).components == len(faces)
+        assert topology(welded(soup)) == topology(mesh)
+        assert len(welded(soup).vertices) == len(mesh.vertices)
+
+    def test_faces_that_lose_a_corner_are_dropped(self) -> None:
+        vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1 + 1e-12, 0, 0]])
+        assert len(welded(TriMesh(vertices, np.array([[0, 1, 2], [1, 3, 2]]))).faces) == 1
+
+
+class TestMesh:
+    def test_components_are_numbered_by_their_lowest_vertex(self) -> None:
+        pair = beside(ball(), ring())
+        label = face_components(pair)
+        np.testing.assert_array_equal(label, np.repeat([0, 1], [len(ball().faces), len(ring().faces)]))
+
+    @law(40)
+    @given(solid=solids())
+    def test_squares_are_split_along_their_first_diagonal(self, solid: NDArray[np.bool_]) -> None:
+        quads: QuadMesh = track(cubes_of(well_composed(keys_in(solid)))).mesh
+        mesh = quads.triangulated()
+        np.testing.assert_array_equal(mesh.faces[0::2], quads.quads[:, [0, 1, 2]])
+        np.testing.assert_array_equal(mesh.faces[1::2], quads.quads[:, [0, 2, 3]])
+        np.testing.assert_allclose(mesh.face_areas, 0.5)
+        assert len(mesh.edges) == len(quads.edges) + len(quads.quads)
