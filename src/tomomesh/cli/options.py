@@ -158,4 +158,5 @@ def _help(entry: Field[Any]) -> str:
         default = " ".join(f"{value:g}" for value in default)
     facts = [meta["unit"], "" if meta["choices"] else limits_of(entry)]
     facts += [] if default is None else [f"default {default:g}" if isinstance(default, float) else f"default {default}"]
-    return f"{meta['help']} ({'; '.join(fact for fact in facts if fact)})".replace("%", "%%")
+    told = "; ".join(fact for fact in facts if fact)
+    return (f"{meta['help']} ({told})" if told else str(meta["help"])).replace("%", "%%")

@@ -10,102 +10,22 @@ from collections.abc import Iterator, Mapping
 from dataclasses import Field, asdict, dataclass, field, fields, replace
 from typing import Any
 
-from .errors import UsageError
+from ..errors import UsageError
+from .parameter import UNSET, Group, limits_of, option_of, param
 
-UNSET = object()
-
-
-def param(
-    default: Any,
-    help: str,
-    *,
-    kind: type | None = None,
-    unit: str = "",
-    choices: tuple[str, ...] = (),
-    low: float = -math.inf,
-    above: float = -math.inf,
-    high: float = math.inf,
-    length: tuple[int, ...] = (),
-    paper: Any = UNSET,
-) -> Any:
-    """Declare a parameter: ``low <= value <= high`` and ``value > above``; `length` where it takes several.
-
-    `kind` is the type of one value; it follows from the default, except where that is None or a tuple.
-    """
-    kind = kind or (float if default is None or isinstance(default, tuple) else type(default))
-    meta = {
-        "help": help,
-        "kind": kind,
-        "unit": unit,
-        "choices": choices,
-        "low": low,
-        "above": above,
-        "high": high,
-        "length": length,
-        "paper": paper,
-    }
-    return field(default=default, metadata=meta)
-
-
-@dataclass(frozen=True)
-class Group:
-    """Parameters that belong together: a section of the settings file and of ``--help``."""
-
-    def __post_init__(self) -> None:
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if isinstance(value, list):
-                value = tuple(value)
-                object.__setattr__(self, entry.name, value)
-            if value is not None or entry.default is not None:
-                _check(entry, value)
-
-    def paper(self) -> Mapping[str, Any]:
-        """Return the values that the paper has in place of the defaults."""
-        return {f.name: f.metadata["paper"] for f in fields(self) if f.metadata["paper"] is not UNSET}
-
-
-def _check(entry: Field[Any], value: Any) -> None:
-    meta, option = entry.metadata, option_of(entry.name)
-    if meta["choices"]:
-        if value not in meta["choices"]:
-            raise UsageError(
-                f"{option} has no such value",
-                found=f"{option} = {value}",
-                expected=" | ".join(meta["choices"]),
-            )
-        return
-    if meta["kind"] is bool:
-        if not isinstance(value, bool):
-            raise UsageError(f"{option} is a switch", found=f"{option} = {value}", expected="true or false")
-        return
-    values = value if isinstance(value, tuple) else (value,)
-    if len(values) not in (meta["length"] or (1,)) or (isinstance(value, tuple) and not meta["length"]):
-        counts = " or ".join(map(str, meta["length"] or ("one",)))
-        raise UsageError(f"{option} has too few or too many values", found=f"{option} = {value}", expected=counts)
-    if not all(_inside(meta, one) for one in values):
-        raise UsageError(f"{option} is outside its limits", found=f"{option} = {value}", expected=limits_of(entry))
-
-
-def _inside(meta: Mapping[str, Any], value: Any) -> bool:
-    if isinstance(value, bool) or not isinstance(value, int if meta["kind"] is int else (int, float)):
-        return False
-    return bool(math.isfinite(value) and meta["low"] <= value <= meta["high"] and value > meta["above"])
-
-
-def limits_of(entry: Field[Any]) -> str:
-    """Put a parameter's limits into words."""
-    meta = entry.metadata
-    words = ["a whole number" if meta["kind"] is int else "a number"]
-    words += [f"over {meta['above']:g}"] if math.isfinite(meta["above"]) else []
-    words += [f"at least {meta['low']:g}"] if math.isfinite(meta["low"]) else []
-    words += [f"at most {meta['high']:g}"] if math.isfinite(meta["high"]) else []
-    return words[0] + (" " + ", ".join(words[1:]) if words[1:] else "")
-
-
-def option_of(name: str) -> str:
-    """Return the command line's spelling of a parameter."""
-    return "--" + name.replace("_", "-")
+__all__ = [
+    "UNSET",
+    "CubeSettings",
+    "FitSettings",
+    "NetworkSettings",
+    "ReadSettings",
+    "RunSettings",
+    "Settings",
+    "WindowSettings",
+    "limits_of",
+    "option_of",
+    "parameters",
+]
 
 
 @dataclass(frozen=True)
@@ -142,6 +62,8 @@ class WindowSettings(Group):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.preset is not None and (self.lower is not None or self.upper is not None):
+            raise UsageError("two windows are asked for", found="--preset and a window", expected="one of them")
         lower = -math.inf if self.lower is None else self.lower
         upper = math.inf if self.upper is None else self.upper
         if lower >= upper:
@@ -165,7 +87,7 @@ class NetworkSettings(Group):
     signal: str = param(
         "auto",
         "what the network sees: the window's pixels (region), the outline of the filled window (boundary), "
-        "or the outline only in slices that the window fills (auto)",
+        "or the outline where the window is a solid and not a wall (auto)",
         choices=("region", "boundary", "auto"),
         paper="region",
     )
@@ -241,7 +163,7 @@ class FitSettings(Group):
 
     stiffness: float = param(0.25, "sum of the structural stiffness at a vertex over k_d", low=0)
     damping: float = param(1.0, "damping over critical damping", above=0)
-    step: float = param(0.8, "time step, in units of 1/omega; the stable limit is 1", above=0, high=1)
+    step: float = param(0.8, "time step, in units of 1/omega; at most the damping and its inverse", above=0, high=1)
     tolerance: float = param(1e-3, "speed and acceleration at which the mesh rests", unit="cube edges", above=0)
     max_steps: int = param(200, "most steps", unit="steps", low=0)
     springs: str = param(
@@ -256,6 +178,16 @@ class FitSettings(Group):
         choices=("clamp", "shorten"),
         paper="shorten",
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        stable = min(self.damping, 1 / self.damping)
+        if self.step > stable:
+            raise UsageError(
+                "the time step is above the stable limit",
+                found=f"--step = {self.step:g}, --damping = {self.damping:g}",
+                expected=f"--step at most {stable:g}, the smaller of --damping and its inverse",
+            )
 
 
 @dataclass(frozen=True)

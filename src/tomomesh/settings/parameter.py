@@ -1,0 +1,105 @@
+"""What a parameter is: a dataclass field that knows its unit, limits, help text and the paper's value."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import Field, dataclass, field, fields
+from typing import Any
+
+from ..errors import UsageError
+
+UNSET = object()
+
+
+def param(
+    default: Any,
+    help: str,
+    *,
+    kind: type | None = None,
+    unit: str = "",
+    choices: tuple[str, ...] = (),
+    low: float = -math.inf,
+    above: float = -math.inf,
+    high: float = math.inf,
+    length: tuple[int, ...] = (),
+    paper: Any = UNSET,
+) -> Any:
+    """Declare a parameter: ``low <= value <= high`` and ``value > above``; `length` where it takes several.
+
+    `kind` is the type of one value; it follows from the default, except where that is None or a tuple.
+    """
+    kind = kind or (float if default is None or isinstance(default, tuple) else type(default))
+    meta = {
+        "help": help,
+        "kind": kind,
+        "unit": unit,
+        "choices": choices,
+        "low": low,
+        "above": above,
+        "high": high,
+        "length": length,
+        "paper": paper,
+    }
+    return field(default=default, metadata=meta)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Parameters that belong together: a section of the settings file and of ``--help``."""
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if isinstance(value, list):
+                value = tuple(value)
+                object.__setattr__(self, entry.name, value)
+            if value is not None or entry.default is not None:
+                _check(entry, value)
+
+    def paper(self) -> Mapping[str, Any]:
+        """Return the values that the paper has in place of the defaults."""
+        return {f.name: f.metadata["paper"] for f in fields(self) if f.metadata["paper"] is not UNSET}
+
+
+def _check(entry: Field[Any], value: Any) -> None:
+    meta, option = entry.metadata, option_of(entry.name)
+    if meta["choices"]:
+        if value not in meta["choices"]:
+            raise UsageError(
+                f"{option} has no such value",
+                found=f"{option} = {value}",
+                expected=" | ".join(meta["choices"]),
+            )
+        return
+    if meta["kind"] is bool:
+        if not isinstance(value, bool):
+            raise UsageError(f"{option} is a switch", found=f"{option} = {value}", expected="true or false")
+        return
+    values = value if isinstance(value, tuple) else (value,)
+    if len(values) not in (meta["length"] or (1,)) or (isinstance(value, tuple) and not meta["length"]):
+        counts = " or ".join(map(str, meta["length"] or ("one",)))
+        raise UsageError(f"{option} has too few or too many values", found=f"{option} = {value}", expected=counts)
+    if not all(_inside(meta, one) for one in values):
+        raise UsageError(f"{option} is outside its limits", found=f"{option} = {value}", expected=limits_of(entry))
+
+
+def _inside(meta: Mapping[str, Any], value: Any) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int if meta["kind"] is int else (int, float)):
+        return False
+    return bool(math.isfinite(value) and meta["low"] <= value <= meta["high"] and value > meta["above"])
+
+
+def limits_of(entry: Field[Any]) -> str:
+    """Put a parameter's limits into words."""
+    meta = entry.metadata
+    words = ["a whole number" if meta["kind"] is int else "a number"]
+    words += [f"over {meta['above']:g}"] if math.isfinite(meta["above"]) else []
+    words += [f"at least {meta['low']:g}"] if math.isfinite(meta["low"]) else []
+    words += [f"at most {meta['high']:g}"] if math.isfinite(meta["high"]) else []
+    return words[0] + (" " + ", ".join(words[1:]) if words[1:] else "")
+
+
+def option_of(name: str) -> str:
+    """Return the command line's spelling of a parameter."""
+    return "--" + name.replace("_", "-")
