@@ -16,9 +16,9 @@ import nibabel
 import numpy as np
 import pytest
 import trimesh
+
 from studies import write_nifti
 from test_end_to_end import ball
-
 from tomomesh.cli import main
 from tomomesh.settings import Settings, option_of, parameters
 

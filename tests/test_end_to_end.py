@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import trimesh
-from studies import shared
 
 import tomomesh
+from studies import shared
 from tomomesh import reconstruct, reconstruct_points, segment
 from tomomesh.account import SECTIONS
 from tomomesh.errors import EmptyError, GeometryError
@@ -43,7 +43,7 @@ def judged(surface: Surface) -> trimesh.Trimesh:
 
 def ball(shape: tuple[int, int, int] = (40, 48, 44), radius: float = 15.0) -> NDArray[np.int16]:
     axes = np.meshgrid(*(np.arange(n) - (n - 1) / 2 for n in shape), indexing="ij")
-    return (100 * (sum(a**2 for a in axes) < radius**2)).astype(np.int16)
+    return np.where(sum(a**2 for a in axes) < radius**2, np.int16(100), np.int16(0))
 
 
 def stacked(voxels: NDArray[Any], spacing: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Volume:

@@ -103,7 +103,7 @@ class TestLimits:
             WindowSettings(lower=lower, upper=upper)
 
     def test_are_put_into_words(self) -> None:
-        assert limits_of(PARAMETERS["neurons"]) == "a whole number at least 3, at most 10000"
+        assert limits_of(PARAMETERS["neurons"]) == "a whole number at least 3, at most 4096"
         assert limits_of(PARAMETERS["step"]) == "a number over 0, at most 1"
         assert limits_of(PARAMETERS["lower"]) == "a number"
 

@@ -189,7 +189,7 @@ class TestPromise:
         mesh = ball()
         vertices = mesh.vertices.copy()
         vertices[mesh.faces[0, 1]] = vertices[mesh.faces[0, 0]]
-        with pytest.raises(InternalCheckError, match="equal position"):
+        with pytest.raises(InternalCheckError, match="position of another"):
             check_promise(mesh.moved(vertices))
 
     @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])

@@ -6,6 +6,7 @@ import math
 import platform
 import time
 from contextlib import contextmanager
+from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -158,9 +159,9 @@ class Account:
         if steps and not trace.converged:
             self.warn(f"the mesh had not come to rest after {steps} steps")
 
-    def quality(self, mesh: TriMesh, points: PointSet) -> None:
+    def quality(self, mesh: TriMesh, points: PointSet, cavities: int) -> None:
         """Measure the mesh, against its points too."""
-        self._sections["quality"] = assess(mesh, points=points.positions)
+        self._sections["quality"] = assess(mesh, points=points.positions, cavities=cavities)
 
     def rings(self, sampling: Sampling) -> None:
         """Compare the volume of the mesh with the areas of the rings times the distance of their slices."""
@@ -179,7 +180,13 @@ class Account:
         sections: dict[str, Any] = self._sections | {
             "timings": self._timings | {"total_s": sum(self._timings.values())},
             "settings": self._settings.to_dict(),
-            "versions": {name: version(name) for name in PACKAGES} | {"python": platform.python_version()},
+            "versions": dict(versions()),
             "warnings": list(self._warnings),
         }
         return {name: sections[name] for name in SECTIONS if name in sections}
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Return the versions of what the result depends on."""
+    return {name: version(name) for name in PACKAGES} | {"python": platform.python_version()}

@@ -179,7 +179,7 @@ def reconstruct_points(
     Surface
     """
     settings = (settings or Settings()).replace(**changes)
-    cloud = points if isinstance(points, PointSet) else PointSet.from_positions(np.asarray(points, np.float64))
+    cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)
     account = Account(settings)
     with account.timed("points"):
         spacing = sampling_distance(cloud.positions)
@@ -253,8 +253,8 @@ def _surface(
     mesh = smoothed.moved(rest.vertices)
     account.fit(rest.trace)
     with account.timed("quality"):
-        check_promise(mesh)
-        account.quality(mesh, points)
+        check_promise(mesh, cavities=tracked.cavities)
+        account.quality(mesh, points, tracked.cavities)
     return Surface(points, cubes, cuberille, smoothed, mesh, rest.nearest, rest.trace, {})
 
 

@@ -15,6 +15,8 @@ POINTS = "an unoriented cloud: PLY, XYZ or CSV text, or NPY"
 MESH = "STL, PLY or OBJ"
 STAGE_ONE = ("read", "window", "network")
 STAGE_TWO = ("cubes", "fit")
+CUBES_ONLY = ("cell_mm", "cell_factor", "closing", "allow_leaks", "surface", "smoothing")
+"""Parameters of the cubes that do not matter to the points."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -50,7 +52,7 @@ def build_parser() -> argparse.ArgumentParser:
     stage_one.add_argument("study", metavar="STUDY", help=STUDY)
     stage_one.add_argument("-o", "--output", required=True, metavar="POINTS", help="PLY, XYZ, CSV or NPY")
     _add_outputs(stage_one, "labels", "figures")
-    _add_settings(stage_one, (*STAGE_ONE, "cubes", "run"))
+    _add_settings(stage_one, (*STAGE_ONE, "cubes", "run"), without=CUBES_ONLY)
 
     stage_two = _command(commands, "surface", "stages two and three alone: points in, a closed surface out")
     stage_two.add_argument("cloud", metavar="POINTS", help=POINTS)
@@ -62,7 +64,7 @@ def build_parser() -> argparse.ArgumentParser:
     network.add_argument("region", metavar="REGION", help="square, triangle, cube, or one picture (PNG or TIFF)")
     network.add_argument("-o", "--output", default="tomomesh-network", metavar="FOLDER", help="default: %(default)s")
     _add_outputs(network)
-    _add_settings(network, ("window", "network", "run"))
+    _add_settings(network, ("window", "network", "run"), without=("slices", "signal", "units"))
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
     inspect.add_argument("study", metavar="STUDY", help=STUDY)
@@ -70,7 +72,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_settings(inspect, ("read",), paper=False)
 
     check = _command(commands, "check", "the quality report of any mesh")
-    check.add_argument("mesh", metavar="MESH", help=f"{MESH} or OFF")
+    check.add_argument("mesh", metavar="MESH", help="STL, PLY, OBJ or OFF")
     check.add_argument("--against", metavar="MESH", help="a mesh that it should equal: distances both ways")
     check.add_argument("--report", metavar="FILE.json", help="write the report")
     check.add_argument("--json", action="store_true", help="print the report as JSON")
@@ -97,13 +99,15 @@ def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
     group.add_argument("--save-settings", metavar="FILE.toml", help="write the settings of this run, to repeat it")
 
 
-def _add_settings(parser: argparse.ArgumentParser, groups: tuple[str, ...], *, paper: bool = True) -> None:
-    """Add an option for each parameter of some groups, and those that choose or show them all."""
+def _add_settings(
+    parser: argparse.ArgumentParser, groups: tuple[str, ...], *, without: tuple[str, ...] = (), paper: bool = True
+) -> None:
+    """Add an option for each parameter of some groups but a few, and those that choose or show them all."""
     sections = {
         entry.name: parser.add_argument_group(_title(entry.name)) for entry in fields(Settings) if entry.name in groups
     }
     for group, entry in parameters():
-        if group in sections:
+        if group in sections and entry.name not in without:
             _add_parameter(sections[group], entry)
     if "window" in sections:
         sections["window"].add_argument(

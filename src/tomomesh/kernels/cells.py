@@ -118,7 +118,7 @@ def track_surfaces(table: NDArray[np.int32], turns: NDArray[np.int32], labels: N
     Parameters
     ----------
     table : (c, 27) int32 array
-        Neighbors in the order of `tomomesh.surface.cuberille.OFFSETS`, -1 where there is none.
+        Neighbors in the order of `tomomesh.surface.neighbors.OFFSETS`, -1 where there is none.
     turns : (24, 5) int32 array
         For each of the 6 directions and each of the 4 sides of a face: the column of the neighbor ahead and
         outward, the column of the neighbor ahead, the direction that faces back, the direction ahead, and the

@@ -22,11 +22,13 @@ INDEX_BITS = 16_383
 """Low bits of a squared distance that carry the neuron's number; as many neurons a network may have."""
 
 
-@kernel("void(f8[:,::1], f8[:,::1], i4[:,::1], f8[::1], f8[::1], b1)")
+@kernel("void(f8[:,::1], f8[:,::1], i4[:,::1], i4[:,::1], i4[:,::1], f8[::1], f8[::1], b1)")
 def train_online(
     codebook: NDArray[np.float64],
     inputs: NDArray[np.float64],
     hops: NDArray[np.int32],
+    nearest_first: NDArray[np.int32],
+    within: NDArray[np.int32],
     alpha: NDArray[np.float64],
     radius: NDArray[np.float64],
     gaussian: bool,
@@ -39,7 +41,9 @@ def train_online(
         Changed in place.
     inputs : (t, d) float array
         One input a presentation, in the order of presentation.
-    hops : (u, u) int array
+    hops, nearest_first : (u, u) int arrays
+    within : (u, h) int array
+        See `tomomesh.model.lattice.Lattice`.
     alpha, radius : (t,) float arrays
         Learning rate and radius of each presentation.
     gaussian : bool
@@ -49,39 +53,39 @@ def train_online(
     -----
     Finite inputs, at most 16,383 neurons. Non-negative floats order as the integers that spell them, and a
     minimum of integers vectorizes: so the number of each neuron rides in the last bits of its distance. Of
-    neurons that are equally near (within 4e-12 of the squared distance) the lowest number wins.
+    neurons that are equally near (within 4e-12 of the squared distance) the lowest number wins. Two axes at
+    least; the first two in one pass save the loads and stores of a second.
     """
     d, u = codebook.shape
+    farthest = within.shape[1] - 1
     squared = np.empty(u)
     bits = squared.view(np.int64)
-    weight = np.empty(u)
-    at_hop = np.zeros(hops.max() + 1)
+    weight = np.empty(farthest + 1)
     for t in range(len(inputs)):
-        squared[:] = 0.0
-        for axis in range(d):
-            x = inputs[t, axis]
-            row = codebook[axis]
+        x, y = inputs[t, 0], inputs[t, 1]
+        row, next_row = codebook[0], codebook[1]
+        for i in range(u):
+            squared[i] = (x - row[i]) * (x - row[i]) + (y - next_row[i]) * (y - next_row[i])
+        for axis in range(2, d):
+            x, row = inputs[t, axis], codebook[axis]
             for i in range(u):
                 squared[i] += (x - row[i]) * (x - row[i])
         winner = np.int64(2**63 - 1)
         for i in range(u):
             winner = min(winner, (bits[i] & ~np.int64(INDEX_BITS)) | np.int64(i))
-        apart = hops[winner & np.int64(INDEX_BITS)]
+        c = winner & np.int64(INDEX_BITS)
+        reach = min(int(6.0 * radius[t] if gaussian else radius[t]), farthest)
+        weight[: reach + 1] = alpha[t]
         if gaussian:
-            for hop in range(len(at_hop)):
-                at_hop[hop] = np.exp(-0.5 * (hop / radius[t]) ** 2) if hop <= 6.0 * radius[t] else 0.0
-            at_hop[0] = 1.0
-            for i in range(u):
-                weight[i] = alpha[t] * at_hop[apart[i]]
-        else:
-            reach = np.int32(radius[t])
-            for i in range(u):
-                weight[i] = alpha[t] if apart[i] <= reach else 0.0
+            for hop in range(1, reach + 1):
+                weight[hop] *= np.exp(-0.5 * (hop / radius[t]) ** 2)
+        near = nearest_first[c, : within[c, reach]]
+        apart = hops[c]
         for axis in range(d):
             x = inputs[t, axis]
             row = codebook[axis]
-            for i in range(u):
-                row[i] += weight[i] * (x - row[i])
+            for i in near:
+                row[i] += weight[apart[i]] * (x - row[i])
 
 
 @kernel("void(f8[:,::1], f8[:,::1], i4[::1], f8[::1])")
@@ -101,6 +105,10 @@ def best_matching_units(
         Result: number of the nearest neuron, the lowest where several are equally near.
     squared : (n,) float array
         Result: squared distance to it.
+
+    Notes
+    -----
+    Two axes at least: the first two are compared in the pass that adds them.
     """
     d, u = codebook.shape
     distance = np.empty(BLOCK)
@@ -110,15 +118,15 @@ def best_matching_units(
         best[:] = np.inf
         for i in range(u):
             distance[:] = 0.0
-            for axis in range(d - 1):
+            for axis in range(2, d):
                 m = codebook[axis, i]
                 x = inputs[axis, start:stop]
                 for n in range(len(x)):
                     distance[n] += (x[n] - m) * (x[n] - m)
-            m = codebook[d - 1, i]
-            x = inputs[d - 1, start:stop]
+            a, b = codebook[0, i], codebook[1, i]
+            x, y = inputs[0, start:stop], inputs[1, start:stop]
             for n in range(len(best)):
-                total = distance[n] + (x[n] - m) * (x[n] - m)
+                total = distance[n] + (x[n] - a) * (x[n] - a) + (y[n] - b) * (y[n] - b)
                 nearer = total < best[n]
                 best[n] = total if nearer else best[n]
                 unit[n] = i if nearer else unit[n]

@@ -43,14 +43,15 @@ def squared_distance(point: NDArray[np.float64], corners: NDArray[np.float64]) -
         cp += c * p
     area = bb * cc - bc * bc
     s, t = cc * bp - bc * cp, bb * cp - bc * bp
+    foot = np.inf
     if area > 0.0 and s >= 0.0 and t >= 0.0 and s + t <= area:
-        return squared_to(point, corners, s / area, t / area)
+        foot = squared_to(point, corners, s / area, t / area)
     tiny = 1e-300
     s = min(max(bp / max(bb, tiny), 0.0), 1.0)
     t = min(max(cp / max(cc, tiny), 0.0), 1.0)
     far = min(max((cp - bp + bb - bc) / max(bb - 2.0 * bc + cc, tiny), 0.0), 1.0)
     sides = min(squared_to(point, corners, s, 0.0), squared_to(point, corners, 0.0, t))
-    return min(sides, squared_to(point, corners, 1.0 - far, far))
+    return min(foot, sides, squared_to(point, corners, 1.0 - far, far))
 
 
 @kernel("void(f8[:,::1], f8[:,:,::1], i8[:,::1], f8[::1])")

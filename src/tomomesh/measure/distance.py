@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from ..model.mesh import TriMesh
 
-FIRST_TRY = 8
+FIRST_TRY = 16
 """Faces looked at for each point before the search widens."""
 BLOCK = 20_000
 """Points handled together, which bounds the memory."""

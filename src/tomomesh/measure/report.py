@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from .distance import distance_to_surface, spread_of
 from .shape import triangle_shapes
-from .topology import face_volumes, topology, welded
+from .topology import distinct_positions, face_volumes, topology, welded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,7 +22,7 @@ SAMPLES = 20_000
 
 
 def assess(
-    mesh: TriMesh, *, points: NDArray[np.float64] | None = None, against: TriMesh | None = None
+    mesh: TriMesh, *, points: NDArray[np.float64] | None = None, against: TriMesh | None = None, cavities: int = 0
 ) -> dict[str, Any]:
     """Measure a mesh.
 
@@ -34,13 +34,17 @@ def assess(
         The points that the surface should pass through.
     against : TriMesh, optional
         A surface that it should equal.
+    cavities : int
+        Components that may face inward.
 
     Returns
     -------
     dict
         Counts, areas, volumes, triangle shapes and distances; each key names its unit (see docs/report.md).
     """
-    counts, again = topology(mesh), topology(welded(mesh))
+    counts = topology(mesh, cavities=cavities)
+    apart = distinct_positions(mesh, np.float32) == len(mesh.vertices)
+    again = counts if apart else topology(welded(mesh), cavities=cavities)
     found: dict[str, Any] = {"vertices": len(mesh.vertices), "faces": len(mesh.faces), **asdict(counts)}
     found |= {"closed": counts.boundary_edges == 0, "sound": counts.sound, "sound_after_welding": again.sound}
     found["area_mm2"] = float(mesh.face_areas.sum())

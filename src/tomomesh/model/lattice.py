@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +37,17 @@ class Lattice:
 
     def __len__(self) -> int:
         return len(self.hops)
+
+    @cached_property
+    def nearest_first(self) -> NDArray[np.int32]:
+        """All neurons in the order of their hops from each, (u, u)."""
+        return np.argsort(self.hops, axis=1, kind="stable").astype(np.int32)
+
+    @cached_property
+    def within(self) -> NDArray[np.int32]:
+        """How many neurons are at most 0, 1, 2, ... hops from each, itself among them, (u, h)."""
+        counts = [(self.hops <= hop).sum(axis=1) for hop in range(int(self.hops.max()) + 1)]
+        return np.stack(counts, axis=1).astype(np.int32)
 
 
 def lattice(name: str, neurons: int) -> Lattice:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import UsageError
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -37,9 +39,21 @@ class PointSet:
 
     @classmethod
     def from_positions(cls, positions: NDArray[np.float64]) -> PointSet:
-        """Take an (n, 3) cloud about which nothing else is known."""
-        unknown = np.full(len(positions), -1, np.int32)
-        return cls(np.asarray(positions, np.float64), unknown, unknown, np.zeros(len(positions), np.uint8))
+        """Take an (n, 3) cloud about which nothing else is known.
+
+        Raises
+        ------
+        UsageError
+            Where the positions are no (n, 3) array of finite numbers.
+        """
+        placed = np.asarray(positions, np.float64)
+        if placed.ndim != 2 or placed.shape[1] != 3:
+            raise UsageError("points are three numbers each", found=f"shape = {placed.shape}", expected="(n, 3)")
+        if not np.isfinite(placed).all():
+            row = int(np.flatnonzero(~np.isfinite(placed).all(axis=1))[0])
+            raise UsageError("a point is not finite", found=f"row = {row}", expected="finite coordinates")
+        unknown = np.full(len(placed), -1, np.int32)
+        return cls(placed, unknown, unknown, np.zeros(len(placed), np.uint8))
 
     def __len__(self) -> int:
         return len(self.positions)

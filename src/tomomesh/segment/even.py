@@ -59,6 +59,8 @@ def _even_arcs(line: NDArray[np.float64], gaps: NDArray[np.bool_]) -> tuple[NDAr
     """Even out the runs of neurons between the gaps of an open line, the neurons shared by length."""
     arcs = np.split(line, np.flatnonzero(gaps) + 1)
     lengths = np.array([_along(arc)[-1] for arc in arcs])
+    if lengths.sum() == 0:
+        return line, gaps
     edges = len(line) - len(arcs)
     share = edges * lengths / max(lengths.sum(), 1e-300)
     counts = np.floor(share).astype(int)

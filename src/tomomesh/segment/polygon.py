@@ -24,14 +24,14 @@ def lattice_inside(ring: NDArray[np.float64], spacing: float) -> NDArray[np.floa
 def inside(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Tell which points (n, 2) lie inside a closed polygon (u, 2)."""
     found = np.empty(len(points), bool)
-    inside_polygon(ring, points, found)
+    inside_polygon(np.ascontiguousarray(ring), np.ascontiguousarray(points), found)
     return found
 
 
 def distance(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the distance of points (n, 2) to the line of a closed polygon (u, 2)."""
     found = np.empty(len(points))
-    distance_to_polygon(ring, points, found)
+    distance_to_polygon(np.ascontiguousarray(ring), np.ascontiguousarray(points), found)
     return found
 
 

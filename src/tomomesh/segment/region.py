@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import EmptyError
+from ..errors import EmptyError, UsageError
 from ..model.lattice import lattice
 from .even import bridged_edges, even_spacing
 from .som import match, start_positions, train
@@ -55,9 +55,13 @@ def train_region(inputs: NDArray[np.float64], settings: NetworkSettings, *, seed
 
     Raises
     ------
+    UsageError
+        For inputs of fewer than two dimensions.
     EmptyError
         With fewer inputs than neurons.
     """
+    if inputs.ndim != 2 or inputs.shape[1] < 2:
+        raise UsageError("inputs have two numbers each or more", found=f"shape = {inputs.shape}", expected="(n, d)")
     graph = lattice(settings.network, settings.neurons)
     if len(inputs) < len(graph):
         raise EmptyError(

@@ -31,12 +31,30 @@ def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
     ----------
     mask : (K, J, I) bool array
     """
-    pixels = [np.argwhere(plane) for plane in mask]
-    areas = [4 * np.pi * np.sqrt(np.linalg.det(np.cov(p.T) + np.eye(2) / 12)) for p in pixels if len(p) > 2]
-    return bool(areas) and sum(len(p) for p in pixels if len(p) > 2) > solid * sum(areas)
+    filled = ellipses = 0.0
+    for plane in mask:
+        pixels = pixels_of(plane)
+        if len(pixels) > 2:
+            filled += len(pixels)
+            ellipses += 4 * np.pi * np.sqrt(np.linalg.det(moments(pixels)[1] + np.eye(2) / 12))
+    return filled > solid * ellipses
 
 
-def outline(plane: NDArray[np.bool_]) -> NDArray[np.int64]:
+def pixels_of(plane: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the pixels of a (J, I) mask, row by row, (n, 2) columns and rows."""
+    row, column = np.divmod(np.flatnonzero(plane), plane.shape[1])
+    return np.stack([column, row], axis=1).astype(np.float64)
+
+
+def moments(inputs: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the mean (d,) and the covariance (d, d) of inputs (n, d)."""
+    by_axis = np.ascontiguousarray(inputs.T)
+    center = by_axis.mean(axis=1)
+    offset = by_axis - center[:, None]
+    return center, np.einsum("an,bn->ab", offset, offset) / max(len(inputs) - 1, 1)
+
+
+def outline(plane: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the pixels on both sides of the border of a filled window, (n, 2) columns and rows.
 
     With the last pixels inside and the first outside, which may lie just off the image, the middle of the
@@ -53,7 +71,7 @@ def outline(plane: NDArray[np.bool_]) -> NDArray[np.int64]:
     background, _ = ndimage.label(~_grown(framed, reach))
     filled = framed | ~_grown(background == background[0, 0], reach)
     border = ndimage.binary_dilation(filled) & ~ndimage.binary_erosion(filled)
-    return np.argwhere(border)[:, ::-1] - (reach + 1)
+    return pixels_of(border) - (reach + 1)
 
 
 def _grown(mask: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:

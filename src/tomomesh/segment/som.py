@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..kernels import som as kernels
+from .signal import moments
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -75,8 +77,8 @@ def start_positions(
     u = len(lattice)
     if start == "random":
         return inputs[rng.choice(len(inputs), u, replace=len(inputs) < u)]
-    center = inputs.mean(axis=0)
-    variance, axes = np.linalg.eigh(np.atleast_2d(np.cov(inputs.T)))
+    center, covariance = moments(inputs)
+    variance, axes = np.linalg.eigh(covariance)
     spread = np.sqrt(np.maximum(variance, 0.0))
     if lattice.name == "ring":
         angle = 2 * np.pi * np.arange(u) / u
@@ -117,13 +119,14 @@ def _half_widths(inputs: NDArray[np.float64], lattice: Lattice, pixel_area: floa
     """Estimate h / s of a ring from the number and the spread of its inputs."""
     if lattice.name != "ring" or inputs.shape[1] != 2:
         return 0.0
-    length = 2 * np.pi * np.sqrt(np.trace(np.cov(inputs.T)))
+    length = 2 * np.pi * np.sqrt(np.trace(moments(inputs)[1]))
     half_width = len(inputs) * pixel_area / (2 * length)
     return float(half_width * len(lattice) / length)
 
 
+@lru_cache(maxsize=8)
 def _falling(steps: int, power: float) -> NDArray[np.float64]:
-    """Fall from 1 to 0 as (1 - t)^power (Reyes Aldasoro 1998)."""
+    """Fall from 1 to 0 as (1 - t)^power (Reyes Aldasoro 1998); kept, for every slice asks for the same."""
     return np.asarray((1 - np.arange(steps) / max(steps - 1, 1)) ** power)
 
 
@@ -138,7 +141,8 @@ def _train_online(
     shown = inputs[rng.integers(len(inputs), size=settings.iterations)]
     alpha = settings.alpha[1] + (settings.alpha[0] - settings.alpha[1]) * _falling(len(shown), settings.alpha_power)
     radius = radii[1] + (radii[0] - radii[1]) * _falling(len(shown), settings.radius_power)
-    kernels.train_online(codebook, shown, lattice.hops, alpha, radius, settings.neighborhood == "gaussian")
+    gaussian = settings.neighborhood == "gaussian"
+    kernels.train_online(codebook, shown, lattice.hops, lattice.nearest_first, lattice.within, alpha, radius, gaussian)
 
 
 def _train_batch(

@@ -12,7 +12,7 @@ from ..model.lattice import lattice
 from ..model.networks import Networks
 from ..progress import Progress, silent
 from .even import bridged_edges, even_spacing
-from .signal import fills_most, outline
+from .signal import fills_most, outline, pixels_of
 from .som import match, train
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def train_study(
 
     def work(start: int, stop: int) -> None:
         for k in range(start, stop):
-            shown = (outline(mask[k]) if outlined else np.argwhere(mask[k])[:, ::-1]) * np.array(pixel_mm)
+            shown = (outline(mask[k]) if outlined else pixels_of(mask[k])) * np.array(pixel_mm)
             pixels[k] = len(shown)
             if len(shown) >= len(graph):
                 rng = np.random.default_rng([seed, k])
@@ -121,10 +121,9 @@ def regions(
     def work(start: int, stop: int) -> None:
         for n in range(start, stop):
             plane = networks.slices[n]
-            row, column = np.nonzero(mask[plane])
-            by_axis = np.stack([column, row]) * np.array(pixel_mm)[:, None]
+            by_axis = np.ascontiguousarray((pixels_of(mask[plane]) * pixel_mm).T)
             winners, _ = match(np.ascontiguousarray((networks.codebooks[n] * pixel_mm).T), by_axis)
-            labels[plane, row, column] = winners + 1
+            labels[plane][mask[plane]] = winners + 1
 
     in_blocks(work, len(networks.slices), block=1, threads=threads)
     return labels

@@ -41,7 +41,7 @@ def window(volume: Volume, *, lower: float = -np.inf, upper: float = np.inf) -> 
     """
     levels = volume.voxels
     kept = levels <= upper if np.isneginf(lower) else (levels > lower) & (levels <= upper)
-    mask = np.asarray(kept.all(axis=3) if levels.ndim == 4 else kept)
+    mask = np.ascontiguousarray(kept.all(axis=3) if levels.ndim == 4 else kept)
     if not mask.any():
         raise EmptyError(
             "the window selects nothing",

@@ -92,7 +92,7 @@ class NetworkSettings(Group):
         paper="region",
     )
     network: str = param("ring", "topology of the network", choices=("chain", "ring", "grid"))
-    neurons: int = param(58, "neurons a slice", low=3, high=10_000)
+    neurons: int = param(58, "neurons a slice", low=3, high=4_096)
     training: str = param(
         "batch", "one presentation at a time, or all at once", choices=("online", "batch"), paper="online"
     )
@@ -136,6 +136,13 @@ class NetworkSettings(Group):
         low=0,
         paper=0.0,
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if 0 < self.trim < 1:
+            raise UsageError(
+                "--trim would drop most pixels", found=f"--trim = {self.trim:g}", expected="0 or at least 1"
+            )
 
 
 @dataclass(frozen=True)

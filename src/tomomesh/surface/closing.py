@@ -78,7 +78,7 @@ def close_shell(occupied: NDArray[np.int64], closing: int | None = None, progres
         band = _Band.around(occupied, steps)
         share = band.two_sided()
         if share >= HELD or closing is not None:
-            progress("closing", len(tried), len(tried))
+            progress("closing", count + 1, count + 1)
             return Shell(band.closed(), steps, share)
     progress("closing", len(tried), len(tried))
     band = _Band.around(occupied, LEAKING)
@@ -114,7 +114,8 @@ class _Band:
     def eroded(self) -> NDArray[np.bool_]:
         """Tell which cubes the outside takes back: those it reaches within the dilation, past no occupied cube."""
         depth = np.where(self.outside, 0, -1).astype(np.int32)
-        spread(self.table, self.dilated & ~self.occupied, depth, self.steps)
+        lining = np.append(~self.dilated & ~self.outside, False)[self.table].any(axis=1)
+        spread(self.table, self.dilated & ~self.occupied & ~lining, depth, self.steps)
         return depth >= 0
 
     def closed(self) -> NDArray[np.int64]:

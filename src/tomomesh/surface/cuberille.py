@@ -40,6 +40,11 @@ class Cuberille:
     taken: NDArray[np.bool_]
 
     @property
+    def cavities(self) -> int:
+        """Linings of cavities among the surfaces that were taken."""
+        return int((self.volumes[self.taken] < 0).sum())
+
+    @property
     def enclosed(self) -> int:
         """Cubes inside the surfaces that were taken."""
         return int(self.volumes[self.taken].sum())

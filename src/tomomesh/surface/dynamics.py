@@ -88,7 +88,8 @@ def fit(
         motion.advance()
         progress("fit", len(motion.history), most)
     motion.match()
-    progress("fit", most, most)
+    steps = max(len(motion.history), 1)
+    progress("fit", steps, steps)
     trace = motion.trace()
     return Fit(np.asarray(grid.origin + motion.position), motion.nearest, trace)
 
@@ -159,7 +160,7 @@ class _Motion:
         drawn = (self.nearest >= 0)[:, None]
         pull = np.where(drawn, self.points[self.nearest] - self.position, 0.0)
         tension = self.stiffness * (self.springs @ self.position - self.degree * self.position)
-        mass = drawn + self.stiffness * self.degree
+        mass = np.maximum(drawn + self.stiffness * self.degree, 1e-300)
         acceleration = (pull + tension) / mass - 2 * self.settings.damping * self.velocity
         step, clamped = self._limited_step()
         self._record(pull, drawn, mass, acceleration, clamped)

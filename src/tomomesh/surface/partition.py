@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..errors import EmptyError, ResourceError
 from ..model.cubes import MARGIN, SIDE, CubeGrid, keys_of
@@ -68,13 +69,11 @@ def sampling_distance(positions: NDArray[np.float64], *, neighbors: int = 6) -> 
     Returns
     -------
     float
-        In the unit of the positions; 1 where all points are the same.
+        In the unit of the positions; 1 where there are not two different points.
     """
-    from scipy.spatial import cKDTree
-
     distinct = np.unique(positions, axis=0)
     k = min(neighbors, len(distinct) - 1)
-    if k == 0:
+    if k < 1:
         return 1.0
     distance, _ = cKDTree(distinct).query(distinct, k=[k + 1])
     return float(np.median(distance) * np.sqrt(np.pi / k))
