@@ -164,7 +164,7 @@ class TestOutline:
         row, column = np.mgrid[:60, :60] - 29.5
         disc = np.hypot(row / 20, column / 26) < 1
         contour = np.ascontiguousarray(find_contours(disc.astype(float), 0.5)[0][:, ::-1])
-        pixels = outline(disc)
+        pixels = outline(disc).astype(int)
         assert distance(contour, np.ascontiguousarray(pixels, dtype=float)).max() <= 0.5 + 1e-9
         inner = disc[pixels[:, 1], pixels[:, 0]]
         assert 0.9 < inner.sum() / (~inner).sum() < 1

@@ -88,12 +88,12 @@ def train_online(
                 row[i] += weight[apart[i]] * (x - row[i])
 
 
-@kernel("void(f8[:,::1], f8[:,::1], i4[::1], f8[::1])")
+@kernel("void(f4[:,::1], f4[:,::1], i4[::1], f4[::1])")
 def best_matching_units(
-    codebook: NDArray[np.float64],
-    inputs: NDArray[np.float64],
+    codebook: NDArray[np.float32],
+    inputs: NDArray[np.float32],
     winners: NDArray[np.int32],
-    squared: NDArray[np.float64],
+    squared: NDArray[np.float32],
 ) -> None:
     """Find the neuron nearest to every input (eq. 1).
 
@@ -108,16 +108,17 @@ def best_matching_units(
 
     Notes
     -----
-    Two axes at least: the first two are compared in the pass that adds them.
+    Two axes at least: the first two are compared in the pass that adds them. Single precision, twice as many
+    lanes as double: give positions relative to one of them, so that none is lost.
     """
     d, u = codebook.shape
-    distance = np.empty(BLOCK)
+    distance = np.empty(BLOCK, np.float32)
     for start in range(0, inputs.shape[1], BLOCK):
         stop = min(start + BLOCK, inputs.shape[1])
         best, unit = squared[start:stop], winners[start:stop]
         best[:] = np.inf
         for i in range(u):
-            distance[:] = 0.0
+            distance[:] = np.float32(0.0)
             for axis in range(2, d):
                 m = codebook[axis, i]
                 x = inputs[axis, start:stop]
@@ -129,7 +130,7 @@ def best_matching_units(
                 total = distance[n] + (x[n] - a) * (x[n] - a) + (y[n] - b) * (y[n] - b)
                 nearer = total < best[n]
                 best[n] = total if nearer else best[n]
-                unit[n] = i if nearer else unit[n]
+                unit[n] = np.int32(i) if nearer else unit[n]
 
 
 @kernel("void(f8[:,::1], f8[:,::1], i4[:,::1], f8[:,::1])")
@@ -152,14 +153,21 @@ def train_batch(
 
     Notes
     -----
-    Sums run over the inputs in their order, then over the winners in theirs.
+    Sums run over the inputs in their order, then over the winners in theirs. Winners are sought in single
+    precision, relative to the first input.
     """
     d, u = codebook.shape
     winners = np.empty(inputs.shape[1], np.int32)
-    squared = np.empty(inputs.shape[1])
+    squared = np.empty(inputs.shape[1], np.float32)
     total = np.empty((d + 1, u))
+    near_inputs = np.empty(inputs.shape, np.float32)
+    near_codebook = np.empty((d, u), np.float32)
+    for axis in range(d):
+        near_inputs[axis] = inputs[axis] - inputs[axis, 0]
     for epoch in range(len(weights)):
-        best_matching_units(codebook, inputs, winners, squared)
+        for axis in range(d):
+            near_codebook[axis] = codebook[axis] - inputs[axis, 0]
+        best_matching_units(near_codebook, near_inputs, winners, squared)
         total[:] = 0.0
         for n in range(len(winners)):
             total[d, winners[n]] += 1.0

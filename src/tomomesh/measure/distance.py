@@ -47,7 +47,7 @@ def _search(points: NDArray[np.float64], mesh: TriMesh, tree: cKDTree, radius: f
     best = np.full(len(points), np.inf)
     left, count = np.arange(len(points)), min(FIRST_TRY, len(mesh.faces))
     while len(left):
-        reach, face = tree.query(points[left], k=np.arange(1, count + 1))
+        reach, face = tree.query(points[left], k=np.arange(1, count + 1), workers=-1)
         squared = np.empty(len(left))
         nearest_triangle(points[left], mesh.corners, np.asarray(face, np.int64), squared)
         best[left] = np.sqrt(squared)

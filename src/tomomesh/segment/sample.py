@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from ..model.points import BRIDGE, CAP, NEURON, PointSet
 from .polygon import area, distance, inside, lattice_inside
@@ -138,20 +138,25 @@ def _across(points: PointSet, limit: float) -> float:
 
     Gaps over `limit` medians are left to the closing of the shell, as bridged edges are; 0 takes the widest.
     """
+    order = np.argsort(points.slices, kind="stable")
+    present, first = np.unique(points.slices[order], return_index=True)
+    groups = np.split(order, first[1:])
     gaps = []
-    present = np.unique(points.slices)
-    for here, there in pairwise(present):
-        if there - here > REACH:
-            continue
-        lower, upper = points.slices == here, points.slices == there
-        for own, other in ((lower, upper), (upper, lower)):
-            ring = own & (points.kinds != CAP)
-            target = other | (own & (points.kinds == CAP))
-            gaps.append(cKDTree(points.positions[target]).query(points.positions[ring])[0])
+    for (here, one), (there, other) in pairwise(zip(present, groups, strict=True)):
+        if there - here <= REACH:
+            gaps += [_to_slice(points, one, other), _to_slice(points, other, one)]
     if not gaps:
         return 0.0
     widest = np.concatenate(gaps)
     return float(widest[widest <= limit * np.median(widest)].max(initial=0.0) if limit else widest.max())
+
+
+def _to_slice(points: PointSet, own: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the distance of each point of a ring to the nearest of another slice, or of a cap on its own."""
+    on_cap = points.kinds[own] == CAP
+    targets = np.concatenate([other, own[on_cap]])
+    apart = cdist(points.positions[own[~on_cap]], points.positions[targets])
+    return np.asarray(apart.min(axis=1, initial=np.inf))
 
 
 def _caps(networks: Networks, volume: Volume, spacing: float) -> PointSet:

@@ -168,8 +168,13 @@ def _without_strays(codebook: NDArray[np.float64], by_axis: NDArray[np.float64],
     return np.asarray(squared <= trim**2 * np.median(squared))
 
 
-def match(codebook: NDArray[np.float64], by_axis: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Return the winner of each input and the squared distance to it (eq. 1); arrays are (d, u) and (d, n)."""
-    winners, squared = np.empty(by_axis.shape[1], np.int32), np.empty(by_axis.shape[1])
-    kernels.best_matching_units(codebook, by_axis, winners, squared)
+def match(codebook: NDArray[np.float64], by_axis: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return the winner of each input and the squared distance to it (eq. 1); arrays are (d, u) and (d, n).
+
+    In single precision, relative to the first neuron.
+    """
+    first = codebook[:, :1]
+    winners, squared = np.empty(by_axis.shape[1], np.int32), np.empty(by_axis.shape[1], np.float32)
+    near_codebook, near_inputs = (np.ascontiguousarray(places - first, np.float32) for places in (codebook, by_axis))
+    kernels.best_matching_units(near_codebook, near_inputs, winners, squared)
     return winners, squared

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..model.cubes import key_step
-from .neighbors import column_of, neighbor_table
+from .neighbors import column_of, neighbor_table, once_each
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,7 +42,7 @@ def well_composed(keys: NDArray[np.int64]) -> NDArray[np.int64]:
         ]
         if not added:
             return keys
-        keys = np.unique(np.concatenate([keys, *added]))
+        keys = once_each(np.concatenate([keys, *added]))
 
 
 def _critical_blocks(present: NDArray[np.bool_]) -> list[tuple[list[Offset], NDArray[np.bool_]]]:

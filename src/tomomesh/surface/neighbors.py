@@ -43,5 +43,11 @@ def dilate(keys: NDArray[np.int64], steps: int) -> NDArray[np.int64]:
     """Add every cube within `steps` of a cube, corners included: one axis after the other."""
     for axis in (key_step((1, 0, 0)), key_step((0, 1, 0)), key_step((0, 0, 1))):
         shifts = [keys + axis * n for n in range(-steps, steps + 1)]
-        keys = np.unique(np.concatenate(shifts)) if steps else keys
+        keys = once_each(np.concatenate(shifts)) if steps else keys
     return keys
+
+
+def once_each(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Sort keys and drop repetitions; a stable sort merges the rising runs that the keys consist of."""
+    ordered = np.sort(keys, kind="stable")
+    return np.asarray(ordered[np.append(True, ordered[1:] != ordered[:-1])])
