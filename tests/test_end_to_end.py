@@ -199,8 +199,27 @@ class TestStudies:
 
 
 class TestClouds:
+    @pytest.mark.parametrize("points", [np.zeros((1, 3)), np.zeros((50, 3)), np.eye(3)[:2], np.eye(3), "line", "plane"])
+    def test_flat_clouds_give_their_closed_shell_and_a_warning(self, points: Any) -> None:
+        spread = np.random.default_rng(0).random((500, 3))
+        flat = {"line": spread * [1, 0, 0] + 5, "plane": spread @ np.array([[1, 0, 1], [0, 1, 1], [0, 0, 0]])}
+        found = reconstruct_points(flat[points] if isinstance(points, str) else points)
+        assert judged(found).is_watertight
+        assert "not fitted" in found.report["warnings"][0]
+
+    def test_repeated_points_change_nothing(self) -> None:
+        points = np.random.default_rng(0).normal(size=(800, 3))
+        points /= np.linalg.norm(points, axis=1, keepdims=True)
+        once, often = reconstruct_points(points), reconstruct_points(np.tile(points, (3, 1))[::-1])
+        assert once.mesh.vertices.tobytes() == often.mesh.vertices.tobytes()
+
+    def test_no_points_are_empty(self) -> None:
+        with pytest.raises(EmptyError):
+            reconstruct_points(np.zeros((0, 3)))
+
     def test_a_sheet_is_refused_and_allowed(self) -> None:
-        sheet = np.column_stack([np.random.default_rng(0).random((2000, 2)), np.zeros(2000)])
+        rng = np.random.default_rng(0)
+        sheet = np.column_stack([rng.random((2000, 2)), 0.005 * rng.random(2000)])
         with pytest.raises(GeometryError, match="two walls"):
             reconstruct_points(sheet)
         assert judged(reconstruct_points(sheet, allow_leaks=True)).is_watertight

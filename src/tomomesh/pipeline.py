@@ -15,6 +15,7 @@ from .model.points import CAP, PointSet
 from .model.volume import AXES, Volume
 from .progress import Progress, silent
 from .segment.sample import Sampling, sample
+from .segment.signal import moments
 from .segment.study import regions, train_study
 from .segment.window import choose_window, window
 from .settings import Settings
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 
 LEAST = 0.5
 """Share of the rings' volume that a shell must enclose where it is too thin to be seen to hold."""
+FLAT = 1e-6
+"""Thickness of a cloud, in cube edges, under which it counts as flat."""
 
 
 @dataclass(frozen=True)
@@ -240,7 +243,7 @@ def _surface(
         cuberille = tracked.mesh
     account.surface(tracked)
     if not shell.holds and tracked.enclosed * float(cubes.cell_mm.prod()) < LEAST * expected_mm3:
-        settings = _without_fit(account, settings)
+        settings = _without_fit(account, settings, points.positions)
     with account.timed("smooth"):
         rough = cuberille.triangulated()
         smoothed = rough.moved(low_pass(cuberille.vertices, cuberille.edges, settings.cubes.smoothing))
@@ -264,17 +267,23 @@ def _cell(spacing: float, settings: Settings) -> NDArray[np.float64]:
     return np.broadcast_to(np.array(asked, np.float64) * settings.cubes.cell_factor, 3).copy()
 
 
-def _without_fit(account: Account, settings: Settings) -> Settings:
-    """Refuse a shell that the outside leaks into, unless that was allowed: then its two walls must not be fitted.
+def _without_fit(account: Account, settings: Settings, positions: NDArray[np.float64]) -> Settings:
+    """Refuse a shell that the outside leaks into, unless that was allowed or the points lie in a plane.
 
-    Both would rest on the same points, and the mesh would fall flat.
+    What is let pass is not fitted: both walls would rest on the same points, and the mesh would fall flat.
     """
-    if settings.cubes.allow_leaks:
-        account.warn("the outside leaks into the shell: its surface has two walls, and is smoothed but not fitted")
+    _, covariance = moments(positions)
+    flat = np.linalg.eigvalsh(covariance)[0] <= (FLAT * account.cell_mm) ** 2
+    if flat or settings.cubes.allow_leaks:
+        account.warn(
+            "the points lie in a plane, on a line or at one place: their shell is smoothed, but not fitted"
+            if flat
+            else "the outside leaks into the shell: its surface has two walls, and is smoothed, but not fitted"
+        )
         return settings.replace(max_steps=0)
     raise GeometryError(
         "the outside leaks into the shell of cubes, so its surface would have two walls",
-        found=f"cell = {account.cell_mm:.4g} mm",
+        found=f"cell = {account.cell_mm:.4g}",
         expected="gaps between the points that are narrower than a hole of the surface",
         hint="a larger --cell-mm or --closing, or --allow-leaks",
     )

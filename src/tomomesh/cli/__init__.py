@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         return _complain(ResourceError("the machine's memory is full", hint="a larger --cell-mm, or fewer slices"))
     except KeyboardInterrupt:
-        print("\ninterrupted; nothing was left behind", file=sys.stderr)
+        print("\ninterrupted; no unfinished file is left", file=sys.stderr)
         return INTERRUPTED
     except _Terminated:
         return TERMINATED

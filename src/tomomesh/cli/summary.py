@@ -10,7 +10,7 @@ BARS = " ▁▂▃▄▅▆▇█"
 def of_surface(report: dict[str, Any], output: str) -> list[str]:
     """Say what was reconstructed, and how good it is."""
     quality, fit, cubes = report["quality"], report["fit"], report["cubes"]
-    unit = report["points"]["unit"]
+    unit = _unit(report)
     shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
     lines = [
         *_of_stage_one(report),
@@ -125,7 +125,13 @@ def _of_points(report: dict[str, Any]) -> str:
     points = report["points"]
     made = f", {points['on_bridges']} on {points['bridged_gaps']} bridged gaps, {points['on_caps']} on caps"
     made = made if points["on_bridges"] or points["on_caps"] else ""
-    return f"{points['count']}{made}, r = {points['spacing_mm']:.4g} {points['unit']}"
+    return f"{points['count']}{made}, r = {points['spacing_mm']:.4g} {_unit(report)}"
+
+
+def _unit(report: dict[str, Any]) -> str:
+    """Name the unit of lengths; a cloud may not know its own."""
+    unit = report["points"]["unit"]
+    return "units" if unit == "unknown" else str(unit)
 
 
 def _of_rings(quality: dict[str, Any]) -> str:

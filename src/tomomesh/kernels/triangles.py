@@ -54,26 +54,34 @@ def squared_distance(point: NDArray[np.float64], corners: NDArray[np.float64]) -
     return min(foot, sides, squared_to(point, corners, 1.0 - far, far))
 
 
-@kernel("void(f8[:,::1], f8[:,:,::1], i8[:,::1], f8[::1])")
+@kernel("void(f8[:,::1], f8[:,:,::1], i8[:,::1], f8[:,::1], f8, f8[::1])")
 def nearest_triangle(
     points: NDArray[np.float64],
     corners: NDArray[np.float64],
     candidates: NDArray[np.int64],
-    squared: NDArray[np.float64],
+    reach: NDArray[np.float64],
+    radius: float,
+    distance: NDArray[np.float64],
 ) -> None:
-    """Find the squared distance from each point to the nearest of its candidate triangles.
+    """Find the distance from each point to the nearest of its candidate triangles.
 
     Parameters
     ----------
     points : (n, 3) float array
     corners : (m, 3, 3) float array
     candidates : (n, c) int64 array
-        Numbers of triangles.
-    squared : (n,) float array
+        Numbers of triangles, the nearest center first.
+    reach : (n, c) float array
+        Distance of their centers.
+    radius : float
+        No triangle reaches farther from its center; the search ends where no later candidate can be nearer.
+    distance : (n,) float array
         Result.
     """
     for n in range(len(points)):
         best = np.inf
         for c in range(candidates.shape[1]):
-            best = min(best, squared_distance(points[n], corners[candidates[n, c]]))
-        squared[n] = best
+            if reach[n, c] - radius > best:
+                break
+            best = min(best, np.sqrt(squared_distance(points[n], corners[candidates[n, c]])))
+        distance[n] = best

@@ -47,11 +47,11 @@ def _search(points: NDArray[np.float64], mesh: TriMesh, tree: cKDTree, radius: f
     best = np.full(len(points), np.inf)
     left, count = np.arange(len(points)), min(FIRST_TRY, len(mesh.faces))
     while len(left):
-        reach, face = tree.query(points[left], k=np.arange(1, count + 1), workers=-1)
-        squared = np.empty(len(left))
-        nearest_triangle(points[left], mesh.corners, np.asarray(face, np.int64), squared)
-        best[left] = np.sqrt(squared)
-        left = left[(np.asarray(reach)[:, -1] < best[left] + radius) & (count < len(mesh.faces))]
+        reach, face = (np.asarray(a) for a in tree.query(points[left], k=np.arange(1, count + 1), workers=-1))
+        found = np.empty(len(left))
+        nearest_triangle(points[left], mesh.corners, face.astype(np.int64), reach, radius, found)
+        best[left] = found
+        left = left[(reach[:, -1] < best[left] + radius) & (count < len(mesh.faces))]
         count = min(2 * count, len(mesh.faces))
     return best
 
