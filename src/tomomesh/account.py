@@ -139,14 +139,17 @@ class Account:
             "found": tracked.surfaces,
             "cavities": int((tracked.volumes < 0).sum()),
             "taken": int(tracked.taken.sum()),
+            "debris": tracked.debris,
             "square_faces": len(tracked.mesh.quads),
             "enclosed_cubes": tracked.enclosed,
         }
 
-    def fit(self, trace: Trace) -> None:
-        """Note how the mesh came to rest."""
+    def fit(self, trace: Trace, collapsed: int) -> None:
+        """Note how the mesh came to rest, and how many components were not left as the fit had them."""
         steps = len(trace.speed)
-        self._sections["fit"] = {"iterations": steps, "converged": trace.converged}
+        self._sections["fit"] = {"iterations": steps, "converged": trace.converged, "collapsed": collapsed}
+        if collapsed:
+            self.warn(f"{collapsed} component(s) collapsed in the fit: they are smoothed, but not fitted")
         if steps:
             self._sections["fit"] |= {
                 "speed": float(trace.speed[-1]),

@@ -20,6 +20,7 @@ from .segment.study import regions, train_study
 from .segment.window import choose_window, window
 from .settings import Settings
 from .surface.closing import close_shell
+from .surface.collapse import without_collapse
 from .surface.composition import well_composed
 from .surface.cuberille import track
 from .surface.dynamics import fit
@@ -253,8 +254,8 @@ def _surface(
             smoothed.vertices, springs, cuberille.vertex_cubes, points.positions, cubes, settings.fit,
             threads=settings.run.threads, progress=progress,
         )  # fmt: skip
-    mesh = smoothed.moved(rest.vertices)
-    account.fit(rest.trace)
+    mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))
+    account.fit(rest.trace, collapsed)
     with account.timed("quality"):
         check_promise(mesh, cavities=tracked.cavities)
         account.quality(mesh, points, tracked.cavities)

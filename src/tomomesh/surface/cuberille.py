@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from ..model.cubes import CubeGrid
 
 
+CRUMB = 0.01
+"""Share of the outer surfaces' cubes under which one that encloses nothing is debris, and left out."""
+
+
 @dataclass(frozen=True)
 class Cuberille:
     """The tracked surfaces of a cube set.
@@ -32,12 +36,15 @@ class Cuberille:
         Signed volume of each, cubes; negative for cavities.
     taken : (s,) bool array
         Which surfaces the mesh holds.
+    debris : int
+        Crumbs among the outer surfaces, which were left out.
     """
 
     mesh: QuadMesh
     surfaces: int
     volumes: NDArray[np.int64]
     taken: NDArray[np.bool_]
+    debris: int
 
     @property
     def cavities(self) -> int:
@@ -103,9 +110,11 @@ def track(grid: CubeGrid, *, surface: str = "outer") -> Cuberille:
     label = labels[cube, direction]
     cells = grid.cells
     volumes = _volumes(cells[cube, 0], direction, label, count)
-    taken = np.ones(count, bool) if surface == "all" else _outermost(cells, cube, direction, label, volumes)
+    outermost = _outermost(cells, cube, direction, label, volumes)
+    debris = _debris(cube, label, volumes, outermost)
+    taken = np.ones(count, bool) if surface == "all" else outermost & ~debris
     keep = taken[label]
-    return Cuberille(_quads(grid, cells, cube[keep], direction[keep]), count, volumes, taken)
+    return Cuberille(_quads(grid, cells, cube[keep], direction[keep]), count, volumes, taken, int(debris.sum()))
 
 
 def _volumes(
@@ -142,6 +151,16 @@ def _outermost(
     row = seed - seed % SIDE
     inside = entered[np.searchsorted(at[rank], seed)] - entered[np.searchsorted(at[rank], row)]
     return np.asarray(outward & (inside == 0))
+
+
+def _debris(
+    cube: NDArray[np.int64], label: NDArray[np.int32], volumes: NDArray[np.int64], outermost: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Tell which surfaces are crumbs: small, and around nothing but the cubes that bear their own faces."""
+    pairs = np.unique(label.astype(np.int64) * (int(cube.max()) + 1) + cube)
+    bearing = np.bincount(pairs // (int(cube.max()) + 1), minlength=len(volumes))
+    small = bearing < CRUMB * bearing[outermost].sum()
+    return np.asarray(outermost & small & (volumes <= bearing))
 
 
 def _quads(grid: CubeGrid, cells: NDArray[np.int64], cube: NDArray[np.int64], direction: NDArray[np.int64]) -> QuadMesh:
