@@ -205,6 +205,23 @@ class TestFaults:
         fails(["reconstruct", "nowhere.nii", "-o", str(tmp_path / "no" / "m.stl")], 8, capsys)
         fails(["reconstruct", str(study), "-o", str(tmp_path / "m.stl"), "--report", "no/r.json"], 8, capsys)
 
+    def test_two_outputs_of_one_name_are_refused(
+        self, study: Path, tmp_path: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        mesh = str(tmp_path / "same.ply")
+        fails(["reconstruct", str(study), "-o", mesh, "--points", mesh], 2, capsys)
+        assert not Path(mesh).exists()
+
+    def test_one_or_three_edges_may_stand_before_the_study(self, study: Path, tmp_path: Path) -> None:
+        for edges in (["4"], ["3", "4", "5"]):
+            output = tmp_path / "m.stl"
+            assert main(["reconstruct", "--cell-mm", *edges, str(study), "-o", str(output), "--quiet"]) == 0
+            assert trimesh.load(output).is_watertight
+
+    def test_an_unknown_region_names_those_there_are(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
+        assert "triangle" in fails(["network", "hexagon", "-o", str(tmp_path / "n")], 3, capsys)
+        assert not (tmp_path / "n").exists()
+
     def test_an_empty_window_is_told_with_the_datas_range(
         self, study: Path, tmp_path: Path, capsys: CaptureFixture[str]
     ) -> None:

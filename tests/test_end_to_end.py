@@ -89,6 +89,16 @@ class TestDemo:
         assert single.mesh.faces.tobytes() == surface.mesh.faces.tobytes()
         assert single.points.positions.tobytes() == surface.points.positions.tobytes()
 
+    def test_a_stack_without_its_caps_is_refused(self, head: Phantom) -> None:
+        with pytest.raises(GeometryError, match="two walls"):
+            reconstruct(head.volume, lower=head.lower, upper=head.upper, caps=False)
+
+    def test_small_cubes_are_warned_of_and_their_error_is_of_the_measured_part(self, head: Phantom) -> None:
+        fine = reconstruct(head.volume, truth=head.truth, lower=head.lower, upper=head.upper, cell_mm=2.0)
+        assert "no point near" in fine.report["warnings"][0]
+        assert fine.report["truth"]["mean_mm"] < 0.4
+        assert fine.report["truth"]["max_mm"] < 10
+
     def test_points_are_told_apart(self, surface: Surface) -> None:
         kinds = surface.points.kinds
         assert (kinds == NEURON).sum() == 54 * 58
@@ -173,6 +183,14 @@ class TestStudies:
         with pytest.raises(EmptyError, match="fewer --neurons"):
             segment(stacked(ball(radius=3.0)), neurons=500)
 
+    def test_gantry_tilt_keeps_the_volume(self) -> None:
+        affine = np.eye(4)
+        affine[1, 2] = np.tan(np.radians(25))
+        found = reconstruct(Volume.from_stored(ball(), affine))
+        straight = reconstruct(stacked(ball()))
+        ratios = [one.report["quality"]["volume_over_rings"] for one in (found, straight)]
+        assert ratios[0] == pytest.approx(ratios[1], abs=0.03)
+
     def test_kept_zero_stays_kept(self) -> None:
         found = segment(stacked(100 - ball()), lower=-1, upper=50)
         assert found.mask.sum() == (ball() > 0).sum()
@@ -212,6 +230,18 @@ class TestClouds:
         points /= np.linalg.norm(points, axis=1, keepdims=True)
         once, often = reconstruct_points(points), reconstruct_points(np.tile(points, (3, 1))[::-1])
         assert once.mesh.vertices.tobytes() == often.mesh.vertices.tobytes()
+
+    @pytest.mark.parametrize("noise", [0.0, 1.5])
+    @pytest.mark.parametrize("count", [2000, 8000])
+    def test_open_clouds_are_refused(self, count: int, noise: float) -> None:
+        rng = np.random.default_rng(count)
+        ball = rng.normal(size=(2 * count, 3))
+        ball *= 50 / np.linalg.norm(ball, axis=1, keepdims=True)
+        angle, height = rng.random((2, count))
+        tube = np.column_stack([20 * np.cos(7 * angle), 20 * np.sin(7 * angle), 100 * height])
+        for cloud in (ball[ball[:, 2] > 0], tube):
+            with pytest.raises(GeometryError, match="two walls"):
+                reconstruct_points(cloud + rng.normal(size=cloud.shape) * noise)
 
     def test_no_points_are_empty(self) -> None:
         with pytest.raises(EmptyError):

@@ -179,7 +179,7 @@ class TestRegion:
             epochs=size(10, 3),
             trim=0.0,
         )
-        inputs = shape(name)[:: size(1, 7)]
+        inputs = shape(name)[0][:: size(1, 7)]
         trained = train_region(inputs, kind, seed=1)
         again = train_region(inputs, kind, seed=1)
         assert trained.codebook.tobytes() == again.codebook.tobytes()

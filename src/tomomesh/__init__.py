@@ -68,6 +68,11 @@ def __getattr__(name: str) -> Any:
     return value
 
 
+def __dir__() -> list[str]:
+    """List the public names, imported or not."""
+    return __all__
+
+
 class _Package(ModuleType):
     """Keep a public name its function's, where a module of the same name is imported too."""
 

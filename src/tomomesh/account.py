@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import platform
 import time
 from contextlib import contextmanager
@@ -35,6 +34,10 @@ SECTIONS = (
     "study", "window", "networks", "points", "cubes", "surface", "fit", "quality", "truth", "timings",
     "settings", "versions", "warnings",
 )  # fmt: skip
+DRAWN = 0.9
+"""Share of the vertices that must have a point near them, else a result is warned of."""
+PLAUSIBLE = 0.15
+"""Difference from the volume of the rings over which a result is warned of."""
 PACKAGES = ("tomomesh", "numpy", "scipy", "numba")
 
 
@@ -93,9 +96,9 @@ class Account:
         if any(edges[2:]):
             self.warn("the window touches the border of the slices: the surface is closed along it")
 
-    def networks(self, networks: Networks, slices: int) -> None:
-        """Note what was trained."""
-        without = np.setdiff1d(np.arange(slices), networks.slices)
+    def networks(self, networks: Networks, mask: NDArray[np.bool_]) -> None:
+        """Note what was trained, and which slices could not be."""
+        without = np.setdiff1d(np.arange(len(mask)), networks.slices)
         self._sections["networks"] = {
             "topology": networks.lattice.name,
             "neurons": len(networks.lattice),
@@ -105,9 +108,11 @@ class Account:
             "strays": int(networks.strays.sum()),
             "slices_without": without.tolist(),
         }
-        inner = without[(without > networks.slices[0]) & (without < networks.slices[-1])]
-        if len(inner):
-            self.warn(f"slices in the middle without a network: {', '.join(map(str, inner))}")
+        inside = (without > networks.slices[0]) & (without < networks.slices[-1])
+        missed = without[inside | mask[without].any(axis=(1, 2))]
+        if len(missed):
+            named = ", ".join(map(str, missed[:8])) + (", ..." if len(missed) > 8 else "")
+            self.warn(f"{len(missed)} slice(s) without pixels enough for a network: {named}")
 
     def points(self, points: PointSet, spacing: float, bridged: int = 0) -> None:
         """Note how many points there are and how far apart."""
@@ -144,7 +149,7 @@ class Account:
             "enclosed_cubes": tracked.enclosed,
         }
 
-    def fit(self, trace: Trace, collapsed: int) -> None:
+    def fit(self, trace: Trace, vertices: int, collapsed: int) -> None:
         """Note how the mesh came to rest, and how many components were not left as the fit had them."""
         steps = len(trace.speed)
         self._sections["fit"] = {"iterations": steps, "converged": trace.converged, "collapsed": collapsed}
@@ -159,6 +164,9 @@ class Account:
                 "clamped": int(trace.clamped.sum()),
                 "unattracted": int(trace.unattracted[-1]),
             }
+            drawn = 1 - trace.unattracted[-1] / max(vertices, 1)
+            if drawn < DRAWN:
+                self.warn(f"{1 - drawn:.0%} of the vertices have no point near: the cubes are small for the points")
         if steps and not trace.converged:
             self.warn(f"the mesh had not come to rest after {steps} steps")
 
@@ -168,10 +176,12 @@ class Account:
 
     def rings(self, sampling: Sampling) -> None:
         """Compare the volume of the mesh with the areas of the rings times the distance of their slices."""
-        if math.isfinite(sampling.volume_mm3) and sampling.volume_mm3 > 0:
+        if sampling.volume_mm3 > 0:
             quality = self._sections["quality"]
             quality["rings_volume_mm3"] = sampling.volume_mm3
             quality["volume_over_rings"] = quality["volume_mm3"] / sampling.volume_mm3
+            if abs(quality["volume_over_rings"] - 1) > PLAUSIBLE:
+                self.warn(f"the mesh encloses {quality['volume_over_rings']:.0%} of the volume of its rings")
 
     def truth(self, mesh: TriMesh, caps: NDArray[np.bool_], truth: TriMesh) -> None:
         """Measure the distance to the exact surface, both ways; the caps are no part of it."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .account import Account
-from .errors import GeometryError
+from .errors import GeometryError, UsageError
 from .measure.topology import check_promise
 from .model.points import CAP, PointSet
 from .model.volume import AXES, Volume
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from .model.trace import Trace
 
 LEAST = 0.5
-"""Share of the rings' volume that a shell must enclose where it is too thin to be seen to hold."""
+"""Share of the rings' volume that a shell must enclose; a slab may be too thin to be seen to hold."""
 FLAT = 1e-6
 """Thickness of a cloud, in cube edges, under which it counts as flat."""
 
@@ -100,8 +100,9 @@ class Surface:
 
     @property
     def cap_faces(self) -> NDArray[np.bool_]:
-        """Faces (m,) with a corner that is drawn to a cap: filled, not measured."""
-        on_cap = (self.points.kinds[self.nearest] == CAP) & (self.nearest >= 0)
+        """Faces (m,) with a corner that is nearest to a cap: filled, not measured."""
+        _, nearest = cKDTree(self.points.positions).query(self.mesh.vertices)
+        on_cap = self.points.kinds[nearest] == CAP
         return np.asarray(on_cap[self.mesh.faces].any(axis=1))
 
 
@@ -193,6 +194,12 @@ def reconstruct_points(
 
 
 def _segment(volume: Volume, settings: Settings, account: Account, progress: Progress) -> Segmentation:
+    if not isinstance(volume, Volume):
+        raise UsageError(
+            "a study is a Volume",
+            found=type(volume).__name__,
+            expected="read_volume(path) or Volume.from_stored(array, affine)",
+        )
     axis = _slice_axis(volume, settings.network.slices)
     stack = volume.along(axis)
     account.study(stack, AXES[axis])
@@ -212,7 +219,7 @@ def _segment(volume: Volume, settings: Settings, account: Account, progress: Pro
         )
     with account.timed("regions"):
         labels = regions(mask, networks, pixel_mm=pixel_mm, threads=threads)
-    account.networks(networks, len(mask))
+    account.networks(networks, mask)
     with account.timed("points"):
         sampling = sample(networks, stack, caps=settings.cubes.caps, bridge=settings.network.bridge)
     account.points(sampling.points, sampling.spacing_mm, sampling.bridged)
@@ -232,7 +239,7 @@ def _surface(
     account: Account,
     progress: Progress,
     *,
-    expected_mm3: float = math.inf,
+    expected_mm3: float = 0.0,
 ) -> Surface:
     with account.timed("cubes"):
         grid = partition(points.positions, _cell(spacing, settings))
@@ -243,7 +250,8 @@ def _surface(
         tracked = track(cubes, surface=settings.cubes.surface)
         cuberille = tracked.mesh
     account.surface(tracked)
-    if not shell.holds and tracked.enclosed * float(cubes.cell_mm.prod()) < LEAST * expected_mm3:
+    enclosed = tracked.enclosed * float(cubes.cell_mm.prod())
+    if enclosed < LEAST * expected_mm3 if expected_mm3 else not shell.holds:
         settings = _without_fit(account, settings, points.positions)
     with account.timed("smooth"):
         rough = cuberille.triangulated()
@@ -255,7 +263,7 @@ def _surface(
             threads=settings.run.threads, progress=progress,
         )  # fmt: skip
     mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))
-    account.fit(rest.trace, collapsed)
+    account.fit(rest.trace, len(mesh.vertices), collapsed)
     with account.timed("quality"):
         check_promise(mesh, cavities=tracked.cavities)
         account.quality(mesh, points, tracked.cavities)

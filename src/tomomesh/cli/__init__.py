@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import signal
 import sys
 from typing import TYPE_CHECKING
 
 from ..errors import InternalCheckError, ResourceError, TomomeshError
-from .options import build_parser
+from .options import build_parser, joined
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,8 +24,11 @@ class _Terminated(BaseException):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``tomomesh`` and return its exit code; every fault is one line on stderr."""
     signal.signal(signal.SIGTERM, _terminate)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     try:
-        chosen = build_parser().parse_args(arguments)
+        chosen = build_parser().parse_args(joined(sys.argv[1:] if arguments is None else arguments))
         from . import commands
 
         commands.run(chosen)

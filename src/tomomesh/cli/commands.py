@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import io
-from ..errors import OutputError, UsageError
+from ..errors import OutputError, UnreadableError, UsageError
 from ..settings import Settings, parameters
 from . import summary
 from .bars import Bars
@@ -39,7 +40,7 @@ def settings_of(chosen: Namespace) -> Settings:
 
 def _demo(chosen: Namespace) -> None:
     settings = settings_of(chosen)
-    folder = _folder(chosen.output)
+    folder = _check_folder(chosen.output)
     from ..phantom import phantom
     from ..pipeline import reconstruct
 
@@ -49,6 +50,7 @@ def _demo(chosen: Namespace) -> None:
         progress("phantom", 1, 1)
         settings = settings.replace(lower=head.lower, upper=head.upper)
         surface = reconstruct(head.volume, settings, truth=head.truth, progress=progress)
+        _make(folder)
         io.write_mesh(head.truth, folder / "truth.ply")
         outputs = Namespace(
             output=folder / "mesh.stl", points=folder / "points.ply", labels=folder / "labels.nii.gz",
@@ -101,7 +103,7 @@ def _surface(chosen: Namespace) -> None:
 
 def _network(chosen: Namespace) -> None:
     settings = settings_of(chosen)
-    folder = _folder(chosen.output)
+    folder = _check_folder(chosen.output)
     _check_files(chosen)
     from ..segment.region import train_region
     from ..segment.shapes import SHAPES, shape
@@ -109,8 +111,12 @@ def _network(chosen: Namespace) -> None:
     from ..show.topologies import draw_adapted, draw_update_regions
 
     given = chosen.region in SHAPES
-    inputs = shape(chosen.region) if given else _window_of_picture(chosen.region, settings)
-    trained = train_region(inputs, settings.network, seed=settings.run.seed)
+    if not given and not Path(chosen.region).exists():
+        regions = f"{' | '.join(SHAPES)} | a PNG or TIFF file"
+        raise UnreadableError("there is no such region", file=chosen.region, expected=regions)
+    inputs, area = shape(chosen.region) if given else (_window_of_picture(chosen.region, settings), 1.0)
+    trained = train_region(inputs, settings.network, seed=settings.run.seed, pixel_area=area)
+    _make(folder)
     title = f"A network over a {chosen.region if given else 'picture'}"
     save(draw_update_regions(), folder / "01-topologies.png")
     figure = draw_adapted(inputs, trained.codebook, trained.lattice, start=trained.start, title=title)
@@ -170,33 +176,37 @@ def _read(study: str, settings: Settings, progress: Bars) -> Volume:
     return volume
 
 
-def _folder(path: str) -> Path:
+def _check_folder(path: str | Path) -> Path:
+    """Refuse a folder that could not be made, before any work is done."""
     folder = Path(path)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as fault:
-        raise OutputError("the folder cannot be made", file=path, found=fault.strerror or "") from fault
+    there = folder if folder.exists() else Path(os.path.realpath(folder)).parent
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        raise OutputError("the folder cannot be made", file=str(path), expected="a place that can be written to")
     return folder
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as fault:
+        raise OutputError("the folder cannot be made", file=str(folder), found=fault.strerror or "") from fault
 
 
 def _check_outputs(chosen: Namespace, writers: Any, source: str) -> None:
     io.check_output(chosen.output, writers, inputs=[source])
-    _check_files(chosen, source)
+    _check_files(chosen, source, chosen.output)
 
 
-def _check_files(chosen: Namespace, *sources: str) -> None:
-    """Refuse further outputs that could not be written."""
-    kinds = {
-        "points": io.POINT_WRITERS,
-        "labels": io.LABEL_WRITERS,
-        "report": (".json",),
-        "save_settings": (".toml",),
-    }
+def _check_files(chosen: Namespace, *taken: str) -> None:
+    """Refuse further outputs that could not be written, or that would overwrite another file of this run."""
+    kinds = {"points": io.POINT_WRITERS, "labels": io.LABEL_WRITERS, "report": (".json",), "save_settings": (".toml",)}
+    names = list(taken)
     for name, suffixes in kinds.items():
         if getattr(chosen, name, None):
-            io.check_output(getattr(chosen, name), suffixes, inputs=sources)
+            io.check_output(getattr(chosen, name), suffixes, inputs=names)
+            names.append(getattr(chosen, name))
     if getattr(chosen, "figures", None):
-        _folder(chosen.figures)
+        _check_folder(chosen.figures)
 
 
 def _write(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> None:
@@ -243,7 +253,8 @@ def _draw(
     from ..show import save
     from .pictures import pictures
 
-    where = _folder(str(folder))
+    where = Path(folder)
+    _make(where)
     total = 9 if surface else 5
     for count, (name, figure) in enumerate(pictures(stage_one, surface, settings)):
         progress("pictures", count, total)

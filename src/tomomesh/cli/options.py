@@ -4,23 +4,31 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import Field, fields
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from .. import __version__
 from ..errors import UsageError
 from ..settings import Settings, limits_of, option_of, parameters
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 STUDY = "a NIfTI file, a folder of DICOM slices, or a folder of PNG or TIFF slices (with --spacing)"
 POINTS = "an unoriented cloud: PLY, XYZ or CSV text, or NPY"
 MESH = "STL, PLY or OBJ"
 STAGE_ONE = ("read", "window", "network")
 STAGE_TWO = ("cubes", "fit")
+SEVERAL = tuple(option_of(entry.name) for _, entry in parameters() if entry.metadata["length"] == (1, 3))
+"""Options that take one number or three."""
 CUBES_ONLY = ("cell_mm", "cell_factor", "closing", "allow_leaks", "surface", "smoothing")
 """Parameters of the cubes that do not matter to the points."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose faults are tomomesh's own one-line errors."""
+    """A parser whose faults are tomomesh's own one-line errors, and that takes no abbreviations."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(allow_abbrev=False, **kwargs)
 
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing a page and leaving."""
@@ -79,6 +87,30 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def joined(arguments: Sequence[str]) -> list[str]:
+    """Join the one or three numbers after an option into one word, so that a file may follow them."""
+    words: list[str] = []
+    for word in arguments:
+        option, _, values = words[-1].partition("=") if words else ("", "", "")
+        if option in SEVERAL and values.count(",") < 2 and _is_number(word):
+            words[-1] = f"{option}={values},{word}" if values else f"{option}={word}"
+        else:
+            words.append(word)
+    return words
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(float(part) for part in text.split(","))
+
+
 def _command(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
     return parser
@@ -134,11 +166,12 @@ def _add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
         text = f"do not {meta['help']}" if entry.default else meta["help"]
         group.add_argument(negated, dest=name, action=action, default=argparse.SUPPRESS, help=text)
         return
-    several = {(): None, (1, 3): "+"}.get(meta["length"], meta["length"][0] if meta["length"] else None)
+    one_or_three = option in SEVERAL
+    several = meta["length"][0] if meta["length"] and not one_or_three else None
     group.add_argument(
         option,
         dest=name,
-        type=meta["kind"],
+        type=_numbers if one_or_three else meta["kind"],
         nargs=several,
         choices=meta["choices"] or None,
         metavar=None if meta["choices"] else _metavar(name, meta),
@@ -149,7 +182,7 @@ def _add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
 
 def _metavar(name: str, meta: Any) -> Any:
     if meta["length"] in ((), (1, 3)):
-        return {int: "N", float: "X"}[meta["kind"]]
+        return "X [Y Z]" if meta["length"] else {int: "N", float: "X"}[meta["kind"]]
     return (
         tuple(name[0].upper() + str(n) for n in range(meta["length"][0])) if meta["length"] == (2,) else ("X", "Y", "Z")
     )

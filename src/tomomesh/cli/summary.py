@@ -23,13 +23,14 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
         f"distance  points to surface: mean {quality['points_to_surface_mean_mm']:.3g}, "
         f"95 % {quality['points_to_surface_p95_mm']:.3g}, largest {quality['points_to_surface_max_mm']:.3g} {unit}",
     ]
+    lines += _ending(report, output)
     if "truth" in report:
         truth = report["truth"]
         lines.append(
             f"truth     error: mean {truth['mean_mm']:.3f} mm, 95 % {truth['p95_mm']:.3f} mm, "
             f"largest {truth['max_mm']:.2f} mm (caps aside)"
         )
-    return [*lines, *_ending(report, output)]
+    return lines
 
 
 def of_points(report: dict[str, Any], output: str) -> list[str]:
@@ -78,8 +79,8 @@ def of_check(report: dict[str, Any]) -> list[str]:
     lines = [
         f"mesh      {report['vertices']} vertices, {report['faces']} faces",
         f"topology  {shape}; {same} after welding at 32 bits",
-        f"          {report['components']} component(s), Euler number {report['euler_number']}, "
-        f"genus {report['genus']}",
+        f"          {report['components']} component(s), Euler number {report['euler_number']}"
+        + (f", genus {report['genus']}" if report["sound"] else ""),
         f"size      area {report['area_mm2']:.6g}, volume {report['volume_mm3']:.6g}",
         f"edges     {report['shortest_edge_mm']:.4g} to {report['longest_edge_mm']:.4g}, "
         f"median {report['median_edge_mm']:.4g}",
@@ -145,4 +146,6 @@ def _edges(cell: list[float]) -> str:
 
 def _ending(report: dict[str, Any], output: str) -> list[str]:
     warnings = [f"warning   {warning}" for warning in report["warnings"]]
-    return [*warnings[:3], f"written   {output} in {report['timings']['total_s']:.2f} s"]
+    notes = report.get("study", {}).get("notes", [])
+    told = [f"note      {'; '.join(notes)}"] if notes else []
+    return [*told, *warnings[:3], f"written   {output}, computed in {report['timings']['total_s']:.2f} s"]

@@ -24,7 +24,8 @@ def distance_to_surface(points: NDArray[np.float64], mesh: TriMesh) -> NDArray[n
     """Return the distance of each point to the nearest point of a mesh.
 
     Faces are tried in the order of their centers. A face whose center is farther than the best distance so far
-    plus the largest face's radius cannot be nearer, so the result is exact.
+    plus its radius cannot be nearer, so the result is exact. Faces of like size are searched together, or one
+    large face would widen the search for all.
 
     Parameters
     ----------
@@ -37,23 +38,29 @@ def distance_to_surface(points: NDArray[np.float64], mesh: TriMesh) -> NDArray[n
     (n,) float array
     """
     centers = mesh.corners.mean(axis=1)
-    radius = float(np.sqrt(((mesh.corners - centers[:, None]) ** 2).sum(axis=2).max()))
-    tree = cKDTree(centers)
-    found = [_search(points[n : n + BLOCK], mesh, tree, radius) for n in range(0, len(points), BLOCK)]
-    return np.concatenate(found) if found else np.empty(0)
-
-
-def _search(points: NDArray[np.float64], mesh: TriMesh, tree: cKDTree, radius: float) -> NDArray[np.float64]:
+    radii = np.sqrt(((mesh.corners - centers[:, None]) ** 2).sum(axis=2).max(axis=1))
+    size = np.round(np.log2(np.maximum(radii, 1e-300)) / 2)
     best = np.full(len(points), np.inf)
-    left, count = np.arange(len(points)), min(FIRST_TRY, len(mesh.faces))
+    for one in np.unique(size):
+        alike = np.flatnonzero(size == one)
+        tree, radius, corners = cKDTree(centers[alike]), float(radii[alike].max()), mesh.corners[alike]
+        for n in range(0, len(points), BLOCK):
+            _search(points[n : n + BLOCK], corners, tree, radius, best[n : n + BLOCK])
+    return best
+
+
+def _search(
+    points: NDArray[np.float64], corners: NDArray[np.float64], tree: cKDTree, radius: float, best: NDArray[np.float64]
+) -> None:
+    """Lower the best distances (n,) to those of some faces, looking at more and more until none can be nearer."""
+    left, count = np.arange(len(points)), min(FIRST_TRY, len(corners))
     while len(left):
         reach, face = (np.asarray(a) for a in tree.query(points[left], k=np.arange(1, count + 1), workers=-1))
         found = np.empty(len(left))
-        nearest_triangle(points[left], mesh.corners, face.astype(np.int64), reach, radius, found)
-        best[left] = found
-        left = left[(reach[:, -1] < best[left] + radius) & (count < len(mesh.faces))]
-        count = min(2 * count, len(mesh.faces))
-    return best
+        nearest_triangle(points[left], corners, face.astype(np.int64), reach, radius, found)
+        best[left] = np.minimum(best[left], found)
+        left = left[(reach[:, -1] < best[left] + radius) & (count < len(corners))]
+        count = min(2 * count, len(corners))
 
 
 def spread_of(distances: NDArray[np.float64], name: str) -> dict[str, float]:

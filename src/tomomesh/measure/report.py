@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..model.points import PointSet
 from .distance import distance_to_surface, spread_of
 from .shape import triangle_shapes
 from .topology import distinct_positions, face_volumes, topology, welded
@@ -22,7 +23,11 @@ SAMPLES = 20_000
 
 
 def assess(
-    mesh: TriMesh, *, points: NDArray[np.float64] | None = None, against: TriMesh | None = None, cavities: int = 0
+    mesh: TriMesh,
+    *,
+    points: PointSet | NDArray[np.float64] | None = None,
+    against: TriMesh | None = None,
+    cavities: int = 0,
 ) -> dict[str, Any]:
     """Measure a mesh.
 
@@ -30,7 +35,7 @@ def assess(
     ----------
     mesh : TriMesh
         One face at least.
-    points : (p, 3) float array, optional
+    points : PointSet or (p, 3) float array, optional
         The points that the surface should pass through.
     against : TriMesh, optional
         A surface that it should equal.
@@ -51,6 +56,7 @@ def assess(
     found["volume_mm3"] = float(face_volumes(mesh).sum())
     found |= triangle_shapes(mesh)
     if points is not None:
+        points = points.positions if isinstance(points, PointSet) else points
         found |= spread_of(distance_to_surface(points, mesh), "points_to_surface_")
         found |= spread_of(np.asarray(cKDTree(points).query(mesh.vertices)[0]), "vertices_to_points_")
     if against is not None:

@@ -65,6 +65,11 @@ class Volume:
     unit: str = "stored"
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        k, j, i = self.shape
+        x, y, z = self.spacing_mm
+        return f"Volume({k} x {j} x {i} of {self.voxels.dtype}, {x:g} x {y:g} x {z:g} mm)"
+
     @classmethod
     def from_stored(
         cls,
@@ -108,6 +113,16 @@ class Volume:
         return float(x), float(y), float(z)
 
     @property
+    def pixel_area_mm2(self) -> float:
+        """Area of a pixel of a slice K; where a slice is sheared, less than the product of its spacings."""
+        return float(np.linalg.norm(np.cross(self.affine[:3, 0], self.affine[:3, 1])))
+
+    @property
+    def slice_distance_mm(self) -> float:
+        """Distance of the planes of neighboring slices K; under gantry tilt less than the spacing along K."""
+        return float(abs(np.linalg.det(self.affine[:3, :3])) / self.pixel_area_mm2)
+
+    @property
     def stored_axis(self) -> int:
         """The patient axis (0 left, 1 posterior, 2 superior) along which the file stacks its slices."""
         return 2 - self.grid.axes.index(0)
@@ -145,10 +160,6 @@ class Volume:
     def to_mm(self, indices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Carry (n, 3) indices (i, j, k) to patient millimeters (x, y, z)."""
         return indices @ self.affine[:3, :3].T + self.affine[:3, 3]
-
-    def with_voxels(self, voxels: NDArray[Any]) -> Volume:
-        """Return a volume of the same grid that holds other voxels."""
-        return replace(self, voxels=voxels)
 
 
 def _world_axes(columns: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -40,7 +40,9 @@ class TrainedNetwork:
     measures: dict[str, Any]
 
 
-def train_region(inputs: NDArray[np.float64], settings: NetworkSettings, *, seed: int = 0) -> TrainedNetwork:
+def train_region(
+    inputs: NDArray[np.float64], settings: NetworkSettings, *, seed: int = 0, pixel_area: float = 1.0
+) -> TrainedNetwork:
     """Train a network on inputs of any dimension from 2 up.
 
     Parameters
@@ -48,6 +50,8 @@ def train_region(inputs: NDArray[np.float64], settings: NetworkSettings, *, seed
     inputs : (n, d) float array
     settings : NetworkSettings
     seed : int
+    pixel_area : float
+        Area that one input stands for.
 
     Returns
     -------
@@ -71,8 +75,7 @@ def train_region(inputs: NDArray[np.float64], settings: NetworkSettings, *, seed
             hint="a wider window, or fewer --neurons",
         )
     start = start_positions(inputs, graph, settings.start, np.random.default_rng(seed))
-    spacing = (np.prod(np.ptp(inputs, axis=0)) / len(inputs)) if inputs.shape[1] == 2 else 1.0
-    codebook, kept = train(inputs, graph, settings, np.random.default_rng(seed), pixel_area=float(spacing))
+    codebook, kept = train(inputs, graph, settings, np.random.default_rng(seed), pixel_area=pixel_area)
     if settings.even:
         codebook, _ = even_spacing(codebook, graph, bridged_edges(codebook, graph, settings.bridge))
     return TrainedNetwork(inputs, graph, start, codebook, _measures(inputs, graph, codebook, kept))

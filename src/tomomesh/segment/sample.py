@@ -47,9 +47,9 @@ class Sampling:
 
     @property
     def volume_mm3(self) -> float:
-        """Volume between the rings: their areas times the distance of the slices; infinite without rings."""
+        """Volume between the rings: their areas times the distance of the slices; 0 without rings."""
         if len(self.ring_area_mm2) < 2:
-            return float("inf")
+            return 0.0
         return float(np.trapezoid(self.ring_area_mm2, self.distance_mm))
 
 
@@ -78,14 +78,14 @@ def sample(networks: Networks, volume: Volume, *, caps: bool = True, bridge: flo
     if is_ring and caps:
         points = points.joined(_caps(networks, volume, spacing))
     spacing = max(spacing, _across(points, bridge))
-    pixel = np.prod(volume.spacing_mm[:2])
+    pixel = volume.pixel_area_mm2
     areas = np.array([abs(area(ring)) for ring in networks.codebooks]) * pixel if is_ring else np.empty(0)
     return Sampling(
         points,
         spacing,
         int(networks.bridged.sum()),
         areas,
-        networks.slices * np.float64(volume.spacing_mm[2]),
+        networks.slices * np.float64(volume.slice_distance_mm),
     )
 
 

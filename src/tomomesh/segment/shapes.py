@@ -14,7 +14,7 @@ SIDE = {"square": 64, "triangle": 91, "cube": 16}
 """Lattice points along a side: about 4,096 inputs each."""
 
 
-def shape(name: str) -> NDArray[np.float64]:
+def shape(name: str) -> tuple[NDArray[np.float64], float]:
     """Fill a region with inputs on a regular lattice; its sides are 1.
 
     Parameters
@@ -24,12 +24,15 @@ def shape(name: str) -> NDArray[np.float64]:
 
     Returns
     -------
-    (n, 2) or (n, 3) float array
+    inputs : (n, 2) or (n, 3) float array
+    pixel_area : float
+        Area, or volume, that one input stands for.
     """
     dimensions = 3 if name == "cube" else 2
     axis = (np.arange(SIDE[name]) + 0.5) / SIDE[name]
     lattice = np.stack(np.meshgrid(*[axis] * dimensions, indexing="ij"), axis=-1).reshape(-1, dimensions)
+    share = SIDE[name] ** -float(dimensions)
     if name != "triangle":
-        return lattice
+        return lattice, share
     below = lattice[lattice.sum(axis=1) <= 1]
-    return np.asarray(below @ np.array([[1.0, 0.0], [0.5, np.sqrt(3) / 2]]))
+    return np.asarray(below @ np.array([[1.0, 0.0], [0.5, np.sqrt(3) / 2]])), share * np.sqrt(3) / 2

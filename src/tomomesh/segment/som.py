@@ -85,7 +85,7 @@ def start_positions(
         plane = np.zeros((u, inputs.shape[1]))
         plane[:, 0], plane[:, 1] = np.cos(angle), np.sin(angle)
         return np.asarray(center + np.sqrt(2) * plane @ (axes * spread) @ axes.T)
-    sides = [np.linspace(-1, 1, side) for side in lattice.shape]
+    sides = [np.linspace(-1, 1, side) if side > 1 else np.zeros(1) for side in lattice.shape]
     coordinates = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(u, -1)
     longest = np.argsort(lattice.shape) + inputs.shape[1] - len(lattice.shape)
     towards = _pointing_forward(axes[:, longest])

@@ -55,7 +55,8 @@ def train_study(
         Where no slice has pixels enough.
     """
     graph = lattice(settings.network, settings.neurons)
-    outlined = settings.signal == "boundary" or (settings.signal == "auto" and fills_most(mask))
+    solid = settings.signal == "auto" and graph.name != "grid" and fills_most(mask)
+    outlined = settings.signal == "boundary" or solid
     count = len(mask)
     pixel_area = pixel_mm[0] * pixel_mm[1]
     codebooks, bridged = np.zeros((count, len(graph), 2)), np.zeros((count, len(graph.edges)), bool)

@@ -36,9 +36,13 @@ def window(volume: Volume, *, lower: float = -np.inf, upper: float = np.inf) -> 
 
     Raises
     ------
+    UsageError
+        Where the limits leave no gray level between them.
     EmptyError
         Where nothing lies in the window; names the range of the data.
     """
+    if not lower < upper:
+        raise UsageError("the window is empty", found=f"lower = {lower:g}, upper = {upper:g}", expected="lower < upper")
     levels = volume.voxels
     kept = levels <= upper if np.isneginf(lower) else (levels > lower) & (levels <= upper)
     mask = np.ascontiguousarray(kept.all(axis=3) if levels.ndim == 4 else kept)
@@ -90,6 +94,7 @@ def otsu_threshold(levels: NDArray[Any], *, bins: int = 256) -> float:
     float
         Middle of the last bin of the lower class; the level itself where there is only one.
     """
+    levels = levels[np.isfinite(levels)] if levels.dtype.kind == "f" else levels
     low, high = float(levels.min()), float(levels.max())
     if low == high:
         return low
@@ -106,6 +111,7 @@ def otsu_threshold(levels: NDArray[Any], *, bins: int = 256) -> float:
 
 def histogram(levels: NDArray[Any], low: float, high: float, bins: int) -> NDArray[np.int64]:
     """Count gray levels in equal bins; exact and quick for small integers, which most studies hold."""
+    levels = levels.view(np.uint8) if levels.dtype.kind == "b" else levels
     if levels.dtype.kind in "iu" and levels.dtype.itemsize <= 2:
         base = int(np.iinfo(levels.dtype).min)
         counts = np.bincount(levels.ravel().astype(np.int64) - base)

@@ -80,7 +80,7 @@ class NetworkSettings(Group):
 
     slices: str = param(
         "auto",
-        "plane of the slices; auto is across the thickest spacing, axial where equal",
+        "plane of the slices; auto is across the thickest spacing, axial where equal; a slab keeps its few slices",
         choices=("auto", "axial", "coronal", "sagittal", "stored"),
         paper="stored",
     )
@@ -131,7 +131,7 @@ class NetworkSettings(Group):
     even: bool = param(True, "space the neurons of a chain or ring evenly along their line", paper=False)
     trim: float = param(
         2.5,
-        "pixels farther from their neuron than this many medians are strays, dropped in a second fit; 0 keeps all",
+        "pixels farther from their neuron than this many medians are strays, dropped in a second fit (batch); 0: none",
         unit="medians",
         low=0,
         paper=0.0,
@@ -244,7 +244,7 @@ class Settings:
                 raise UsageError(
                     "the settings have no such entry",
                     file=file,
-                    found=".".join([name, *unknown[:1]]),
+                    found=".".join([name, *unknown[:1]] if name in known else [name]),
                     expected="an entry of settings.toml",
                 )
             known[name] = replace(known[name], **values)

@@ -53,9 +53,9 @@ class Group:
     def __post_init__(self) -> None:
         for entry in fields(self):
             value = getattr(self, entry.name)
-            if isinstance(value, list):
-                value = tuple(value)
-                object.__setattr__(self, entry.name, value)
+            plain = value.tolist() if hasattr(value, "tolist") else value
+            value = tuple(plain) if isinstance(plain, list) else plain
+            object.__setattr__(self, entry.name, value)
             if value is not None or entry.default is not None:
                 _check(entry, value)
 
@@ -70,20 +70,28 @@ def _check(entry: Field[Any], value: Any) -> None:
         if value not in meta["choices"]:
             raise UsageError(
                 f"{option} has no such value",
-                found=f"{option} = {value}",
+                found=f"{option} = {_said(value)}",
                 expected=" | ".join(meta["choices"]),
             )
         return
     if meta["kind"] is bool:
         if not isinstance(value, bool):
-            raise UsageError(f"{option} is a switch", found=f"{option} = {value}", expected="true or false")
+            raise UsageError(f"{option} is a switch", found=f"{option} = {_said(value)}", expected="true or false")
         return
     values = value if isinstance(value, tuple) else (value,)
     if len(values) not in (meta["length"] or (1,)) or (isinstance(value, tuple) and not meta["length"]):
         counts = " or ".join(map(str, meta["length"] or ("one",)))
-        raise UsageError(f"{option} has too few or too many values", found=f"{option} = {value}", expected=counts)
+        raise UsageError(
+            f"{option} has too few or too many values", found=f"{option} = {_said(value)}", expected=counts
+        )
     if not all(_inside(meta, one) for one in values):
-        raise UsageError(f"{option} is outside its limits", found=f"{option} = {value}", expected=limits_of(entry))
+        raise UsageError(
+            f"{option} is outside its limits", found=f"{option} = {_said(value)}", expected=limits_of(entry)
+        )
+
+
+def _said(value: Any) -> str:
+    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def _inside(meta: Mapping[str, Any], value: Any) -> bool:

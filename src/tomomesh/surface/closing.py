@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import ResourceError
 from ..kernels.cells import label_components, spread
 from ..progress import Progress, silent
 from .neighbors import FACE_COLUMNS, column_of, dilate, neighbor_table
@@ -20,12 +21,17 @@ if TYPE_CHECKING:
 
 WIDEST = 8
 """Largest closing that is tried by itself, cubes."""
+MOST_CUBES = 10_000_000
+"""Cubes over which no wider closing is tried: their table of neighbors takes a gigabyte."""
 LEAKING = 1
 """Closing of a shell that none makes hold, as of a sheet or a thin slab: it fills single holes."""
 HELD = 0.5
 """Share of a component's occupied cubes that must be near the inside for the shell to hold."""
 NEAR = 2
-"""Steps from the inside within which an occupied cube counts as seeing it: noise may make a shell two cubes thick."""
+"""Steps, beyond twice the dilation, from enclosed space within which an occupied cube counts as near it: noise may
+make a shell two cubes thick, and a dilation leaves little of what is enclosed."""
+SOLID = 0.2
+"""Share of a component's cubes that must be surrounded by occupied ones for it to be a solid."""
 DEBRIS = 0.01
 """Components with less than this share of the occupied cubes have no say."""
 
@@ -43,7 +49,7 @@ class Shell:
     closing : int
         Cubes by which the shell was dilated and eroded.
     two_sided : float
-        Smallest share, over the components, of occupied cubes that are near the inside: near 1 where the
+        Smallest share, over the components, of occupied cubes that are near enclosed space: near 1 where the
         shell holds, near 0 where the outside leaks in and the surface would be two-walled.
     """
 
@@ -73,15 +79,27 @@ def close_shell(occupied: NDArray[np.int64], closing: int | None = None, progres
         Where no closing up to `WIDEST` holds, closed by `LEAKING`; see `Shell.holds`.
     """
     tried = range(WIDEST + 1) if closing is None else [closing]
+    dilated, reached = occupied, 0
     for count, steps in enumerate(tried):
         progress("closing", count, len(tried))
-        band = _Band.around(occupied, steps)
+        while reached < steps and len(dilated) <= MOST_CUBES:
+            dilated, reached = dilate(dilated, 1), reached + 1
+        if len(dilated) > MOST_CUBES:
+            break
+        band = _Band.around(occupied, dilated, steps)
         share = band.two_sided()
         if share >= HELD or closing is not None:
             progress("closing", count + 1, count + 1)
             return Shell(band.closed(), steps, share)
     progress("closing", len(tried), len(tried))
-    band = _Band.around(occupied, LEAKING)
+    if closing is not None:
+        raise ResourceError(
+            "the closing would take more cubes than fit",
+            found=f"--closing = {closing}",
+            expected=f"at most {MOST_CUBES} cubes",
+            hint="a larger --cell-mm or a smaller --closing",
+        )
+    band = _Band.around(occupied, dilate(occupied, LEAKING), LEAKING)
     return Shell(band.closed(), LEAKING, band.two_sided())
 
 
@@ -97,8 +115,7 @@ class _Band:
     steps: int
 
     @classmethod
-    def around(cls, occupied: NDArray[np.int64], steps: int) -> _Band:
-        inner = dilate(occupied, steps)
+    def around(cls, occupied: NDArray[np.int64], inner: NDArray[np.int64], steps: int) -> _Band:
         keys = dilate(inner, 1)
         table = neighbor_table(keys)
         dilated = np.isin(keys, inner, assume_unique=True)
@@ -123,20 +140,22 @@ class _Band:
         return self.keys[self.dilated & ~self.eroded()]
 
     def two_sided(self) -> float:
-        """Return the smallest share, over the components, of occupied cubes that are near the inside.
+        """Return the smallest share, over the components, of occupied cubes that are near enclosed space.
 
-        The inside is whatever is not occupied and shares no face with the outside, and the depth of a solid.
+        Only space that the dilation left empty counts: a closing makes small pockets within a wall, too. A
+        component counts in full where it is a solid, many of whose cubes are surrounded by others.
         """
-        outside = np.append(self.eroded(), False)
-        inside = ~self.occupied & ~outside[:-1] & ~outside[self.table[:, FACE_COLUMNS]].any(axis=1)
-        inside |= np.append(self.occupied, False)[self.table].all(axis=1)
-        depth = np.where(inside, 0, -1).astype(np.int32)
-        spread(self.table, self.occupied, depth, NEAR)
+        depth = np.where(~self.dilated & ~self.outside, 0, -1).astype(np.int32)
+        spread(self.table, self.dilated & ~self.eroded(), depth, 2 * self.steps + NEAR)
+        deep = np.append(self.occupied, False)[self.table].all(axis=1)
         labels = np.full(len(self.keys), -1, np.int32)
         label_components(self.table, self.dilated, labels)
         cubes = np.bincount(labels[self.occupied])
         seeing = np.bincount(labels[self.occupied], weights=depth[self.occupied] >= 0)
-        return float((seeing / np.maximum(cubes, 1))[cubes >= DEBRIS * cubes.sum()].min())
+        solid = np.bincount(labels[self.occupied], weights=deep[self.occupied]) >= SOLID * cubes
+        heard = np.asarray(cubes >= min(DEBRIS * cubes.sum(), cubes.max()))
+        share = np.asarray(np.maximum(seeing / np.maximum(cubes, 1), solid))
+        return float(share[heard].min())
 
 
 def _outer_layer(table: NDArray[np.int32], dilated: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -149,7 +149,7 @@ class _Motion:
             )  # fmt: skip
 
         in_blocks(work, len(self.position), block=BLOCK, threads=self.threads)
-        moves = (found != self.nearest) & ((found != self.left) | (found < 0))
+        moves = (found != self.nearest) & (found != self.left)
         self.left = np.where(moves, self.nearest, self.left)
         self.nearest = np.where(moves, found, self.nearest)
         self.cube = np.where(self.nearest >= 0, self.cube_of_point[self.nearest], self.cube)

@@ -1,0 +1,60 @@
+"""The public names, and the example of the README."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tomomesh
+from tomomesh.errors import UsageError
+from tomomesh.segment.region import train_region
+from tomomesh.segment.signal import pixels_of
+from tomomesh.segment.study import train_study
+from tomomesh.settings import NetworkSettings
+
+
+def test_names_stay_functions_whatever_modules_are_imported() -> None:
+    import tomomesh.phantom
+    import tomomesh.segment.som
+
+    assert callable(tomomesh.phantom)
+    assert callable(tomomesh.segment)
+    assert set(dir(tomomesh)) == set(tomomesh.__all__)
+    for name in tomomesh.__all__:
+        assert getattr(tomomesh, name) is not None
+    with pytest.raises(AttributeError, match="nothing"):
+        tomomesh.nothing  # noqa: B018
+
+
+def test_the_readmes_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    example = re.search(r"```python\n(.*?)```", readme, re.DOTALL)
+    assert example is not None
+    monkeypatch.chdir(tmp_path)
+    exec(example[1], {})
+    assert (tmp_path / "skull.ply").exists()
+
+
+def test_what_is_no_study_is_refused() -> None:
+    with pytest.raises(UsageError, match="from_stored"):
+        tomomesh.reconstruct(np.zeros((5, 9, 9)))  # type: ignore[arg-type]
+
+
+def test_a_picture_is_trained_as_its_slice_is() -> None:
+    row, column = np.mgrid[:80, :80] - 39.5
+    band = np.abs(np.hypot(row / 30, column / 25) - 1) < 0.1
+    settings = NetworkSettings(neurons=40, signal="region", even=False)
+    slices = train_study(band[None], settings)
+    picture = train_region(pixels_of(band), settings)
+    np.testing.assert_allclose(picture.codebook, slices.codebooks[0], atol=1e-9)
+
+
+def test_numpy_numbers_are_numbers() -> None:
+    settings = tomomesh.Settings().replace(
+        smoothing=np.int64(2), stiffness=np.float32(0.5), cell_mm=np.array([2.0, 3.0, 5.0])
+    )
+    assert settings.cubes.smoothing == 2
+    assert settings.cubes.cell_mm == (2.0, 3.0, 5.0)
