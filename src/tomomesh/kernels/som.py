@@ -54,7 +54,8 @@ def train_online(
     Finite inputs, at most 16,383 neurons. Non-negative floats order as the integers that spell them, and a
     minimum of integers vectorizes: so the number of each neuron rides in the last bits of its distance. Of
     neurons that are equally near (within 4e-12 of the squared distance) the lowest number wins. Two axes at
-    least; the first two in one pass save the loads and stores of a second.
+    least; the first two in one pass save the loads and stores of a second. One exponential a presentation gives
+    the Gaussian: from hop k to k + 1 it falls by q^(2k + 1), q = exp(-1 / 2 radius^2).
     """
     d, u = codebook.shape
     farthest = within.shape[1] - 1
@@ -77,8 +78,11 @@ def train_online(
         reach = min(int(6.0 * radius[t] if gaussian else radius[t]), farthest)
         weight[: reach + 1] = alpha[t]
         if gaussian:
+            ratio = square = np.exp(-0.5 / max(radius[t] * radius[t], 1e-12))
+            square *= square
             for hop in range(1, reach + 1):
-                weight[hop] *= np.exp(-0.5 * (hop / radius[t]) ** 2)
+                weight[hop] = weight[hop - 1] * ratio
+                ratio *= square
         near = nearest_first[c, : within[c, reach]]
         apart = hops[c]
         for axis in range(d):

@@ -147,7 +147,7 @@ class _Band:
         """
         depth = np.where(~self.dilated & ~self.outside, 0, -1).astype(np.int32)
         spread(self.table, self.dilated & ~self.eroded(), depth, 2 * self.steps + NEAR)
-        deep = np.append(self.occupied, False)[self.table].all(axis=1)
+        deep = np.asarray(np.append(self.occupied, False)[self.table].all(axis=1))
         labels = np.full(len(self.keys), -1, np.int32)
         label_components(self.table, self.dilated, labels)
         cubes = np.bincount(labels[self.occupied])
