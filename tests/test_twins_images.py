@@ -98,6 +98,12 @@ class TestHistogram:
         assert histogram(levels, float(limits.min), float(limits.max), 2).sum() == 4
         assert histogram(levels, float(limits.min), float(limits.max), 2)[-1] >= 2
 
+    def test_a_few_far_levels_change_little(self) -> None:
+        rng = np.random.default_rng(0)
+        levels = np.concatenate([rng.normal(10, 2, 60_000), rng.normal(60, 5, 40_000)])
+        alone = otsu_threshold(levels)
+        assert otsu_threshold(np.append(levels, [1e30, -1e20, np.nan, np.inf])) == pytest.approx(alone, abs=3)
+
 
 class TestWindow:
     @law(80)

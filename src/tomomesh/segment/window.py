@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 PRESETS_HU = {"bone": (300.0, np.inf), "skin": (-300.0, np.inf)}
 """Windows for CT, Hounsfield units."""
+PILED, SPAN = 0.999, (0.01, 99.99)
+"""Share of the levels in one bin over which a histogram tells nothing, and the percentiles that it then spans."""
 
 
 def window(volume: Volume, *, lower: float = -np.inf, upper: float = np.inf) -> NDArray[np.bool_]:
@@ -85,9 +87,10 @@ def otsu_threshold(levels: NDArray[Any], *, bins: int = 256) -> float:
     Parameters
     ----------
     levels : array
-        Finite gray levels of any shape.
+        Gray levels of any shape; those that are not finite do not count.
     bins : int
-        Bins of the histogram between the lowest and the highest level.
+        Bins of the histogram between the lowest and the highest level; between the percentiles `SPAN` where a
+        few far levels pile all others up in one bin.
 
     Returns
     -------
@@ -99,6 +102,10 @@ def otsu_threshold(levels: NDArray[Any], *, bins: int = 256) -> float:
     if low == high:
         return low
     counts = histogram(levels, low, high, bins)
+    if counts.max() > PILED * counts.sum():
+        inner = np.percentile(levels, SPAN)
+        low, high = inner if inner[0] < inner[1] else (low, high)
+        counts = histogram(levels, low, high, bins)
     middles = low + (np.arange(bins) + 0.5) * (high - low) / bins
     below = np.cumsum(counts)[:-1]
     above = counts.sum() - below
