@@ -40,8 +40,9 @@ def dots(
 
 
 def lines(ax: Axes, segments: Floats, *, color: str, width: float, style: str = "-") -> None:
-    """Draw (n, 2, 2) segments."""
-    ax.add_collection(LineCollection(list(segments), colors=color, linewidths=width, linestyles=style))
+    """Draw (n, 2, 2) segments over what was marked before them."""
+    collection = LineCollection(list(segments), colors=color, linewidths=width, linestyles=style, zorder=3)
+    ax.add_collection(collection)
 
 
 def fill(ax: Axes, polygons: Floats, *, color: Any, edge: str = "face", width: float = 0.3) -> None:
