@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-COUNT = size(1200, 500)
+COUNT = size(1200, 600)
 
 
 def bytes_of(surface: Surface) -> tuple[bytes, bytes]:
