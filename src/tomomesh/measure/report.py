@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from ..model.points import PointSet
 from .distance import distance_to_surface, spread_of
 from .shape import triangle_shapes
-from .topology import distinct_positions, face_volumes, topology, welded
+from .topology import distinct_positions, topology, welded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,7 +53,7 @@ def assess(
     found: dict[str, Any] = {"vertices": len(mesh.vertices), "faces": len(mesh.faces), **asdict(counts)}
     found |= {"closed": counts.boundary_edges == 0, "sound": counts.sound, "sound_after_welding": again.sound}
     found["area_mm2"] = float(mesh.face_areas.sum())
-    found["volume_mm3"] = float(face_volumes(mesh).sum())
+    found["volume_mm3"] = float(mesh.face_volumes.sum())
     found |= triangle_shapes(mesh)
     if points is not None:
         points = points.positions if isinstance(points, PointSet) else points

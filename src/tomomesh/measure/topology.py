@@ -90,7 +90,7 @@ def topology(mesh: TriMesh, *, cavities: int = 0) -> Topology:
     label = face_components(mesh)
     components = int(label.max(initial=-1)) + 1
     euler = len(used) - len(uses) + len(mesh.faces)
-    volumes = np.bincount(label, face_volumes(mesh), components)
+    volumes = np.bincount(label, mesh.face_volumes, components)
     return Topology(
         components=components,
         euler_number=int(euler),
@@ -111,12 +111,6 @@ def face_components(mesh: TriMesh) -> NDArray[np.int64]:
     if len(mesh.faces) == 0:
         return np.empty(0, np.int64)
     return np.unique(label[mesh.faces[:, 0]], return_inverse=True)[1].astype(np.int64)
-
-
-def face_volumes(mesh: TriMesh) -> NDArray[np.float64]:
-    """Return the signed volume under each face, (m,); their sum is the volume of a closed mesh."""
-    center = mesh.vertices.mean(axis=0) if len(mesh.vertices) else np.zeros(3)
-    return np.asarray(((mesh.corners[:, 0] - center) * mesh.face_vectors).sum(axis=1) / 6)
 
 
 def _fans(mesh: TriMesh, edge: NDArray[np.int64]) -> int:

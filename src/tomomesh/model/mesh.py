@@ -48,6 +48,12 @@ class TriMesh:
         return np.asarray(0.5 * np.sqrt((self.face_vectors**2).sum(axis=1)))
 
     @cached_property
+    def face_volumes(self) -> NDArray[np.float64]:
+        """Signed volume under each face, (m,); their sum is the volume of a closed mesh."""
+        center = self.vertices.mean(axis=0) if len(self.vertices) else np.zeros(3)
+        return np.asarray(((self.corners[:, 0] - center) * self.face_vectors).sum(axis=1) / 6)
+
+    @cached_property
     def half_edges(self) -> NDArray[np.int64]:
         """Directed edges, three a face, (3m, 2)."""
         return self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -55,10 +61,7 @@ class TriMesh:
     @cached_property
     def edges(self) -> NDArray[np.int64]:
         """Undirected edges, smaller vertex first, sorted, each once, (e, 2)."""
-        n = max(len(self.vertices), 1)
-        low, high = self.half_edges.min(axis=1), self.half_edges.max(axis=1)
-        keys = np.unique(low * n + high)
-        return np.stack([keys // n, keys % n], axis=1)
+        return _once_each(self.half_edges, len(self.vertices))
 
     @cached_property
     def vertex_normals(self) -> NDArray[np.float64]:
@@ -95,10 +98,7 @@ class QuadMesh:
     @cached_property
     def edges(self) -> NDArray[np.int64]:
         """Undirected sides of the squares, each once, (e, 2)."""
-        n = max(len(self.vertices), 1)
-        ends = self.quads[:, [0, 1, 1, 2, 2, 3, 3, 0]].reshape(-1, 2)
-        keys = np.unique(ends.min(axis=1) * n + ends.max(axis=1))
-        return np.stack([keys // n, keys % n], axis=1)
+        return _once_each(self.quads[:, [0, 1, 1, 2, 2, 3, 3, 0]].reshape(-1, 2), len(self.vertices))
 
     @cached_property
     def vertex_cubes(self) -> NDArray[np.int64]:
@@ -109,3 +109,10 @@ class QuadMesh:
     def triangulated(self) -> TriMesh:
         """Split each square by its diagonal 0-2 (the paper's systematic triangulation, Fig. 8b)."""
         return TriMesh(self.vertices, self.quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3))
+
+
+def _once_each(directed: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Return the undirected edges under directed ones (h, 2) of so many vertices, sorted, (e, 2)."""
+    n = max(count, 1)
+    keys = np.unique(directed.min(axis=1) * n + directed.max(axis=1))
+    return np.stack([keys // n, keys % n], axis=1)

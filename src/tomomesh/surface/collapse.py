@@ -11,8 +11,6 @@ from scipy.spatial import cKDTree
 from .smooth import adjacency
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from ..model.mesh import TriMesh
 
 CLOSE = 1e-4
@@ -42,7 +40,9 @@ def without_collapse(smoothed: TriMesh, fitted: TriMesh) -> tuple[TriMesh, int]:
         Components taken back to their smoothed shape.
     """
     count, label = connected_components(adjacency(smoothed.edges, len(smoothed.vertices)), directed=False)
-    turned = _volumes(smoothed, label, count) * _volumes(fitted, label, count) <= 0
+    owner = label[smoothed.faces[:, 0]]
+    before, after = (np.bincount(owner, mesh.face_volumes, count) for mesh in (smoothed, fitted))
+    turned = before * after <= 0
     vertices = np.where(turned[label][:, None], smoothed.vertices, fitted.vertices)
     ends = smoothed.vertices[smoothed.edges]
     close = CLOSE * float(np.median(np.sqrt(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1))))
@@ -52,10 +52,3 @@ def without_collapse(smoothed: TriMesh, fitted: TriMesh) -> tuple[TriMesh, int]:
             break
         vertices[meeting] += BACK * (smoothed.vertices[meeting] - vertices[meeting])
     return fitted.moved(vertices), int(turned.sum())
-
-
-def _volumes(mesh: TriMesh, label: NDArray[np.int32], count: int) -> NDArray[np.float64]:
-    """Return the signed volume of each component, up to a factor of 6."""
-    middle = mesh.vertices.mean(axis=0)
-    under = ((mesh.corners[:, 0] - middle) * mesh.face_vectors).sum(axis=1)
-    return np.bincount(label[mesh.faces[:, 0]], under, count).astype(np.float64)
