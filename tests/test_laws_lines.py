@@ -182,7 +182,7 @@ def stack(rings_: list[Floats], slices: list[int], spacing: tuple[float, float, 
     gaps = np.stack([bridged_edges(ring, graph, 2.0) for ring in rings_])
     count = len(rings_)
     none = np.zeros(count, np.int64)
-    networks = Networks(graph, np.array(slices, np.int32), codebooks, gaps, none > 0, none, none)
+    networks = Networks(graph, np.array(slices, np.int32), codebooks, gaps, False, none, none)
     return networks, Volume.from_stored(np.zeros((max(slices) + 1, 9, 9)), np.diag([*spacing, 1.0]))
 
 

@@ -75,7 +75,7 @@ def networks(study: dict[str, NDArray[np.float64]]) -> Networks:
     books = np.stack([study["codebook"]] * 3)
     gaps = np.zeros((3, 16), bool)
     gaps[1, [2, 7]] = True
-    return Networks(lattice("ring", 16), np.arange(3, dtype=np.int32), books, gaps, nothing > 0, nothing, nothing)
+    return Networks(lattice("ring", 16), np.arange(3, dtype=np.int32), books, gaps, False, nothing, nothing)
 
 
 @pytest.fixture(scope="module")

@@ -103,7 +103,7 @@ class Account:
             "topology": networks.lattice.name,
             "neurons": len(networks.lattice),
             "trained": len(networks.slices),
-            "signal": "boundary" if networks.outlined.all() else "region",
+            "signal": "boundary" if networks.outlined else "region",
             "pixels": int(networks.pixels.sum()),
             "strays": int(networks.strays.sum()),
             "slices_without": without.tolist(),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..measure.topology import FAULTS
+
 BARS = " ▁▂▃▄▅▆▇█"
 
 
@@ -95,15 +97,6 @@ def of_check(report: dict[str, Any]) -> list[str]:
             f"largest {report['back_max_mm']:.4g}",
         ]
     return lines
-
-
-FAULTS = (
-    "boundary_edges",
-    "nonmanifold_edges",
-    "nonmanifold_vertices",
-    "misoriented_edges",
-    "inward_components",
-)
 
 
 def _of_stage_one(report: dict[str, Any]) -> list[str]:

@@ -15,6 +15,9 @@ from ..model.mesh import TriMesh
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+FAULTS = ("boundary_edges", "nonmanifold_edges", "nonmanifold_vertices", "misoriented_edges", "inward_components")
+"""The counts that are 0 on a closed, outward 2-manifold."""
+
 
 @dataclass(frozen=True)
 class Topology:
@@ -52,14 +55,7 @@ class Topology:
     @property
     def faults(self) -> dict[str, int]:
         """Return the counts that are 0 on a closed, outward 2-manifold."""
-        names = (
-            "boundary_edges",
-            "nonmanifold_edges",
-            "nonmanifold_vertices",
-            "misoriented_edges",
-            "inward_components",
-        )
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in FAULTS}
 
     @property
     def sound(self) -> bool:

@@ -26,8 +26,8 @@ class Networks:
         Positions of the neurons as voxel indices (column i, row j) within their slice.
     bridged : (s, e) bool array
         Edges of the lattice that cross a gap in the pixels.
-    outlined : (s,) bool array
-        Whether the network saw the outline of the filled window, not the window's pixels.
+    outlined : bool
+        Whether the networks saw the outline of the filled window, not the window's pixels.
     pixels : (s,) int64 array
         Pixels presented.
     strays : (s,) int64 array
@@ -38,6 +38,6 @@ class Networks:
     slices: NDArray[np.int32]
     codebooks: NDArray[np.float64]
     bridged: NDArray[np.bool_]
-    outlined: NDArray[np.bool_]
+    outlined: bool
     pixels: NDArray[np.int64]
     strays: NDArray[np.int64]

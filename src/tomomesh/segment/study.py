@@ -89,7 +89,7 @@ def train_study(
         slices,
         codebooks[trained],
         bridged[trained],
-        np.full(len(slices), outlined),
+        outlined,
         pixels[trained],
         strays[trained],
     )
