@@ -82,7 +82,8 @@ def fit(
     -------
     Fit
     """
-    motion = _Motion(vertices, edges, cubes, points, grid, settings, threads)
+    position, targets = (np.ascontiguousarray(places - grid.origin) for places in (vertices, points))
+    motion = _Motion(position, targets, edges, cubes.astype(np.int32), grid, settings, threads)
     most = settings.max_steps
     while len(motion.history) < most and not motion.rests():
         motion.advance()
@@ -94,31 +95,28 @@ def fit(
     return Fit(np.asarray(grid.origin + motion.position), motion.nearest, trace)
 
 
+@dataclass
 class _Motion:
     """Positions and velocities of the vertices, relative to the grid's origin, and one step of Euler's."""
 
-    def __init__(
-        self,
-        vertices: NDArray[np.float64],
-        edges: NDArray[np.int64],
-        cubes: NDArray[np.int64],
-        points: NDArray[np.float64],
-        grid: CubeGrid,
-        settings: FitSettings,
-        threads: int,
-    ) -> None:
-        self.grid, self.settings, self.threads, self.edges = grid, settings, threads, edges
-        self.position = np.ascontiguousarray(vertices - grid.origin)
+    position: NDArray[np.float64]
+    points: NDArray[np.float64]
+    edges: NDArray[np.int64]
+    cube: NDArray[np.int32]
+    grid: CubeGrid
+    settings: FitSettings
+    threads: int
+
+    def __post_init__(self) -> None:
+        count, grid = len(self.position), self.grid
         self.velocity = np.zeros_like(self.position)
-        self.points = np.ascontiguousarray(points - grid.origin)
-        self.springs = adjacency(edges, len(vertices))
+        self.springs = adjacency(self.edges, count)
         self.degree = np.diff(self.springs.indptr)[:, None]
-        self.stiffness = settings.stiffness / max(self.degree.mean(), 1.0)
+        self.stiffness = self.settings.stiffness / max(self.degree.mean(), 1.0)
         self.table = neighbor_table(grid.keys)
-        self.cube = cubes.astype(np.int32)
-        self.cube_of_point = np.empty(len(points), np.int32)
+        self.cube_of_point = np.empty(len(self.points), np.int32)
         self.cube_of_point[grid.order] = np.repeat(np.arange(len(grid.keys)), np.diff(grid.start))
-        self.nearest = np.full(len(vertices), -1, np.int32)
+        self.nearest = np.full(count, -1, np.int32)
         self.left = self.nearest
         self.edge = float(grid.cell_mm.min())
         self.history: list[tuple[float, ...]] = []
