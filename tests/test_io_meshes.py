@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from hypothesis.extra import numpy as hnp
 
 from studies import shared
 from tomomesh.errors import EmptyError, FormatError, OutputError, UsageError
-from tomomesh.io import read_mesh, write_mesh
+from tomomesh.io import read_mesh, read_points, write_mesh
 from tomomesh.io.weld import weld
 from tomomesh.model.mesh import TriMesh
 
@@ -29,6 +29,14 @@ def ball(shift: float = 0.0) -> TriMesh:
 
 def as_single(mesh: TriMesh) -> TriMesh:
     return mesh.moved(mesh.vertices.astype(np.float32).astype(np.float64))
+
+
+def fields_of(mesh: TriMesh) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return fields at the vertices and on the faces, the colors first."""
+    rng, n, m = np.random.default_rng(3), len(mesh.vertices), len(mesh.faces)
+    colors = {name: rng.integers(0, 256, n).astype(np.uint8) for name in ("red", "green", "blue")}
+    others = {"intensity": rng.random(n).astype(np.float32), "flow": rng.normal(size=(n, 2))}
+    return {**colors, **others}, {"filled": rng.random(m) < 0.5, "gray level": rng.integers(-9, 9, m)}
 
 
 class TestWrite:
@@ -87,10 +95,68 @@ class TestWrite:
         assert (faces[:, 0] == 3).all()
         np.testing.assert_array_equal(faces[:, 1:], mesh.faces)
 
+    def test_ply_holds_the_fields_of_vertices_and_faces(self, tmp_path: Path) -> None:
+        mesh = ball()
+        at_vertices, on_faces = fields_of(mesh)
+        write_mesh(mesh, tmp_path / "m.ply", vertex_fields=at_vertices, face_fields=on_faces)
+        head = (tmp_path / "m.ply").read_bytes().partition(b"end_header\n")[0].decode()
+        assert [line for line in head.splitlines() if line.startswith("property")] == [
+            *(f"property double {axis}" for axis in "xyz"),
+            *(f"property uchar {name}" for name in ("red", "green", "blue")),
+            "property float intensity",
+            "property double flow_0",
+            "property double flow_1",
+            "property list uchar int vertex_indices",
+            "property uchar filled",
+            "property int gray_level",
+        ]
+        judge = trimesh.load(tmp_path / "m.ply", process=False)
+        np.testing.assert_array_equal(judge.triangles, mesh.corners)
+        np.testing.assert_array_equal(
+            judge.visual.vertex_colors[:, :3], np.stack(list(at_vertices.values())[:3], axis=1)
+        )
+        rows = {name: element["data"] for name, element in judge.metadata["_ply_raw"].items()}
+        np.testing.assert_array_equal(rows["vertex"]["intensity"], at_vertices["intensity"])
+        np.testing.assert_array_equal(rows["vertex"]["flow_1"], at_vertices["flow"][:, 1])
+        np.testing.assert_array_equal(rows["face"]["filled"], on_faces["filled"])
+        np.testing.assert_array_equal(rows["face"]["gray_level"], on_faces["gray level"])
+        np.testing.assert_array_equal(read_mesh(tmp_path / "m.ply").corners, mesh.corners)
+        attributes = read_points(tmp_path / "m.ply").attributes
+        np.testing.assert_array_equal(attributes["flow_0"], at_vertices["flow"][:, 0])
+
+    def test_obj_holds_the_colors(self, tmp_path: Path) -> None:
+        mesh = ball()
+        at_vertices, on_faces = fields_of(mesh)
+        write_mesh(mesh, tmp_path / "m.obj", vertex_fields=at_vertices, face_fields=on_faces)
+        colors = np.stack(list(at_vertices.values())[:3], axis=1)
+        judge = trimesh.load(tmp_path / "m.obj", process=False)
+        np.testing.assert_array_equal(judge.visual.vertex_colors[:, :3], colors)
+        np.testing.assert_array_equal(judge.triangles, mesh.corners)
+        points = read_points(tmp_path / "m.obj")
+        np.testing.assert_array_equal(points.positions, mesh.vertices)
+        np.testing.assert_array_equal(np.stack(list(points.attributes.values()), axis=1), colors)
+
+    def test_stl_and_a_mesh_without_colors_are_as_before(self, tmp_path: Path) -> None:
+        mesh = ball()
+        at_vertices, on_faces = fields_of(mesh)
+        for suffix, fields in ((".stl", at_vertices), (".obj", {"intensity": at_vertices["intensity"]})):
+            write_mesh(mesh, tmp_path / f"a{suffix}")
+            write_mesh(mesh, tmp_path / f"b{suffix}", vertex_fields=fields, face_fields=on_faces)
+            assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+    def test_fields_that_do_not_fit_are_refused(self, tmp_path: Path) -> None:
+        mesh = ball()
+        with pytest.raises(UsageError, match="a field does not fit"):
+            write_mesh(mesh, tmp_path / "m.ply", vertex_fields={"intensity": np.zeros(len(mesh.faces))})
+        with pytest.raises(UsageError, match="a field does not fit"):
+            write_mesh(mesh, tmp_path / "m.ply", face_fields={"name": np.array(["a"] * len(mesh.faces))})
+        assert list(tmp_path.iterdir()) == []
+
     @pytest.mark.parametrize("suffix", [".ply", ".obj", ".stl"])
     def test_the_bytes_repeat(self, tmp_path: Path, suffix: str) -> None:
         for name in ("a", "b"):
-            write_mesh(ball(), tmp_path / f"{name}{suffix}")
+            at_vertices, on_faces = fields_of(ball())
+            write_mesh(ball(), tmp_path / f"{name}{suffix}", vertex_fields=at_vertices, face_fields=on_faces)
         assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
         assert b"unit=mm frame=LPS" in (tmp_path / f"a{suffix}").read_bytes()[:200]
 

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 from scipy.optimize import LinearConstraint, minimize
+from scipy.spatial import cKDTree
 
 from conftest import law, seeds, size, sphere
 from tomomesh.kernels.cells import label_components, nearest_points
@@ -19,6 +20,8 @@ from tomomesh.kernels.triangles import squared_distance
 from tomomesh.measure.distance import distance_to_surface, spread_of
 from tomomesh.measure.report import area_samples, assess, compare
 from tomomesh.measure.shape import triangle_shapes
+from tomomesh.measure.topology import welded
+from tomomesh.measure.tree import Tree
 from tomomesh.model.cubes import cells_of
 from tomomesh.model.mesh import TriMesh
 from tomomesh.surface.neighbors import neighbor_table
@@ -93,13 +96,17 @@ class TestComponents:
         np.testing.assert_array_equal(labels + 1, wanted[z, y, x])
 
 
+def squared(point: Floats, corners: Floats) -> float:
+    return float(squared_distance(point[None], 0, np.ascontiguousarray(corners), np.arange(3, dtype=np.int32)[None], 0))
+
+
 class TestSquaredDistance:
     @law(80)
     @given(mesh=soups(), seed=seeds)
     def test_is_the_least_over_the_triangle(self, mesh: TriMesh, seed: int) -> None:
         point = np.random.default_rng(seed).normal(size=3) * 4
-        corners = np.ascontiguousarray(mesh.corners[0])
-        found = squared_distance(point, corners)
+        corners = mesh.corners[0]
+        found = squared(point, corners)
 
         def off(weights: Floats) -> float:
             return float(((np.append(weights, 1 - weights.sum()) @ corners - point) ** 2).sum())
@@ -116,18 +123,51 @@ class TestSquaredDistance:
     @given(mesh=soups(), seed=seeds)
     def test_does_not_depend_on_the_order_of_the_corners(self, mesh: TriMesh, seed: int) -> None:
         point = np.random.default_rng(seed).normal(size=3) * 4
-        corners = mesh.corners[0]
-        turned = [squared_distance(point, corners[list(o)].copy()) for o in ((0, 1, 2), (1, 2, 0), (2, 1, 0))]
+        turned = [squared(point, mesh.corners[0][list(o)]) for o in ((0, 1, 2), (1, 2, 0), (2, 1, 0))]
         np.testing.assert_allclose(turned, turned[0], rtol=1e-9, atol=1e-12)
 
 
 class TestDistance:
     @law(60)
-    @given(mesh=soups(), seed=seeds)
-    def test_is_exact(self, mesh: TriMesh, seed: int) -> None:
-        points = np.random.default_rng(seed).normal(size=(15, 3)) * 6
-        brute = [min(squared_distance(p, np.ascontiguousarray(c)) for c in mesh.corners) for p in points]
-        np.testing.assert_allclose(distance_to_surface(points, mesh), np.sqrt(brute), rtol=1e-12)
+    @given(mesh=soups(), seed=seeds, far=st.sampled_from([0.5, 6, 1e4]))
+    def test_is_exact(self, mesh: TriMesh, seed: int, far: float) -> None:
+        points = np.random.default_rng(seed).normal(size=(15, 3)) * far
+        brute = np.array([[squared(p, c) for c in mesh.corners] for p in points])
+        distance, face = Tree.of_faces(mesh).nearest(points)
+        np.testing.assert_allclose(distance, np.sqrt(brute.min(axis=1)), rtol=1e-12)
+        np.testing.assert_allclose(brute[np.arange(15), face], brute.min(axis=1), rtol=1e-12)
+        assert distance_to_surface(points, mesh).tobytes() == distance.tobytes()
+
+    @law(40)
+    @given(seed=seeds, count=st.integers(1, 60), whole=st.booleans())
+    def test_of_points_is_scipy_s(self, seed: int, count: int, whole: bool) -> None:
+        rng = np.random.default_rng(seed)
+        points, asked = rng.normal(size=(count, 3)), rng.normal(size=(30, 3)) * 2
+        points = np.round(points) if whole else points
+        distance, number = Tree.of_points(points).nearest(asked)
+        np.testing.assert_allclose(distance, cKDTree(points).query(asked)[0], rtol=1e-12)
+        np.testing.assert_allclose(distance, np.linalg.norm(points[number] - asked, axis=1), rtol=1e-12)
+
+    @law(20)
+    @given(seed=seeds)
+    def test_a_tree_holds_every_face_once_and_boxes_hold_their_own(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        m = int(rng.integers(1, 300))
+        mesh = TriMesh(rng.normal(size=(40, 3)) * 10 ** rng.uniform(-3, 3, (40, 1)), rng.integers(0, 40, (m, 3)))
+        tree = Tree.of_faces(mesh)
+        np.testing.assert_array_equal(np.sort(tree.order), np.arange(m))
+        np.testing.assert_array_equal(tree.simplices, mesh.faces[tree.order])
+        low, high = tree.boxes[2::2], tree.boxes[3::2]
+        assert (low[0] == mesh.corners.min(axis=(0, 1))).all()
+        assert (high[0] == mesh.corners.max(axis=(0, 1))).all()
+        parent = (np.arange(2, 2 * tree.leaves) // 2) - 1
+        assert (low[parent] <= low[1:]).all()
+        assert (high[parent] >= high[1:]).all()
+        begin = np.arange(tree.leaves + 1) * m // tree.leaves
+        leaf = np.searchsorted(begin, np.arange(m), side="right") - 2 + tree.leaves
+        corners = mesh.corners[tree.order]
+        assert (low[leaf] <= corners.min(axis=1)).all()
+        assert (high[leaf] >= corners.max(axis=1)).all()
 
     @law(20)
     @given(seed=seeds)
@@ -137,11 +177,26 @@ class TestDistance:
         _, wanted, _ = trimesh.proximity.closest_point_naive(trimesh.Trimesh(mesh.vertices, mesh.faces), points)
         np.testing.assert_allclose(distance_to_surface(points, mesh), wanted, atol=1e-9)
 
-    def test_is_the_same_in_blocks(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_is_the_same_on_any_number_of_threads_and_nearly_so_in_other_blocks(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         points, mesh = sphere(100, 2.0), icosphere()
         whole = distance_to_surface(points, mesh)
-        monkeypatch.setattr("tomomesh.measure.distance.BLOCK", 7)
-        assert distance_to_surface(points, mesh).tobytes() == whole.tobytes()
+        monkeypatch.setattr("tomomesh.measure.tree.BLOCK", 70)
+        one, three = (distance_to_surface(points, mesh, threads=threads) for threads in (1, 3))
+        assert one.tobytes() == three.tobytes()
+        np.testing.assert_allclose(one, whole, rtol=1e-12)
+
+    def test_tells_how_far_it_is_and_may_be_stopped(self) -> None:
+        told = []
+        distance_to_surface(sphere(100), icosphere(), progress=lambda *now: told.append(now))
+        assert told[-1] == ("distances", 100, 100)
+
+        def stop(_stage: str, _done: int, _total: int) -> None:
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            distance_to_surface(sphere(100), icosphere(), progress=stop)
 
     def test_of_no_points_is_nothing(self) -> None:
         assert distance_to_surface(np.empty((0, 3)), icosphere()).shape == (0,)
@@ -182,20 +237,38 @@ class TestShapes:
         found = triangle_shapes(mesh)
         lengths = np.linalg.norm(mesh.corners - np.roll(mesh.corners, 1, axis=1), axis=2)
         assert found["shortest_edge_mm"] == pytest.approx(lengths.min())
+        assert found["p5_edge_mm"] == pytest.approx(np.percentile(lengths, 5))
         assert found["median_edge_mm"] == pytest.approx(np.median(lengths))
+        assert found["p95_edge_mm"] == pytest.approx(np.percentile(lengths, 95))
         assert found["longest_edge_mm"] == pytest.approx(lengths.max())
         thick = judge.area_faces > 1e-9
         if thick.all():
-            smallest = np.degrees(judge.face_angles.min(axis=1))
-            assert found["smallest_angle_deg"] == pytest.approx(smallest.min(), abs=1e-3)
-            assert found["mean_smallest_angle_deg"] == pytest.approx(smallest.mean(), abs=1e-3)
+            angles = np.degrees(judge.face_angles)
+            assert found["smallest_angle_deg"] == pytest.approx(angles.min(), abs=1e-3)
+            assert found["p5_smallest_angle_deg"] == pytest.approx(np.percentile(angles.min(axis=1), 5), abs=1e-3)
+            assert found["mean_smallest_angle_deg"] == pytest.approx(angles.min(axis=1).mean(), abs=1e-3)
+            assert found["largest_angle_deg"] == pytest.approx(angles.max(), abs=1e-3)
         assert 0 <= found["mean_aspect"] <= 1
+        assert found["mean_turn_deg"] == found["largest_turn_deg"] == 0
+
+    @law(20)
+    @given(seed=seeds)
+    def test_turns_are_trimesh_s(self, seed: int) -> None:
+        mesh = icosphere()
+        rough = mesh.moved(mesh.vertices * np.random.default_rng(seed).uniform(0.7, 1.3, (len(mesh.vertices), 1)))
+        angles = np.degrees(trimesh.Trimesh(rough.vertices, rough.faces, process=False).face_adjacency_angles)
+        found = triangle_shapes(rough)
+        assert found["mean_turn_deg"] == pytest.approx(angles.mean())
+        assert found["largest_turn_deg"] == pytest.approx(angles.max())
+        flipped = np.where(np.arange(len(rough.faces))[:, None] == 3, rough.faces[:, ::-1], rough.faces)
+        assert triangle_shapes(TriMesh(rough.vertices, flipped)) == pytest.approx(found)
 
     def test_of_an_equilateral_triangle_are_perfect(self) -> None:
         one = TriMesh(np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 1, 2]]))
         found = triangle_shapes(one)
         assert found["mean_aspect"] == pytest.approx(1)
         assert found["smallest_angle_deg"] == pytest.approx(60)
+        assert found["largest_angle_deg"] == pytest.approx(60)
 
 
 class TestAssess:
@@ -209,9 +282,74 @@ class TestAssess:
         assert found["closed"] == judge.is_watertight
         assert found["sound"]
         assert found["sound_after_welding"]
+        assert found["self_intersections"] == 0
         assert found["points_to_surface_mean_mm"] < size(0.1, 1.0)
         assert found["vertices_to_points_max_mm"] < 3
         assert found["mean_mm"] == pytest.approx(1, abs=size(0.05, 0.5))
+
+    def test_a_single_component_is_the_mesh(self) -> None:
+        found = assess(icosphere(2.0), points=sphere(100, 2.2))
+        (only,) = found["per_component"]
+        assert found["components_not_listed"] == 0
+        assert only.pop("points") == 100
+        assert only.pop("area_mm2") == pytest.approx(found["area_mm2"])
+        assert only.pop("volume_mm3") == pytest.approx(found["volume_mm3"])
+        assert only == {key: found[key] for key in only}
+
+    @law(12)
+    @given(seed=seeds)
+    def test_components_are_those_of_each_alone(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        torus = trimesh.creation.torus(4.0, 1.0, major_sections=12, minor_sections=8)
+        ring = TriMesh(np.array(torus.vertices), np.array(torus.faces, np.int64))
+        parts = [ring, icosphere(), TriMesh(icosphere().vertices * 2, icosphere().faces[1:])]
+        parts = [part.moved(part.vertices + 12 * n) for n, part in enumerate(parts)]
+        begin = np.cumsum([0] + [len(part.vertices) for part in parts])
+        faces = np.concatenate([part.faces + n for part, n in zip(parts, begin[:-1], strict=True)])
+        number = rng.permutation(begin[-1])
+        vertices = np.empty((begin[-1], 3))
+        vertices[number] = np.concatenate([part.vertices for part in parts])
+        points = vertices + rng.normal(size=vertices.shape) * 0.1
+        found = assess(TriMesh(vertices, number[rng.permutation(faces)]), points=points)
+        alone = [assess(part, points=points[number[b:e]]) for part, b, e in zip(parts, begin, begin[1:], strict=False)]
+        alone.sort(key=lambda one: -one["area_mm2"])
+        for own, wanted in zip(found["per_component"], alone, strict=True):
+            assert own.pop("points") == wanted["vertices"]
+            assert own == {key: pytest.approx(wanted[key]) for key in own}
+        assert found["volume_mm3"] is None
+        assert (found["boundary_loops"], found["boundary_edges"]) == (1, 3)
+        assert [own["genus"] for own in found["per_component"]] == [1, 0, 0]
+
+    def test_lists_a_hundred_components_and_counts_the_rest(self) -> None:
+        tetrahedron = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+        scale = np.linspace(1, 2, 130)[:, None, None]
+        vertices = (tetrahedron * scale + np.arange(130)[:, None, None] * 5).reshape(-1, 3)
+        faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]) + 4 * np.arange(130)[:, None, None]
+        found = assess(TriMesh(vertices, faces.reshape(-1, 3)))
+        assert (len(found["per_component"]), found["components_not_listed"]) == (100, 30)
+        np.testing.assert_allclose([own["shortest_edge_mm"] for own in found["per_component"]], scale[:29:-1, 0, 0])
+        assert found["sound"]
+
+    def test_a_soup_is_sound_after_welding(self) -> None:
+        mesh = icosphere()
+        soup = TriMesh(mesh.corners.reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3))
+        found = assess(soup)
+        assert (found["sound"], found["sound_after_welding"]) == (False, True)
+        assert found["self_intersections"] == 0
+        assert assess(welded(soup))["sound"]
+
+    def test_tells_percents_and_may_be_stopped(self) -> None:
+        told: list[tuple[str, int, int]] = []
+        assess(icosphere(), points=sphere(50), progress=lambda *now: told.append(now))
+        assert {(stage, total) for stage, _, total in told} == {("measure", 100)}
+        assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)
+        assert told[-1][1] == 100
+
+        def stop(_stage: str, _done: int, _total: int) -> None:
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            assess(icosphere(), progress=stop)
 
 
 class TestBlocks:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from tomomesh.errors import InternalCheckError
 from tomomesh.measure.topology import (
     Topology,
     check_promise,
+    distinct_positions,
     face_components,
     topology,
     welded,
@@ -25,6 +27,8 @@ from tomomesh.surface.composition import well_composed
 from tomomesh.surface.cuberille import track
 
 if TYPE_CHECKING:
+    from collections.abc import Hashable, Iterable
+
     from numpy.typing import NDArray
 
 FAULTS = ("boundary_edges", "nonmanifold_edges", "nonmanifold_vertices", "misoriented_edges", "inward_components")
@@ -54,6 +58,104 @@ def faults(mesh: TriMesh) -> dict[str, int]:
     assert tuple(found.faults) == FAULTS
     assert found.sound == (not any(found.faults.values()))
     return {name: count for name, count in found.faults.items() if count}
+
+
+def groups(members: Iterable[Hashable], links: Iterable[tuple[Hashable, Hashable]]) -> int:
+    """Count the sets of members that are joined by links."""
+    parent = {one: one for one in members}
+
+    def root(one: Hashable) -> Hashable:
+        while parent[one] != one:
+            one = parent[one]
+        return one
+
+    for a, b in links:
+        parent[root(a)] = root(b)
+    return len({root(one) for one in parent})
+
+
+def by_definition(mesh: TriMesh) -> dict[str, int]:
+    """Count what makes up a topology, edge by edge."""
+    half: dict[frozenset[int], list[tuple[int, int, int]]] = {}
+    for face, (a, b, c) in enumerate(mesh.faces.tolist()):
+        for start, end in ((a, b), (b, c), (c, a)):
+            half.setdefault(frozenset((start, end)), []).append((face, start, end))
+    used = set(mesh.faces.ravel().tolist())
+    across = [
+        ((one[0], vertex), (other[0], vertex))
+        for around in half.values()
+        for one, other in pairwise(around)
+        for vertex in one[1:]
+    ]
+    corners = [(face, vertex) for face, own in enumerate(mesh.faces.tolist()) for vertex in own]
+    borders = [((face, a), (face, b)) for (face, a, b), *others in half.values() if not others]
+    touched = [corner for ends in borders for corner in ends]
+    return {
+        "components": groups(used, [(a, b) for around in half.values() for _, a, b in around[:1]]),
+        "euler_number": len(used) - len(half) + len(mesh.faces),
+        "boundary_edges": len(borders),
+        "nonmanifold_edges": sum(len(around) > 2 for around in half.values()),
+        "nonmanifold_vertices": groups(corners, across) - len(used),
+        "misoriented_edges": sum(len(around) == 2 and around[0][1] == around[1][1] for around in half.values()),
+        "boundary_loops": groups(corners, across + borders)
+        - groups(corners, [*across, *borders, *pairwise(touched)])
+        + bool(borders),
+    }
+
+
+class TestDefinition:
+    @law(100)
+    @given(seed=seeds, n=st.integers(3, 12), m=st.integers(1, 25))
+    def test_any_faces_are_counted_by_it(self, seed: int, n: int, m: int) -> None:
+        rng = np.random.default_rng(seed)
+        mesh = TriMesh(rng.normal(size=(n, 3)), np.array([rng.choice(n, 3, replace=False) for _ in range(m)], np.int64))
+        found, wanted = topology(mesh), by_definition(mesh)
+        assert {name: getattr(found, name) for name in wanted} == wanted
+
+    @law(30)
+    @given(seed=seeds, left=st.floats(0.3, 1))
+    def test_so_is_a_ring_with_holes(self, seed: int, left: float) -> None:
+        mesh = ring()
+        kept = np.random.default_rng(seed).random(len(mesh.faces)) < left
+        holey = TriMesh(mesh.vertices, mesh.faces[kept])
+        found, wanted = topology(holey), by_definition(holey)
+        assert {name: getattr(found, name) for name in wanted} == wanted
+
+
+class TestOpen:
+    @pytest.mark.parametrize(("dropped", "loops"), [([0], 1), ([0, 40], 2), ([0, 40, 77], 3)])
+    def test_every_hole_is_a_loop(self, dropped: list[int], loops: int) -> None:
+        mesh = ring()
+        holey = TriMesh(mesh.vertices, np.delete(mesh.faces, dropped, axis=0))
+        found = topology(holey)
+        assert (found.boundary_edges, found.boundary_loops) == (3 * loops, loops)
+        assert (found.genus, found.inward_components) == (1, 0)
+        check_promise(holey, open_=True)
+        with pytest.raises(InternalCheckError, match="boundary_edges"):
+            check_promise(holey)
+
+    def test_two_holes_that_touch_at_a_vertex_are_told(self) -> None:
+        mesh = ring()
+        around = np.flatnonzero((mesh.faces == mesh.faces[0, 0]).any(axis=1))
+        shared = [n for n in around.tolist() if np.isin(mesh.faces[n], mesh.faces[0]).sum() == 1]
+        holey = TriMesh(mesh.vertices, np.delete(mesh.faces, np.array([0, shared[0]]), axis=0))
+        assert faults(holey) == {"boundary_edges": 6, "nonmanifold_vertices": 1}
+        with pytest.raises(InternalCheckError, match="nonmanifold_vertices = 1"):
+            check_promise(holey, open_=True)
+
+    def test_an_open_piece_is_never_inward_but_a_flipped_face_is_seen(self) -> None:
+        mesh = ball()
+        cup = TriMesh(mesh.vertices, mesh.faces[:40, ::-1])
+        check_promise(cup, open_=True)
+        faces = cup.faces.copy()
+        faces[7] = faces[7, ::-1]
+        with pytest.raises(InternalCheckError, match="misoriented_edges"):
+            check_promise(TriMesh(cup.vertices, faces), open_=True)
+
+    def test_a_closed_piece_must_still_look_outward(self) -> None:
+        mesh = ball()
+        with pytest.raises(InternalCheckError, match="inward_components"):
+            check_promise(TriMesh(mesh.vertices, mesh.faces[:, ::-1]), open_=True)
 
 
 class TestGood:
@@ -219,6 +321,17 @@ class TestWelded:
         assert topology(soup).components == len(faces)
         assert topology(welded(soup)) == topology(mesh)
         assert len(welded(soup).vertices) == len(mesh.vertices)
+
+    @law(40)
+    @given(seed=seeds, n=st.integers(1, 40), spread=st.sampled_from([1, 3, 2**40]))
+    def test_positions_are_told_apart_as_rows_are(self, seed: int, n: int, spread: int) -> None:
+        rng = np.random.default_rng(seed)
+        positions = rng.integers(-1, 2, (n, 3)) * rng.choice([0.5, 1.0], (n, 3)) * spread
+        mesh = TriMesh(positions, np.empty((0, 3), np.int64))
+        assert distinct_positions(mesh, np.float64) == len(np.unique(positions, axis=0))
+        joined = welded(TriMesh(positions, np.zeros((1, 3), np.int64)), np.float64).vertices
+        np.testing.assert_array_equal(np.unique(joined, axis=0), np.unique(positions, axis=0))
+        assert len(joined) == distinct_positions(mesh, np.float64)
 
     def test_faces_that_lose_a_corner_are_dropped(self) -> None:
         vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1 + 1e-12, 0, 0]])

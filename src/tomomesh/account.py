@@ -13,6 +13,7 @@ import numpy as np
 
 from .measure.report import assess, compare
 from .model.points import BRIDGE, CAP, NEURON
+from .progress import Progress, silent
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,15 +30,25 @@ if TYPE_CHECKING:
     from .settings import Settings
     from .surface.closing import Shell
     from .surface.cuberille import Cuberille
+    from .surface.drape import Draped
+    from .surface.holding import Held
+    from .surface.samples import Samples
+    from .surface.voxels import Boundary, VoxelSurface
 
 SECTIONS = (
-    "study", "window", "networks", "points", "cubes", "surface", "fit", "quality", "truth", "timings",
+    "study", "window", "networks", "points", "cubes", "voxels", "surface", "fit", "quality", "truth", "timings",
     "settings", "versions", "warnings",
 )  # fmt: skip
 DRAWN = 0.9
 """Share of the vertices that must have a point near them, else a result is warned of."""
 PLAUSIBLE = 0.15
 """Difference from the volume of the rings over which a result is warned of."""
+STRAYS = 0.05
+"""Share of strays among the points over which a result is warned of."""
+WIDE = 3
+"""Closing over which a result is warned of, cubes."""
+FILLED = 0.05
+"""Share of filled faces over which a result is warned of."""
 PACKAGES = ("tomomesh", "numpy", "scipy", "numba")
 
 
@@ -126,6 +137,56 @@ class Account:
             "spacing_mm": spacing,
         }
 
+    def samples(self, count: int, samples: Samples) -> None:
+        """Note how far apart the points of a cloud are, how noisy, and how many are strays."""
+        spacing, noise = float(np.median(samples.spacing)), float(np.median(samples.noise))
+        self._sections["points"] = {
+            "unit": self._settings.run.units,
+            "count": count,
+            "distinct": len(samples.positions) + samples.strays,
+            "strays": samples.strays,
+            "spacing_mm": spacing,
+            "spacing_p5_mm": float(np.percentile(samples.spacing, 5)),
+            "spacing_p95_mm": float(np.percentile(samples.spacing, 95)),
+            "noise_mm": noise,
+            "noise_p95_mm": float(np.percentile(samples.noise, 95)),
+        }
+        if samples.strays > STRAYS * count:
+            self.warn(f"{samples.strays} of {count} points are strays, and were left out")
+
+    def held(self, held: Held, taken: NDArray[np.bool_], cell: NDArray[np.float64], cubes: int, bridged: int) -> None:
+        """Note the cubes of a cloud, the closing that made them hold, and which surfaces were taken."""
+        shell, walls = held.shell, held.walls
+        self._sections["cubes"] = {
+            "cell_mm": cell.tolist(),
+            "occupied": cubes,
+            "bridge_places": bridged,
+            "closing": shell.closing,
+            "added_for_composition": shell.added,
+            "two_sided": float(walls.two_sided[taken].min()),
+            "holds": held.holds,
+        }
+        self._sections["surface"] = {
+            "found": walls.count,
+            "cavities": int((walls.inward & taken).sum()),
+            "taken": int(taken.sum()),
+            "debris": int(walls.debris.sum()),
+            "square_faces": int(walls.sizes[taken].sum()),
+            "enclosed_cubes": int(walls.volumes[taken].sum()),
+        }
+        if held.holds and shell.closing > WIDE:
+            self.warn(f"gaps up to {2 * shell.closing} cubes wide were closed: look at the faces marked as filled")
+
+    def draped(self, draped: Draped | None, taken_back: int, filled: NDArray[np.bool_]) -> None:
+        """Note how the mesh of a cloud came to rest, and what of it was filled rather than measured."""
+        if draped is None:
+            self._sections["fit"] = {"iterations": 0, "converged": True, "collapsed": 0}
+        else:
+            self.fit(draped.trace, len(draped.vertices), 0)
+        self._sections["fit"] |= {"taken_back": taken_back, "filled_faces": int(filled.sum())}
+        if filled.mean() > FILLED:
+            self.warn(f"{filled.mean():.0%} of the faces lie where there are no points: they were filled")
+
     def cubes(self, grid: CubeGrid, shell: Shell, composed: CubeGrid) -> None:
         """Note the partition, its closing and the cubes added."""
         self._sections["cubes"] = {
@@ -170,9 +231,35 @@ class Account:
         if steps and not trace.converged:
             self.warn(f"the mesh had not come to rest after {steps} steps")
 
-    def quality(self, mesh: TriMesh, points: PointSet, cavities: int) -> None:
+    def boundary(self, found: Boundary, surface: VoxelSurface) -> None:
+        """Note the boundary of the voxels, and how its net came to rest."""
+        rest = surface.rest
+        self._sections["voxels"] = {
+            "added_for_composition": found.added,
+            "interpolated": not found.crossings.stepped,
+            "split_in_four": len(surface.mesh.vertices) - len(found.net.low),
+        }
+        self._sections["surface"] = {
+            "found": len(found.volumes),
+            "cavities": found.cavities,
+            "taken": len(found.volumes),
+            "debris": 0,
+            "square_faces": len(found.net.quads),
+            "enclosed_cubes": int(found.volumes.sum()),
+        }
+        self._sections["fit"] = {"iterations": rest.steps, "converged": rest.converged, "collapsed": 0}
+        if found.crossings.stepped:
+            self.warn("the gray levels are those of a mask: the surface is evened out between the voxels")
+        elif rest.steps and not rest.converged:
+            self.warn(f"the mesh had not come to rest after {rest.steps} steps")
+
+    def quality(self, mesh: TriMesh, points: PointSet, cavities: int, progress: Progress = silent) -> None:
         """Measure the mesh, against its points too."""
-        self._sections["quality"] = assess(mesh, points=points.positions, cavities=cavities)
+        self._sections["quality"] = assess(
+            mesh, points=points.positions, cavities=cavities, threads=self._settings.run.threads, progress=progress
+        )
+        if self._sections["quality"]["self_intersections"]:
+            self.warn(f"{self._sections['quality']['self_intersections']} faces pass through others")
 
     def rings(self, sampling: Sampling) -> None:
         """Compare the volume of the mesh with the areas of the rings times the distance of their slices."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .account import Account
+from .cloudwise import surface_of_cloud
 from .errors import GeometryError, UsageError
 from .measure.topology import check_promise
 from .model.points import CAP, PointSet
@@ -25,7 +26,9 @@ from .surface.composition import well_composed
 from .surface.cuberille import track
 from .surface.dynamics import fit
 from .surface.partition import partition, sampling_distance
+from .surface.samples import distinct
 from .surface.smooth import low_pass
+from .voxelwise import NO_CUBES, NO_NETWORKS, NO_TRACE, find_boundary, mesh_boundary, sampled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
     from .model.mesh import QuadMesh, TriMesh
     from .model.networks import Networks
     from .model.trace import Trace
+    from .surface.voxels import Boundary
 
 LEAST = 0.5
 """Share of the rings' volume that a shell must enclose; a slab may be too thin to be seen to hold."""
@@ -58,6 +62,8 @@ class Segmentation:
         The neurons, bridged gaps and caps in patient millimeters.
     sampling : Sampling
     report : dict
+    boundary : Boundary or None
+        The window's own boundary, where it takes the place of networks.
     """
 
     volume: Volume
@@ -67,6 +73,7 @@ class Segmentation:
     points: PointSet
     sampling: Sampling
     report: dict[str, Any]
+    boundary: Boundary | None = None
 
 
 @dataclass(frozen=True)
@@ -86,6 +93,8 @@ class Surface:
     report : dict
     segmentation : Segmentation or None
         Stage one, where the points came from a study.
+    filled : (m,) bool array or None
+        Faces of `mesh` that lie where a cloud has no points: filled, not measured.
     """
 
     points: PointSet
@@ -97,6 +106,7 @@ class Surface:
     trace: Trace
     report: dict[str, Any]
     segmentation: Segmentation | None = None
+    filled: NDArray[np.bool_] | None = None
 
     @property
     def cap_faces(self) -> NDArray[np.bool_]:
@@ -140,9 +150,12 @@ def reconstruct(
     account = Account(settings)
     segmentation = _segment(volume, settings, account, progress)
     sampling = segmentation.sampling
-    surface = _surface(
-        sampling.points, sampling.spacing_mm, settings, account, progress, expected_mm3=sampling.volume_mm3
-    )
+    if segmentation.boundary is not None:
+        surface = _surface_of_voxels(segmentation.boundary, settings, account, progress)
+    else:
+        surface = _surface(
+            sampling.points, sampling.spacing_mm, settings, account, progress, expected_mm3=sampling.volume_mm3
+        )
     account.rings(sampling)
     if truth is not None:
         account.truth(surface.mesh, surface.cap_faces, truth)
@@ -186,11 +199,27 @@ def reconstruct_points(
     settings = (settings or Settings()).replace(**changes)
     cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)
     account = Account(settings)
-    with account.timed("points"):
-        spacing = sampling_distance(cloud.positions)
-    account.points(cloud, spacing)
-    surface = _surface(cloud, spacing, settings, account, progress)
+    if settings.fit.attraction == "nearest":
+        with account.timed("points"):
+            spacing = sampling_distance(distinct(cloud.positions))
+        account.points(cloud, spacing)
+        surface = _surface(cloud, spacing, settings, account, progress)
+    else:
+        surface = _surface_of_cloud(cloud, settings, account, progress)
     return replace(surface, report=account.report())
+
+
+def _surface_of_cloud(cloud: PointSet, settings: Settings, account: Account, progress: Progress) -> Surface:
+    found = surface_of_cloud(cloud.positions, settings, account, progress)
+    with account.timed("quality"):
+        cavities = int(found.held.walls.inward.sum())
+        check_promise(found.mesh, cavities=cavities)
+        account.quality(found.mesh, cloud, cavities, progress)
+    trace = NO_TRACE if found.draped is None else found.draped.trace
+    return Surface(
+        cloud, NO_CUBES, found.cuberille, found.smoothed, found.mesh, np.empty(0, np.int32), trace, {},
+        filled=found.filled,
+    )  # fmt: skip
 
 
 def _segment(volume: Volume, settings: Settings, account: Account, progress: Progress) -> Segmentation:
@@ -203,6 +232,8 @@ def _segment(volume: Volume, settings: Settings, account: Account, progress: Pro
     axis = _slice_axis(volume, settings.network.slices)
     stack = volume.along(axis)
     account.study(stack, AXES[axis])
+    if settings.network.network == "none":
+        return _segment_voxels(stack, settings, account)
     with account.timed("window"):
         lower, upper = choose_window(volume, settings.window)
         mask = window(stack, lower=lower, upper=upper)
@@ -224,6 +255,21 @@ def _segment(volume: Volume, settings: Settings, account: Account, progress: Pro
         sampling = sample(networks, stack, caps=settings.cubes.caps, bridge=settings.network.bridge)
     account.points(sampling.points, sampling.spacing_mm, sampling.bridged)
     return Segmentation(stack, mask, networks, labels, sampling.points, sampling, {})
+
+
+def _segment_voxels(stack: Volume, settings: Settings, account: Account) -> Segmentation:
+    """Take the boundary of the window in place of networks."""
+    mask, found = find_boundary(stack, settings, account)
+    return Segmentation(
+        stack, mask, NO_NETWORKS, mask.astype(np.uint16), found.points, sampled(found), {}, boundary=found
+    )
+
+
+def _surface_of_voxels(found: Boundary, settings: Settings, account: Account, progress: Progress) -> Surface:
+    made = mesh_boundary(found, settings, account, progress)
+    return Surface(
+        found.points, NO_CUBES, found.cuberille, made.smoothed, made.mesh, made.nearest, NO_TRACE, {}
+    )  # fmt: skip
 
 
 def _slice_axis(volume: Volume, slices: str) -> int:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 STUDY = "a NIfTI file, a folder of DICOM slices, or a folder of PNG or TIFF slices (with --spacing)"
-POINTS = "an unoriented cloud: PLY, XYZ or CSV text, or NPY"
+POINTS = "an unoriented cloud: PLY, XYZ, TXT, CSV, NPY, NPZ, PCD, LAS, LAZ or E57, or the vertices of OBJ, OFF or STL"
 MESH = "STL, PLY or OBJ"
 STAGE_ONE = ("read", "window", "network")
 STAGE_TWO = ("cubes", "fit")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..model.points import PointSet
 from ..show import draw_all
 from ..show.plane import Plane
 from ..show.render import View
@@ -30,12 +31,12 @@ def pictures(
             "mask": stage_one.mask,
             "networks": stage_one.networks,
             "labels": stage_one.labels,
-            "points": stage_one.points,
+            "points": _drawn(stage_one),
             "plane": Plane(spacing_mm=volume.spacing_mm[:2], upward=plane != "axial"),
         }
     if surface is not None:
         stages |= {
-            "points": surface.points,
+            "points": surface.points if stage_one is None else _drawn(stage_one),
             "cuberille": surface.cuberille,
             "triangulated": surface.cuberille.triangulated(),
             "smoothed": surface.smoothed,
@@ -44,6 +45,12 @@ def pictures(
             "view": _view(stage_one, settings),
         }
     return draw_all(**stages)
+
+
+def _drawn(stage_one: Segmentation) -> PointSet:
+    """Return the points; without a network there are no kinds of neurons to tell apart."""
+    points = stage_one.points
+    return points if stage_one.boundary is None else PointSet.from_positions(points.positions)
 
 
 def _view(stage_one: Segmentation | None, settings: Settings) -> View:

@@ -11,13 +11,13 @@ BARS = " ▁▂▃▄▅▆▇█"
 
 def of_surface(report: dict[str, Any], output: str) -> list[str]:
     """Say what was reconstructed, and how good it is."""
-    quality, fit, cubes = report["quality"], report["fit"], report["cubes"]
+    quality, fit = report["quality"], report["fit"]
     unit = _unit(report)
     shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
     lines = [
         *_of_stage_one(report),
         f"points    {_of_points(report)}",
-        f"cubes     edge {_edges(cubes['cell_mm'])} {unit}, {cubes['occupied']} occupied, closed by {cubes['closing']}",
+        _of_cubes(report),
         f"fit       {fit['iterations']} steps, {'at rest' if fit['converged'] else 'NOT at rest'}",
         f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}",
         f"          {quality['components']} component(s), genus {quality['genus']}, "
@@ -102,22 +102,39 @@ def of_check(report: dict[str, Any]) -> list[str]:
 def _of_stage_one(report: dict[str, Any]) -> list[str]:
     if "study" not in report:
         return []
-    study, window, networks = report["study"], report["window"], report["networks"]
+    study, window = report["study"], report["window"]
     lower = "any" if window["lower"] is None else f"{window['lower']:g}"
     upper = "any" if window["upper"] is None else f"{window['upper']:g}"
     chosen = {"otsu": "Otsu's, as no window was given", "preset": "the preset", "given": "as given"}
-    return [
+    lines = [
         f"study     {study['slices']} {study['plane']} slices of {study['columns']} x {study['rows']}",
         f"window    {lower} < k <= {upper} ({chosen[window['chosen_by']]}), "
         f"{100 * window['share']:.1f} % of the voxels",
-        f"networks  {networks['trained']} {networks['topology']}s of {networks['neurons']} neurons on the window's "
-        f"{'outline' if networks['signal'] == 'boundary' else 'pixels'}, {networks['strays']} stray pixels dropped",
     ]
+    if "networks" in report:
+        networks = report["networks"]
+        lines.append(
+            f"networks  {networks['trained']} {networks['topology']}s of {networks['neurons']} neurons on the window's "
+            f"{'outline' if networks['signal'] == 'boundary' else 'pixels'}, {networks['strays']} stray pixels dropped"
+        )
+    return lines
+
+
+def _of_cubes(report: dict[str, Any]) -> str:
+    """Say what the surface was tracked on."""
+    if "voxels" in report:
+        voxels = report["voxels"]
+        places = "gray levels interpolated" if voxels["interpolated"] else "a mask, evened out"
+        return f"voxels    {report['surface']['square_faces']} faces, {places}, {voxels['added_for_composition']} added"
+    cubes = report["cubes"]
+    edge = f"edge {_edges(cubes['cell_mm'])} {_unit(report)}"
+    return f"cubes     {edge}, {cubes['occupied']} occupied, closed by {cubes['closing']}"
 
 
 def _of_points(report: dict[str, Any]) -> str:
     points = report["points"]
-    made = f", {points['on_bridges']} on {points['bridged_gaps']} bridged gaps, {points['on_caps']} on caps"
+    bridges = "added voxels" if "study" in report and "networks" not in report else "bridged gaps"
+    made = f", {points['on_bridges']} on {points['bridged_gaps']} {bridges}, {points['on_caps']} on caps"
     made = made if points["on_bridges"] or points["on_caps"] else ""
     return f"{points['count']}{made}, r = {points['spacing_mm']:.4g} {_unit(report)}"
 

@@ -11,7 +11,7 @@ FALLBACK_BYTES = 16 * 2**30
 
 
 def require_memory(promised: int, *, file: str) -> None:
-    """Refuse voxels that cannot fit into the machine's memory, before any of them is allocated.
+    """Refuse data that cannot fit into the machine's memory, before any of them is allocated.
 
     Raises
     ------
@@ -21,11 +21,11 @@ def require_memory(promised: int, *, file: str) -> None:
     held = physical_memory()
     if promised > held:
         raise ResourceError(
-            "the voxels do not fit into the memory",
+            "the data do not fit into the memory",
             file=file,
             found=f"size = {promised} bytes",
             expected=f"at most {held} bytes",
-            hint="a part of the study, or a machine with more memory",
+            hint="a part of it, or a machine with more memory",
         )
 
 
@@ -43,6 +43,24 @@ def require_bytes(promised: int, found: int, *, file: str) -> None:
             file=file,
             found=f"data = {found} bytes",
             expected=f"{promised} bytes, as its header promises",
+            hint="a fresh copy of the file",
+        )
+
+
+def require_rows(promised: int, found: int, what: str, *, file: str) -> None:
+    """Refuse a file that holds fewer points, or whatever `what` names, than its header promises.
+
+    Raises
+    ------
+    FormatError
+        Where `found` is below `promised`.
+    """
+    if found < promised:
+        raise FormatError(
+            "the file is cut off",
+            file=file,
+            found=f"{what} = {found}",
+            expected=f"{promised}, as its header promises",
             hint="a fresh copy of the file",
         )
 

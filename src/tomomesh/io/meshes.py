@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,18 +12,22 @@ import numpy as np
 from ..errors import EmptyError, FormatError, OutputError
 from ..model.mesh import TriMesh
 from .atomic import check_output, replacing
+from .colors import named_colors
+from .fields import AXES, flat_columns
+from .finite import check_finite
 from .limits import require_bytes
 from .ply import parse_header, write_ply
-from .points import check_finite
 from .signature import signature
-from .source import existing_file, suffix_of, third_party, whole
+from .source import existing_file, reader_of, suffix_of, third_party, whole
 from .weld import weld
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+    from .fields import Fields
 
     Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
 
@@ -51,15 +56,8 @@ def read_mesh(path: str | Path) -> TriMesh:
         For a file without faces.
     """
     path = existing_file(path)
-    suffix, file = suffix_of(path), str(path)
-    if suffix not in MESH_READERS:
-        raise FormatError(
-            "the file is of an unknown kind",
-            file=file,
-            found=f"suffix = {suffix or 'none'}",
-            expected=" | ".join(MESH_READERS),
-        )
-    vertices, faces = MESH_READERS[suffix](whole(path), file)
+    read, file = reader_of(path, MESH_READERS), str(path)
+    vertices, faces = read(whole(path), file)
     if len(faces) == 0:
         raise EmptyError("the mesh has no faces", file=file)
     if faces.min() < 0 or faces.max() >= len(vertices):
@@ -108,7 +106,24 @@ MESH_READERS: dict[str, Callable[[bytes, str], Arrays]] = {
 """Suffix to reader of vertices and faces."""
 
 
-def write_mesh(mesh: TriMesh, path: str | Path, *, unit: str = "mm", frame: str = "LPS") -> None:
+@dataclass(frozen=True)
+class Written:
+    """What a writer is given beside the mesh: a line about it, and the fields of its vertices and faces."""
+
+    head: str
+    vertex_fields: Fields
+    face_fields: Fields
+
+
+def write_mesh(
+    mesh: TriMesh,
+    path: str | Path,
+    *,
+    unit: str = "mm",
+    frame: str = "LPS",
+    vertex_fields: Mapping[str, NDArray[Any]] | None = None,
+    face_fields: Mapping[str, NDArray[Any]] | None = None,
+) -> None:
     """Write a triangle mesh; the same mesh gives the same bytes.
 
     Parameters
@@ -119,25 +134,31 @@ def write_mesh(mesh: TriMesh, path: str | Path, *, unit: str = "mm", frame: str 
         ``.stl`` (binary, 32-bit coordinates), ``.ply`` (binary, 64-bit) or ``.obj`` (text, 64-bit).
     unit, frame : str
         What the coordinates are in, named in the file.
+    vertex_fields : mapping of str to (n,) or (n, c) array, optional
+        Numbers at the vertices. PLY keeps them all, OBJ the colors (``red``, ``green`` and ``blue``), STL none.
+    face_fields : mapping of str to (m,) or (m, c) array, optional
+        Numbers on the faces, kept by PLY.
 
     Raises
     ------
     UsageError
-        For a suffix that has no writer.
+        For a suffix that has no writer, and fields of another length or without numbers.
     OutputError
         Where the file cannot be written, or the format cannot keep distinct vertices apart.
     """
     check_output(path, MESH_WRITERS)
-    MESH_WRITERS[suffix_of(path)](mesh, path, signature(unit, frame))
+    at_vertices = flat_columns(vertex_fields or {}, len(mesh.vertices), AXES)
+    on_faces = flat_columns(face_fields or {}, len(mesh.faces), ["count", "corners", "vertex_indices"])
+    MESH_WRITERS[suffix_of(path)](mesh, path, Written(signature(unit, frame), at_vertices, on_faces))
 
 
-def _write_stl(mesh: TriMesh, path: str | Path, head: str) -> None:
+def _write_stl(mesh: TriMesh, path: str | Path, beside: Written) -> None:
     rows = np.zeros(len(mesh.faces), STL_ROW)
     rows["corners"] = _single(mesh.vertices, path)[mesh.faces]
     length = np.linalg.norm(mesh.face_vectors, axis=1, keepdims=True)
     rows["normal"] = mesh.face_vectors / np.where(length > 0, length, 1.0)
     with replacing(path) as file:
-        file.write(head.encode("ascii")[:80].ljust(80))
+        file.write(beside.head.encode("ascii")[:80].ljust(80))
         file.write(np.array(len(rows), "<u4").tobytes())
         file.write(rows.tobytes())
 
@@ -157,20 +178,24 @@ def _single(vertices: NDArray[np.float64], path: str | Path) -> NDArray[np.float
     return single
 
 
-def _write_ply(mesh: TriMesh, path: str | Path, head: str) -> None:
-    rows = np.empty(len(mesh.vertices), [("x", "f8"), ("y", "f8"), ("z", "f8")])
-    rows["x"], rows["y"], rows["z"] = mesh.vertices.T
-    write_ply(path, head, rows, mesh.faces)
+def _write_ply(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+    positions = dict(zip(AXES, np.asarray(mesh.vertices, np.float64).T, strict=True))
+    write_ply(path, beside.head, {**positions, **beside.vertex_fields}, mesh.faces, beside.face_fields)
 
 
-def _write_obj(mesh: TriMesh, path: str | Path, head: str) -> None:
-    vertices = (f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist())
+def _write_obj(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+    colors = named_colors(beside.vertex_fields)
+    behind = [""] * len(mesh.vertices)
+    if colors:
+        fractions = [f" {value / 255:.6g}" for value in range(256)]
+        behind = ["".join(fractions[value] for value in color) for color in colors[1].tolist()]
+    vertices = (f"v {x!r} {y!r} {z!r}{color}" for (x, y, z), color in zip(mesh.vertices.tolist(), behind, strict=True))
     faces = (f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist())
     with replacing(path) as file:
-        file.write(("\n".join([f"# {head}", *vertices, *faces]) + "\n").encode("ascii"))
+        file.write(("\n".join([f"# {beside.head}", *vertices, *faces]) + "\n").encode("ascii"))
 
 
-MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, str], None]] = {
+MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, Written], None]] = {
     ".stl": _write_stl,
     ".ply": _write_ply,
     ".obj": _write_obj,

@@ -12,22 +12,29 @@ from .atomic import replacing
 from .limits import require_bytes
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-BYTES = {
-    **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
-    **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
-    **dict.fromkeys(("int", "uint", "int32", "uint32", "float", "float32"), 4),
-    **dict.fromkeys(("double", "float64"), 8),
+    from .fields import Fields
+
+NAMES = {
+    "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
+    "i4": "int", "u4": "uint", "f4": "float", "f8": "double",
+}  # fmt: skip
+"""NumPy's codes of the types of properties to PLY's names."""
+
+CODES = {
+    **{name: code for code, name in NAMES.items()},
+    **{f"{word}{8 * size}": f"{word[0]}{size}" for word in ("int", "uint") for size in (1, 2, 4)},
+    "float32": "f4",
+    "float64": "f8",
 }
-"""Bytes of a property's type."""
+"""Every name of a type to NumPy's code."""
 
-NAMES = {"f8": "double", "i4": "int", "u1": "uchar"}
-"""PLY's names of the types that are written."""
-
-FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
+ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+"""The formats to their byte orders."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +45,25 @@ class Element:
     count: int
     properties: tuple[tuple[str, ...], ...]
 
+    @property
+    def names(self) -> list[str]:
+        """Names of the properties."""
+        return [words[-1] for words in self.properties]
+
+    @property
+    def has_lists(self) -> bool:
+        """Whether rows differ in length."""
+        return any(words[0] == "list" for words in self.properties)
+
+    def types(self, order: str) -> list[np.dtype[Any]]:
+        """Return the type of each property; of a list, that of its length."""
+        kinds = [words[1] if words[0] == "list" else words[0] for words in self.properties]
+        return [np.dtype(order + CODES[kind]) for kind in kinds]
+
     def least_bytes(self, text: bool) -> int:
         """Return the fewest bytes that all rows can take: lists are empty, numbers have one digit."""
-        kinds = [words[1] if words[0] == "list" else words[0] for words in self.properties]
-        sizes = [BYTES[kind] for kind in kinds]
-        return self.count * (2 * len(sizes) if text else sum(sizes))
+        types = self.types("")
+        return self.count * (2 * len(types) if text else sum(kind.itemsize for kind in types))
 
 
 @dataclass(frozen=True)
@@ -52,7 +73,7 @@ class Header:
     Attributes
     ----------
     format : str
-        One of `FORMATS`.
+        One of `ORDERS`.
     elements : tuple of Element
         In the order of the file.
     length : int
@@ -63,9 +84,11 @@ class Header:
     elements: tuple[Element, ...]
     length: int
 
-    def element(self, name: str) -> Element:
-        """Return an element by its name, an empty one where there is none."""
-        return next((one for one in self.elements if one.name == name), Element(name, 0, ()))
+    def before(self, name: str) -> tuple[tuple[Element, ...], Element]:
+        """Return an element by its name, an empty one where there is none, and those before it."""
+        names = [one.name for one in self.elements]
+        at = names.index(name) if name in names else len(names)
+        return self.elements[:at], (*self.elements, Element(name, 0, ()))[at]
 
 
 def parse_header(data: bytes, *, file: str) -> Header:
@@ -94,7 +117,7 @@ def parse_header(data: bytes, *, file: str) -> Header:
 
 def _format(lines: list[list[str]]) -> str:
     name = next((words[1] for words in lines if words[:1] == ["format"]), "")
-    if name not in FORMATS:
+    if name not in ORDERS:
         raise ValueError(name)
     return name
 
@@ -114,8 +137,9 @@ def _elements(lines: list[list[str]]) -> list[Element]:
 def write_ply(
     path: str | Path,
     comment: str,
-    vertices: NDArray[Any],
+    vertices: Mapping[str, NDArray[Any]],
     faces: NDArray[np.int64] | None = None,
+    face_fields: Mapping[str, NDArray[Any]] | None = None,
 ) -> None:
     """Write a binary PLY file, little-endian.
 
@@ -125,24 +149,43 @@ def write_ply(
         The file.
     comment : str
         Goes into the header.
-    vertices : (n,) structured array
-        One field a property, of the types in `NAMES`.
+    vertices : mapping of str to (n,) array
+        One column a property; integers that PLY has no type for become doubles.
     faces : (m, 3) int array, optional
         Vertex numbers.
+    face_fields : mapping of str to (m,) array, optional
+        Properties of the faces, behind their vertices.
     """
-    lines = [
-        "ply",
-        "format binary_little_endian 1.0",
-        f"comment {comment}",
-        f"element vertex {len(vertices)}",
-    ]
-    little = vertices.astype(vertices.dtype.newbyteorder("<"))
-    lines += [f"property {NAMES[little.dtype[name].str[1:]]} {name}" for name in little.dtype.names or ()]
-    rows = np.empty(0 if faces is None else len(faces), [("count", "u1"), ("corners", "<i4", 3)])
+    lines = ["ply", "format binary_little_endian 1.0", f"comment {comment}"]
+    columns: Fields = {name: _storable(column) for name, column in vertices.items()}
+    body = [_rows(columns)]
+    lines += [f"element vertex {len(body[0])}", *_properties(columns)]
     if faces is not None:
-        lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
-        rows["count"], rows["corners"] = 3, faces
+        columns = {name: _storable(column) for name, column in (face_fields or {}).items()}
+        corners: Fields = {"count": np.full(len(faces), 3, np.uint8), "corners": faces.astype(np.int32)}
+        body.append(_rows({**corners, **columns}))
+        lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", *_properties(columns)]
     with replacing(path) as file:
         file.write(("\n".join([*lines, "end_header"]) + "\n").encode("ascii"))
-        file.write(little.tobytes())
-        file.write(rows.tobytes())
+        file.writelines(rows.tobytes() for rows in body)
+
+
+def _storable(column: NDArray[Any]) -> NDArray[Any]:
+    """Return a column in a type that PLY has."""
+    if column.dtype.str[1:] in NAMES:
+        return column
+    if column.dtype.kind == "f":
+        return column.astype(np.float32 if column.dtype.itemsize < 4 else np.float64)
+    return column.astype(np.int32 if np.array_equal(column.astype(np.int32), column) else np.float64)
+
+
+def _rows(columns: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+    kinds = [(name, column.dtype.newbyteorder("<"), column.shape[1:]) for name, column in columns.items()]
+    rows = np.empty(len(next(iter(columns.values()))), kinds)
+    for name, column in columns.items():
+        rows[name] = column
+    return rows
+
+
+def _properties(columns: Mapping[str, NDArray[Any]]) -> list[str]:
+    return [f"property {NAMES[column.dtype.str[1:]]} {name}" for name, column in columns.items()]

@@ -7,12 +7,14 @@ import warnings
 from collections import Counter
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from ..errors import FormatError, ResourceError, TomomeshError, UnreadableError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
+
+Reader = TypeVar("Reader")
 
 
 def suffix_of(path: str | Path) -> str:
@@ -59,6 +61,24 @@ def existing_file(path: str | Path) -> Path:
     if path.stat().st_size == 0:
         raise FormatError("the file is empty", file=str(path), found="size = 0 bytes")
     return path
+
+
+def reader_of(path: Path, readers: Mapping[str, Reader]) -> Reader:
+    """Return what reads a file, by its suffix.
+
+    Raises
+    ------
+    FormatError
+        Where nothing does; it lists the suffixes.
+    """
+    if (suffix := suffix_of(path)) not in readers:
+        raise FormatError(
+            "the file is of an unknown kind",
+            file=str(path),
+            found=f"suffix = {suffix or 'none'}",
+            expected=" | ".join(readers),
+        )
+    return readers[suffix]
 
 
 def whole(path: str | Path) -> bytes:

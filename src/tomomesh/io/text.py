@@ -2,51 +2,74 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import FormatError
+from .source import whole
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
 
-def parse_rows(lines: Sequence[str], *, columns: Sequence[int], file: str, before: int = 0) -> NDArray[np.float64]:
-    """Return some columns of rows of equal length.
+def read_lines(path: Path) -> list[str]:
+    """Return the lines of a text in UTF-8.
+
+    Raises
+    ------
+    UnreadableError, FormatError
+        Where the file may not be read, or is no text.
+    """
+    try:
+        return whole(path).decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise FormatError("the file is no text", file=str(path), expected="rows of numbers") from None
+
+
+def parse_rows(
+    lines: Sequence[str], *, required: Sequence[int], file: str, before: int = 0, width: int = 0
+) -> NDArray[np.float64]:
+    """Return rows of equal length.
 
     Parameters
     ----------
     lines : sequence of str
         Text; what follows ``#`` and empty lines are passed over. Columns are parted by semicolons, else by
         commas, else by white space.
-    columns : sequence of int
-        The columns to take, from 0; only they must hold numbers.
+    required : sequence of int
+        The columns, from 0, that must hold finite numbers; what is no number elsewhere becomes NaN.
     file : str
         Named in errors.
     before : int
         Lines of the file before the first of these.
+    width : int
+        How many columns there must be; as many as in the first row where 0.
 
     Returns
     -------
     (n, c) float array
-        Finite numbers.
+        All columns; at least as many as the required ones need, also where there are no rows.
 
     Raises
     ------
     FormatError
-        For text, NaN, infinite numbers and ragged rows; it names the row.
+        For ragged rows, and for text, NaN and infinite numbers in the required columns; it names the row.
     """
     delimiter = delimiter_of(lines)
+    least = max(width, *(column + 1 for column in required), 1)
+    if not any(map(_content, lines)):
+        return np.empty((0, least))
     try:
-        rows = np.loadtxt(lines, delimiter=delimiter, ndmin=2) if any(map(_content, lines)) else np.empty((0, 0))
-        if not rows.size or (rows.shape[1] > max(columns) and np.isfinite(rows[:, columns]).all()):
-            return rows[:, columns] if rows.size else np.empty((0, len(columns)))
+        rows = np.loadtxt(lines, delimiter=delimiter, ndmin=2)
+        if width in (0, rows.shape[1]) and rows.shape[1] >= least and np.isfinite(rows[:, required]).all():
+            return rows
     except ValueError:
-        pass  # the slow way finds the row, or passes over columns of text
-    return _parse_slowly(lines, delimiter, columns, file, before)
+        pass  # the slow way finds the row, or passes over text
+    return _parse_slowly(lines, delimiter, required, file, before, width)
 
 
 def delimiter_of(lines: Sequence[str]) -> str | None:
@@ -55,36 +78,56 @@ def delimiter_of(lines: Sequence[str]) -> str | None:
     return next((mark for mark in ";," if mark in content), None)
 
 
+def first_row(lines: Sequence[str]) -> list[str]:
+    """Return the cells of the first row."""
+    return next(filter(None, map(_content, lines)), "").split(delimiter_of(lines))
+
+
 def _content(line: str) -> str:
     return line.partition("#")[0].strip()
 
 
 def _parse_slowly(
-    lines: Sequence[str], delimiter: str | None, columns: Sequence[int], file: str, before: int
+    lines: Sequence[str], delimiter: str | None, required: Sequence[int], file: str, before: int, width: int
 ) -> NDArray[np.float64]:
     rows: list[list[float]] = []
-    width = 0
+    least = max(required, default=0) + 1
     for number, line in enumerate(lines, before + 1):
         if not (content := _content(line)):
             continue
-        fields = content.split(delimiter)
-        width = width or len(fields)
-        if len(fields) != width or width <= max(columns):
-            expected = f"{width} columns" if width > max(columns) else f"at least {max(columns) + 1} columns"
-            raise _fault("the rows are ragged", number, f"{len(fields)} columns", expected, file)
-        rows.append([_number(fields[column], number, file) for column in columns])
-    return np.array(rows).reshape(-1, len(columns))
+        cells = content.split(delimiter)
+        width = width or len(cells)
+        if len(cells) != width or width < least:
+            expected = f"{width} columns" if width >= least else f"at least {least} columns"
+            raise _fault("the rows are ragged", number, f"{len(cells)} columns", expected, file)
+        values = [_number(cell) for cell in cells]
+        for column in required:
+            _check(values[column], cells[column], number, file)
+        rows.append(values)
+    return np.array(rows)
 
 
-def _number(field: str, number: int, file: str) -> float:
+def _number(cell: str) -> float:
     try:
-        value = float(field)
+        return float(cell)
     except ValueError:
-        raise _fault("a coordinate is no number", number, "text", "a finite number", file) from None
-    if not np.isfinite(value):
-        raise _fault("a coordinate is not finite", number, f"{value}", "a finite number", file)
-    return value
+        return np.nan
+
+
+def _check(value: float, cell: str, number: int, file: str) -> None:
+    if np.isfinite(value):
+        return
+    if np.isnan(value) and cell.strip().lstrip("+-").lower() != "nan":
+        raise _fault("a coordinate is no number", number, "text", "a finite number", file)
+    raise _fault("a coordinate is not finite", number, f"{value}", "a finite number", file)
 
 
 def _fault(what: str, number: int, found: str, expected: str, file: str) -> FormatError:
     return FormatError(what, file=file, found=f"row {number} = {found}", expected=expected)
+
+
+def typed(column: NDArray[np.float64], kind: np.dtype[Any]) -> NDArray[Any]:
+    """Return numbers in the type that a header declares, or as they are where it cannot hold them."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        cast = column.astype(kind)
+    return cast if kind.kind == "f" or np.array_equal(cast, column) else column

@@ -1,4 +1,4 @@
-"""Distance from points to triangles."""
+"""Distance from points to triangles and to points."""
 
 from __future__ import annotations
 
@@ -6,25 +6,39 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .bvh import depth_of
 from .compile import kernel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+TINY = 1e-300
 
-@kernel("f8(f8[::1], f8[:,::1], f8, f8)")
-def squared_to(point: NDArray[np.float64], corners: NDArray[np.float64], s: float, t: float) -> float:
-    """Return the squared distance from a point (3,) to a + s (b - a) + t (c - a) of a triangle (3, 3)."""
+
+@kernel("f8(f8[:,::1], i8, f8[:,::1], i4[:,::1], i8, f8, f8)")
+def squared_to(
+    points: NDArray[np.float64],
+    p: int,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    m: int,
+    s: float,
+    t: float,
+) -> float:
+    """Return the squared distance from point p to a + s (b - a) + t (c - a) of face m."""
     squared = 0.0
     for axis in range(3):
-        a = corners[0, axis]
-        squared += (point[axis] - a - s * (corners[1, axis] - a) - t * (corners[2, axis] - a)) ** 2
+        a = vertices[faces[m, 0], axis]
+        b, c = vertices[faces[m, 1], axis] - a, vertices[faces[m, 2], axis] - a
+        squared += (points[p, axis] - a - s * b - t * c) ** 2
     return squared
 
 
-@kernel("f8(f8[::1], f8[:,::1])")
-def squared_distance(point: NDArray[np.float64], corners: NDArray[np.float64]) -> float:
-    """Return the squared distance from a point (3,) to a triangle (3, 3).
+@kernel("f8(f8[:,::1], i8, f8[:,::1], i4[:,::1], i8)")
+def squared_distance(
+    points: NDArray[np.float64], p: int, vertices: NDArray[np.float64], faces: NDArray[np.int32], m: int
+) -> float:
+    """Return the squared distance from point p of (n, 3) to face m of (m, 3).
 
     Notes
     -----
@@ -33,55 +47,119 @@ def squared_distance(point: NDArray[np.float64], corners: NDArray[np.float64]) -
     """
     bb = bc = cc = bp = cp = 0.0
     for axis in range(3):
-        b = corners[1, axis] - corners[0, axis]
-        c = corners[2, axis] - corners[0, axis]
-        p = point[axis] - corners[0, axis]
+        a = vertices[faces[m, 0], axis]
+        b, c, d = vertices[faces[m, 1], axis] - a, vertices[faces[m, 2], axis] - a, points[p, axis] - a
         bb += b * b
         bc += b * c
         cc += c * c
-        bp += b * p
-        cp += c * p
+        bp += b * d
+        cp += c * d
     area = bb * cc - bc * bc
     s, t = cc * bp - bc * cp, bb * cp - bc * bp
-    foot = np.inf
-    if area > 0.0 and s >= 0.0 and t >= 0.0 and s + t <= area:
-        foot = squared_to(point, corners, s / area, t / area)
-    tiny = 1e-300
-    s = min(max(bp / max(bb, tiny), 0.0), 1.0)
-    t = min(max(cp / max(cc, tiny), 0.0), 1.0)
-    far = min(max((cp - bp + bb - bc) / max(bb - 2.0 * bc + cc, tiny), 0.0), 1.0)
-    sides = min(squared_to(point, corners, s, 0.0), squared_to(point, corners, 0.0, t))
-    return min(foot, sides, squared_to(point, corners, 1.0 - far, far))
+    inside = area > 0.0 and s >= 0.0 and t >= 0.0 and s + t <= area
+    foot = squared_to(points, p, vertices, faces, m, s / area, t / area) if inside else np.inf
+    s, t = min(max(bp / max(bb, TINY), 0.0), 1.0), min(max(cp / max(cc, TINY), 0.0), 1.0)
+    far = min(max((cp - bp + bb - bc) / max(bb - 2.0 * bc + cc, TINY), 0.0), 1.0)
+    one, two = squared_to(points, p, vertices, faces, m, s, 0.0), squared_to(points, p, vertices, faces, m, 0.0, t)
+    return min(foot, one, two, squared_to(points, p, vertices, faces, m, 1.0 - far, far))
 
 
-@kernel("void(f8[:,::1], f8[:,:,::1], i8[:,::1], f8[:,::1], f8, f8[::1])")
-def nearest_triangle(
+@kernel("f8(f8[:,::1], i8, f8[:,::1], i8)")
+def squared_to_box(points: NDArray[np.float64], p: int, boxes: NDArray[np.float64], node: int) -> float:
+    """Return the squared distance from a point to the box of a node."""
+    squared = 0.0
+    for axis in range(3):
+        below, above = boxes[2 * node, axis] - points[p, axis], points[p, axis] - boxes[2 * node + 1, axis]
+        gap = below if below > above else above
+        gap = gap if gap > 0.0 else 0.0
+        squared += gap * gap
+    return squared
+
+
+@kernel("f8(f8[:,::1], i8, f8[:,::1], i8)")
+def squared_between(points: NDArray[np.float64], p: int, vertices: NDArray[np.float64], v: int) -> float:
+    """Return the squared distance from a point to a vertex."""
+    squared = 0.0
+    for axis in range(3):
+        squared += (points[p, axis] - vertices[v, axis]) ** 2
+    return squared
+
+
+@kernel("f8(f8[:,::1], i8, f8[:,::1], i4[:,::1], i8)")
+def squared_to_box_of(
+    points: NDArray[np.float64], p: int, vertices: NDArray[np.float64], faces: NDArray[np.int32], m: int
+) -> float:
+    """Return the squared distance from a point to the box of a face."""
+    squared = 0.0
+    for axis in range(3):
+        x = points[p, axis]
+        a, b, c = vertices[faces[m, 0], axis] - x, vertices[faces[m, 1], axis] - x, vertices[faces[m, 2], axis] - x
+        low, high = (a, b) if a < b else (b, a)
+        low, high = c if c < low else low, c if c > high else high
+        gap = low if low > -high else -high
+        gap = gap if gap > 0.0 else 0.0
+        squared += gap * gap
+    return squared
+
+
+@kernel("void(f8[:,::1], f8[:,::1], i4[:,::1], f8[:,::1], f8[::1], i4[::1], i8, i8)")
+def nearest_simplices(
     points: NDArray[np.float64],
-    corners: NDArray[np.float64],
-    candidates: NDArray[np.int64],
-    reach: NDArray[np.float64],
-    radius: float,
-    distance: NDArray[np.float64],
+    vertices: NDArray[np.float64],
+    simplices: NDArray[np.int32],
+    boxes: NDArray[np.float64],
+    squared: NDArray[np.float64],
+    nearest: NDArray[np.int32],
+    start: int,
+    stop: int,
 ) -> None:
-    """Find the distance from each point to the nearest of its candidate triangles.
+    """Find the triangle, or the vertex, that is nearest to each point, and its squared distance.
 
     Parameters
     ----------
-    points : (n, 3) float array
-    corners : (m, 3, 3) float array
-    candidates : (n, c) int64 array
-        Numbers of triangles, the nearest center first.
-    reach : (n, c) float array
-        Distance of their centers.
-    radius : float
-        No triangle reaches farther from its center; the search ends where no later candidate can be nearer.
-    distance : (n,) float array
-        Result.
+    points : (p, 3) float array
+        Neighbors in the array should be neighbors in space: each starts from the nearest of the one before.
+    vertices : (n, 3) float array
+    simplices : (m, k) int32 array
+        Triangles (k = 3) or vertices (k = 1), in the order of the tree.
+    boxes : (4 P, 3) float array
+        The tree. See `tomomesh.kernels.bvh`.
+    squared : (p,) float array
+    nearest : (p,) int32 array
+        Results.
+    start, stop : int
+        Points to work on.
     """
-    for n in range(len(points)):
-        best = np.inf
-        for c in range(candidates.shape[1]):
-            if reach[n, c] - radius > best:
-                break
-            best = min(best, np.sqrt(squared_distance(points[n], corners[candidates[n, c]])))
-        distance[n] = best
+    depth = depth_of(boxes)
+    leaves = home = 1 << depth
+    found = 0
+    stack, gaps = np.empty(64, np.int64), np.empty(64)
+    for p in range(start, stop):
+        best, climbing = np.inf, home
+        stack[0], gaps[0], waiting = home, 0.0, 1
+        while waiting > 0 or climbing > 1:
+            if waiting == 0:
+                stack[0], gaps[0], waiting = climbing ^ 1, squared_to_box(points, p, boxes, climbing ^ 1), 1
+                climbing >>= 1
+            waiting -= 1
+            node, gap = stack[waiting], gaps[waiting]
+            while node < leaves and gap < best:
+                near, far = 2 * node, 2 * node + 1
+                gap, wider = squared_to_box(points, p, boxes, near), squared_to_box(points, p, boxes, far)
+                if wider < gap:
+                    near, far, gap, wider = far, near, wider, gap
+                if wider < best:
+                    stack[waiting], gaps[waiting] = far, wider
+                    waiting += 1
+                node = near
+            if gap >= best:
+                continue
+            for m in range((node - leaves) * len(simplices) >> depth, (node - leaves + 1) * len(simplices) >> depth):
+                here = best
+                if simplices.shape[1] == 1:
+                    here = squared_between(points, p, vertices, simplices[m, 0])
+                elif squared_to_box_of(points, p, vertices, simplices, m) < best:
+                    here = squared_distance(points, p, vertices, simplices, m)
+                if here < best:
+                    best, found, home = here, m, node
+        squared[p], nearest[p] = best, found

@@ -6,65 +6,116 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..model.points import PointSet
+from ..progress import Progress, silent
+from .components import Measures, per_component
 from .distance import distance_to_surface, spread_of
-from .shape import triangle_shapes
-from .topology import distinct_positions, topology, welded
+from .intersections import marked_in
+from .links import Links
+from .shape import areas_and_volumes, lengths_and_turns, shapes_of_edges, shapes_of_faces
+from .topology import Topology, distinct_positions, topology, topology_of, welded
+from .tree import Tree
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.mesh import TriMesh
 
+    Floats = NDArray[np.float64]
+
 SAMPLES = 20_000
 """Samples a surface for its distance to another."""
+HUNDRED = 100
+"""Parts of the progress that is told."""
 
 
 def assess(
     mesh: TriMesh,
     *,
-    points: PointSet | NDArray[np.float64] | None = None,
+    points: PointSet | Floats | None = None,
     against: TriMesh | None = None,
     cavities: int = 0,
+    threads: int = 0,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Measure a mesh.
 
     Parameters
     ----------
     mesh : TriMesh
-        One face at least.
+        One face at least, and finite vertices; it may have borders.
     points : PointSet or (p, 3) float array, optional
         The points that the surface should pass through.
     against : TriMesh, optional
         A surface that it should equal.
     cavities : int
         Components that may face inward.
+    threads : int
+        0 is one a core. The result does not depend on it.
+    progress : callable
+        Told how far the stage ``measure`` is, in percent; what it raises ends the work.
 
     Returns
     -------
     dict
         Counts, areas, volumes, triangle shapes and distances; each key names its unit (see docs/report.md).
     """
-    counts = topology(mesh, cavities=cavities)
-    apart = distinct_positions(mesh, np.float32) == len(mesh.vertices)
-    again = counts if apart else topology(welded(mesh), cavities=cavities)
-    found: dict[str, Any] = {"vertices": len(mesh.vertices), "faces": len(mesh.faces), **asdict(counts)}
-    found |= {"closed": counts.boundary_edges == 0, "sound": counts.sound, "sound_after_welding": again.sound}
-    found["area_mm2"] = float(mesh.face_areas.sum())
-    found["volume_mm3"] = float(mesh.face_volumes.sum())
-    found |= triangle_shapes(mesh)
+    links, (areas, volumes) = Links(mesh), areas_and_volumes(mesh, threads=threads)
+    counts = topology_of(links, volumes, cavities=cavities)
+    found = _counted(mesh, counts, cavities)
+    found["area_mm2"] = float(areas.sum())
+    found["volume_mm3"] = float(volumes.sum()) if found["closed"] else None
+    lengths, turns = lengths_and_turns(mesh, links, threads=threads)
+    found |= shapes_of_edges(lengths, turns) | shapes_of_faces(mesh, threads=threads)
+    tree = Tree.of_faces(mesh, threads=threads)
+    crossing = marked_in(tree, threads=threads, progress=_part(progress, 10, 50))
+    found["self_intersections"] = int(crossing.sum())
+    distances = nearest = None
     if points is not None:
         points = points.positions if isinstance(points, PointSet) else points
-        found |= spread_of(distance_to_surface(points, mesh), "points_to_surface_")
-        found |= spread_of(np.asarray(cKDTree(points).query(mesh.vertices)[0]), "vertices_to_points_")
+        distances, nearest, back = _distances(mesh, tree, points, threads, progress)
+        found |= spread_of(distances, "points_to_surface_") | spread_of(back, "vertices_to_points_")
+    found["per_component"] = per_component(links, Measures(areas, volumes, crossing, lengths, distances, nearest))
+    found["components_not_listed"] = counts.components - len(found["per_component"])
     if against is not None:
-        found |= compare(mesh, against)
+        found |= compare(mesh, against, threads=threads)
+    progress("measure", HUNDRED, HUNDRED)
     return found
 
 
-def compare(mesh: TriMesh, other: TriMesh, *, leave_out: NDArray[np.bool_] | None = None) -> dict[str, float]:
+def _counted(mesh: TriMesh, counts: Topology, cavities: int) -> dict[str, Any]:
+    """Return what was counted on a mesh, and whether it is sound, also after welding."""
+    apart = distinct_positions(mesh, np.float32) == len(mesh.vertices)
+    again = counts if apart else topology(welded(mesh), cavities=cavities)
+    found: dict[str, Any] = {"vertices": len(mesh.vertices), "faces": len(mesh.faces), **asdict(counts)}
+    return found | {
+        "closed": counts.boundary_edges == 0,
+        "sound": counts.sound,
+        "sound_after_welding": again.sound,
+    }
+
+
+def _distances(
+    mesh: TriMesh, tree: Tree, points: Floats, threads: int, progress: Progress
+) -> tuple[Floats, NDArray[np.int32], Floats]:
+    """Return the distances of points to a mesh, the faces nearest to them, and the vertices' distances to points."""
+    if len(points) == 0:
+        return np.empty(0), np.empty(0, np.int32), np.empty(0)
+    dots = Tree.of_points(points, threads=threads)
+    there, face = tree.nearest(points, order=dots.order, threads=threads, progress=_part(progress, 50, 80))
+    back, _ = dots.nearest(mesh.vertices, threads=threads, progress=_part(progress, 80, HUNDRED))
+    return there, face, back
+
+
+def _part(progress: Progress, start: int, stop: int) -> Progress:
+    """Tell a part of the work as a part of the stage ``measure``, in percent."""
+    return lambda _stage, done, total: progress("measure", start + (stop - start) * done // total, HUNDRED)
+
+
+def compare(
+    mesh: TriMesh, other: TriMesh, *, leave_out: NDArray[np.bool_] | None = None, threads: int = 0
+) -> dict[str, float]:
     """Measure the distances between two surfaces, both ways.
 
     Parameters
@@ -72,22 +123,23 @@ def compare(mesh: TriMesh, other: TriMesh, *, leave_out: NDArray[np.bool_] | Non
     mesh, other : TriMesh
     leave_out : (m,) bool array, optional
         Faces of `mesh` that are not sampled.
+    threads : int
+        0 is one a core.
 
     Returns
     -------
     dict
-        Mean, 95th percentile and maximum from `mesh` to `other`, and, prefixed with ``back_``, from `other`.
+        Mean, percentiles and maximum from `mesh` to `other`, and, prefixed with ``back_``, from `other`.
     """
-    there = distance_to_surface(area_samples(mesh, leave_out=leave_out), other)
-    back = distance_to_surface(area_samples(other), mesh)
+    there = distance_to_surface(area_samples(mesh, leave_out=leave_out), other, threads=threads)
+    back = distance_to_surface(area_samples(other), mesh, threads=threads)
     return spread_of(there, "") | spread_of(back, "back_")
 
 
-def area_samples(
-    mesh: TriMesh, count: int = SAMPLES, *, leave_out: NDArray[np.bool_] | None = None
-) -> NDArray[np.float64]:
+def area_samples(mesh: TriMesh, count: int = SAMPLES, *, leave_out: NDArray[np.bool_] | None = None) -> Floats:
     """Draw points uniformly by area from a mesh, (count, 3); the same points every time."""
-    areas = mesh.face_areas if leave_out is None else np.where(leave_out, 0.0, mesh.face_areas)
+    areas = areas_and_volumes(mesh)[0]
+    areas = areas if leave_out is None else np.where(leave_out, 0.0, areas)
     rng = np.random.default_rng(0)
     reached = np.cumsum(areas)
     if len(areas) == 0 or reached[-1] == 0:
@@ -96,5 +148,5 @@ def area_samples(
     u, v = rng.random((2, count, 1))
     over = u + v > 1
     u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
-    a, b, c = (mesh.corners[face, n] for n in range(3))
+    a, b, c = (mesh.vertices[mesh.faces[face, n]] for n in range(3))
     return np.asarray(a + u * (b - a) + v * (c - a))

@@ -6,17 +6,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from ..errors import InternalCheckError
+from ..kernels.positions import first_alike
 from ..model.mesh import TriMesh
+from .links import Links
+from .shape import areas_and_volumes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FAULTS = ("boundary_edges", "nonmanifold_edges", "nonmanifold_vertices", "misoriented_edges", "inward_components")
 """The counts that are 0 on a closed, outward 2-manifold."""
+STIR = np.uint64(0x9E3779B97F4A7C15)
+"""2^64 over the golden ratio (Knuth 1973, vol. 3, 6.4)."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,7 @@ class Topology:
     euler_number : int
         Vertices - edges + faces; vertices that no face uses do not count.
     genus : int
-        Handles, all components together; meaningful where the mesh is closed and manifold.
+        Handles, all components together; meaningful where the mesh is manifold.
     boundary_edges : int
         Edges with one face.
     nonmanifold_edges : int
@@ -40,7 +43,9 @@ class Topology:
     misoriented_edges : int
         Edges that two faces run through in the same direction.
     inward_components : int
-        Components of negative volume that line no cavity.
+        Components without a border, of negative volume, that line no cavity.
+    boundary_loops : int
+        Closed lines that the edges with one face form.
     """
 
     components: int
@@ -51,6 +56,7 @@ class Topology:
     nonmanifold_vertices: int
     misoriented_edges: int
     inward_components: int
+    boundary_loops: int
 
     @property
     def faults(self) -> dict[str, int]:
@@ -77,54 +83,30 @@ def topology(mesh: TriMesh, *, cavities: int = 0) -> Topology:
     -------
     Topology
     """
-    used = np.unique(mesh.faces)
-    n = len(mesh.vertices)
-    half = mesh.half_edges
-    low, high = half.min(axis=1), half.max(axis=1)
-    _, edge, uses = np.unique(low * n + high, return_inverse=True, return_counts=True)
-    forward = np.bincount(edge, weights=half[:, 0] < half[:, 1], minlength=len(uses))
-    label = face_components(mesh)
-    components = int(label.max(initial=-1)) + 1
-    euler = len(used) - len(uses) + len(mesh.faces)
-    volumes = np.bincount(label, mesh.face_volumes, components)
+    return topology_of(Links(mesh), areas_and_volumes(mesh)[1], cavities=cavities)
+
+
+def topology_of(links: Links, volumes: NDArray[np.float64], *, cavities: int = 0) -> Topology:
+    """Count what `topology` counts, from the adjacency of a mesh and the volumes (m,) under its faces."""
+    euler = int(links.used.sum()) - len(links.uses) + len(links.faces)
+    inward = np.bincount(links.face_pieces, volumes, links.pieces) < 0
+    inward[links.face_pieces[links.borders // 3]] = False
     return Topology(
-        components=components,
-        euler_number=int(euler),
-        genus=int(components - euler // 2),
-        boundary_edges=int((uses == 1).sum()),
-        nonmanifold_edges=int((uses > 2).sum()),
-        nonmanifold_vertices=_fans(mesh, edge) - len(used),
-        misoriented_edges=int(((uses == 2) & (forward != 1)).sum()),
-        inward_components=abs(int((volumes < 0).sum()) - cavities),
+        components=links.pieces,
+        euler_number=euler,
+        genus=links.pieces - (euler + len(links.loops)) // 2,
+        boundary_edges=len(links.borders),
+        nonmanifold_edges=int((links.uses > 2).sum()),
+        nonmanifold_vertices=links.fan_count - int(links.used.sum()),
+        misoriented_edges=links.misoriented,
+        inward_components=abs(int(inward.sum()) - cavities),
+        boundary_loops=len(links.loops),
     )
 
 
 def face_components(mesh: TriMesh) -> NDArray[np.int64]:
     """Return the number of the connected piece of each face, (m,), in the order of their lowest vertex."""
-    n = len(mesh.vertices)
-    links = sparse.coo_array((np.ones(len(mesh.half_edges), bool), tuple(mesh.half_edges.T)), shape=(n, n))
-    _, label = connected_components(links, directed=False)
-    if len(mesh.faces) == 0:
-        return np.empty(0, np.int64)
-    return np.unique(label[mesh.faces[:, 0]], return_inverse=True)[1].astype(np.int64)
-
-
-def _fans(mesh: TriMesh, edge: NDArray[np.int64]) -> int:
-    """Count the fans of faces around all vertices: corners that are joined across an edge at the same vertex.
-
-    `edge` is the number of the undirected edge under each half edge (3m,).
-    """
-    corner = np.arange(len(edge))
-    after = corner - corner % 3 + (corner + 1) % 3
-    vertex = mesh.faces.ravel()
-    ends = np.stack([corner, after], axis=1)
-    forward = (vertex[corner] < vertex[after])[:, None]
-    ends = np.where(forward, ends, ends[:, ::-1])
-    order = np.argsort(edge, kind="stable")
-    same = edge[order][1:] == edge[order][:-1]
-    first, second = ends[order[:-1][same]].ravel(), ends[order[1:][same]].ravel()
-    links = sparse.coo_array((np.ones(len(first), bool), (first, second)), shape=(len(edge), len(edge)))
-    return int(connected_components(links, directed=False)[0])
+    return Links(mesh).face_pieces.astype(np.int64)
 
 
 def welded(mesh: TriMesh, dtype: type[np.floating[Any]] = np.float32) -> TriMesh:
@@ -132,18 +114,27 @@ def welded(mesh: TriMesh, dtype: type[np.floating[Any]] = np.float32) -> TriMesh
 
     Faces that lose a corner are dropped.
     """
-    kept = mesh.vertices.astype(dtype)
-    unique, number = np.unique(kept, axis=0, return_inverse=True)
-    faces = number.reshape(-1)[mesh.faces]
+    rounded = mesh.vertices.astype(dtype).astype(np.float64)
+    first = _first_alike(rounded)
+    kept = first == np.arange(len(first))
+    faces = (np.cumsum(kept) - 1)[first][mesh.faces]
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return TriMesh(unique.astype(np.float64), faces[whole].astype(np.int64))
+    return TriMesh(rounded[kept], faces[whole])
 
 
-def check_promise(mesh: TriMesh, *, cavities: int = 0) -> None:
+def check_promise(mesh: TriMesh, *, cavities: int = 0, open_: bool = False) -> None:
     """Check what is promised of every mesh that is written.
 
     Closed, 2-manifold, outward but for the linings of cavities, finite, and no two vertices at one position: so
     no edge has zero length, and welding equal positions changes nothing.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    cavities : int
+        Components that are known to line a cavity, and so must face inward.
+    open_ : bool
+        Let the mesh have borders: then it is a consistently oriented 2-manifold with boundary.
 
     Raises
     ------
@@ -153,17 +144,37 @@ def check_promise(mesh: TriMesh, *, cavities: int = 0) -> None:
     if not np.isfinite(mesh.vertices).all():
         raise InternalCheckError("the mesh has vertices that are not finite", expected="finite coordinates")
     found = {name: count for name, count in topology(mesh, cavities=cavities).faults.items() if count}
+    if open_:
+        found.pop("boundary_edges", None)
     coincident = len(mesh.vertices) - distinct_positions(mesh, np.float64)
     found |= {"vertices at the position of another": coincident} if coincident else {}
     if found:
         raise InternalCheckError(
             "the mesh failed its own check",
             found=", ".join(f"{name} = {count}" for name, count in found.items()),
-            expected="closed, manifold and outward, also after welding",
+            expected=f"{'' if open_ else 'closed, '}manifold and outward, also after welding",
         )
 
 
 def distinct_positions(mesh: TriMesh, dtype: type[np.floating[Any]]) -> int:
     """Count the positions that stay apart at a precision."""
-    rounded = np.ascontiguousarray(mesh.vertices.astype(dtype) + dtype(0))
-    return len(np.unique(rounded.view(np.dtype((np.void, 3 * rounded.itemsize)))))
+    first = _first_alike(mesh.vertices.astype(dtype).astype(np.float64))
+    return int((first == np.arange(len(first))).sum())
+
+
+def _first_alike(positions: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Return the first vertex at the position of each, (n,); 0 and -0 are the same position."""
+    rows = np.ascontiguousarray(positions + 0.0).view(np.int64)
+    bits = len(rows).bit_length() + 1
+    first = np.empty(len(rows), np.int32)
+    first_alike(rows, _stirred(rows.view(np.uint64), bits), np.full(1 << bits, -1, np.int32), first)
+    return first
+
+
+def _stirred(rows: NDArray[np.uint64], bits: int) -> NDArray[np.int64]:
+    """Make one number of so many bits out of each row, (n,): products stir their high bits, shifts bring them down."""
+    place = np.zeros(len(rows), np.uint64)
+    for column in rows.T:
+        place = (place ^ column) * STIR
+        place ^= place >> np.uint64(32)
+    return (place * STIR >> np.uint64(64 - bits)).astype(np.int64)

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
 NEURON, BRIDGE, CAP = 0, 1, 2
 """What a point is: a trained neuron, a sample of a bridged gap, a sample of a closing cap."""
+
+KINDS = (NEURON, BRIDGE, CAP)
+
+COLORS = ("red", "green", "blue")
+"""The attributes that together are a point's color, uint8."""
 
 
 @dataclass(frozen=True)
@@ -30,12 +37,24 @@ class PointSet:
         Its number within the network of that slice, -1 where it is not a neuron.
     kinds : (n,) uint8 array
         ``NEURON``, ``BRIDGE`` or ``CAP``; measured points of a cloud count as ``NEURON``.
+    attributes : mapping of str to (n,) or (n, c) array
+        What else is known of each point, by name: `COLORS`, ``intensity`` and the like.
     """
 
     positions: NDArray[np.float64]
     slices: NDArray[np.int32]
     neurons: NDArray[np.int32]
     kinds: NDArray[np.uint8]
+    attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, values in self.attributes.items():
+            if values.ndim not in (1, 2) or len(values) != len(self.positions):
+                raise UsageError(
+                    "an attribute does not fit its points",
+                    found=f"{name}: shape = {values.shape}",
+                    expected=f"({len(self)},) or ({len(self)}, c)",
+                )
 
     @classmethod
     def from_positions(cls, positions: NDArray[np.float64]) -> PointSet:
@@ -59,10 +78,16 @@ class PointSet:
         return len(self.positions)
 
     def joined(self, other: PointSet) -> PointSet:
-        """Append the points of another set."""
+        """Append the points of another set; attributes that only one of them has are dropped."""
+        both = {
+            name: np.concatenate([values, other.attributes[name]])
+            for name, values in self.attributes.items()
+            if name in other.attributes and other.attributes[name].shape[1:] == values.shape[1:]
+        }
         return PointSet(
             np.concatenate([self.positions, other.positions]),
             np.concatenate([self.slices, other.slices]),
             np.concatenate([self.neurons, other.neurons]),
             np.concatenate([self.kinds, other.kinds]),
+            both,
         )

@@ -91,7 +91,12 @@ class NetworkSettings(Group):
         choices=("region", "boundary", "auto"),
         paper="region",
     )
-    network: str = param("ring", "topology of the network", choices=("chain", "ring", "grid"))
+    network: str = param(
+        "ring",
+        "topology of the network; none takes the window's boundary itself as the surface, at the places between the "
+        "voxels where the gray levels cross the window's bounds",
+        choices=("chain", "ring", "grid", "none"),
+    )
     neurons: int = param(58, "neurons a slice", low=3, high=4_096)
     training: str = param(
         "batch", "one presentation at a time, or all at once", choices=("online", "batch"), paper="online"
@@ -159,8 +164,13 @@ class CubeSettings(Group):
         None, "cubes by which gaps in the shell are closed; by default the fewest that keep the outside out",
         kind=int, unit="cubes", low=0, high=64,
     )  # fmt: skip
+    largest: bool = param(False, "keep the largest surface alone")
     allow_leaks: bool = param(False, "write the surface even where the outside leaks into the shell")
-    surface: str = param("outer", "the outer surfaces, or all, cavities too", choices=("outer", "all"))
+    surface: str = param(
+        "auto",
+        "the outer surfaces, or all, cavities too; auto is outer, and all without a network",
+        choices=("auto", "outer", "all"),
+    )
     smoothing: int = param(3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000)
 
 
@@ -168,6 +178,13 @@ class CubeSettings(Group):
 class FitSettings(Group):
     """Dynamic mass-spring mesh (eq. 5-7)."""
 
+    attraction: str = param(
+        "auto",
+        "what draws a vertex: the nearest point, or the surface that the points around it describe; "
+        "auto is the surface for clouds and the nearest point for networks",
+        choices=("auto", "nearest", "surface"),
+        paper="nearest",
+    )
     stiffness: float = param(0.25, "sum of the structural stiffness at a vertex over k_d", low=0)
     damping: float = param(1.0, "damping over critical damping", above=0)
     step: float = param(0.8, "time step, in units of 1/omega; at most the damping and its inverse", above=0, high=1)
@@ -207,6 +224,9 @@ class RunSettings(Group):
         "mm",
         "unit that the numbers of a cloud are in; studies are always in mm",
         choices=("mm", "cm", "m", "unknown"),
+    )
+    local_origin: bool = param(
+        False, "write a cloud's mesh relative to the lowest corner of the points; the report tells where that is"
     )
 
 

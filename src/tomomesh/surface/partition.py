@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+ASKED = 10_000
+"""Points whose neighbors are sought to find the sampling distance of all."""
+
+
 def partition(positions: NDArray[np.float64], cell_mm: NDArray[np.float64]) -> CubeGrid:
     """Flag the cubes that hold points, and register the points of each.
 
@@ -58,22 +62,22 @@ def sampling_distance(positions: NDArray[np.float64], *, neighbors: int = 6) -> 
     """Estimate the distance of neighboring samples of a surface, from their positions alone.
 
     If points lie s apart, so that each owns s^2 of the surface, the k-th neighbor is about s sqrt(k / pi)
-    away, on a grid as well as for points thrown at random. The median over the points is returned; repeated
-    points count once.
+    away, on a grid as well as for points thrown at random. The median over some of the points is returned.
 
     Parameters
     ----------
     positions : (n, 3) float array
+        Each once.
     neighbors : int
 
     Returns
     -------
     float
-        In the unit of the positions; 1 where there are not two different points.
+        In the unit of the positions; 1 where there are not two points.
     """
-    distinct = np.unique(positions, axis=0)
-    k = min(neighbors, len(distinct) - 1)
+    k = min(neighbors, len(positions) - 1)
     if k < 1:
         return 1.0
-    distance, _ = cKDTree(distinct).query(distinct, k=[k + 1])
+    tree = cKDTree(positions, balanced_tree=False, compact_nodes=False)
+    distance, _ = tree.query(positions[:: -(-len(positions) // ASKED)], k=[k + 1])
     return float(np.median(distance) * np.sqrt(np.pi / k))

@@ -1,0 +1,27 @@
+"""Packages that only some formats need."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from ..errors import FormatError
+
+
+def required(package: str, *, file: str) -> Any:
+    """Return a package that reads a kind of file, imported on first use.
+
+    Raises
+    ------
+    FormatError
+        Where it is not installed; it names the package and the extra that brings it.
+    """
+    try:
+        return import_module(package)
+    except ImportError:
+        raise FormatError(
+            f"this kind of file needs the package {package}",
+            file=file,
+            found=f"{package} = not installed",
+            hint='pip install "tomomesh[clouds]"',
+        ) from None

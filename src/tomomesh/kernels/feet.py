@@ -1,0 +1,325 @@
+"""Loops of a mesh that is drawn to the surface under its samples: feet, springs, steps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .compile import kernel
+from .samples import gather
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+
+SIGHT = 2.5
+"""Standard deviations of a Gaussian weight that are looked at."""
+MOST = 1024
+"""Samples that are looked at."""
+FACING = 0.2
+"""Cosine of the angle between a sample's normal and the mesh's under which the sample belongs to another side."""
+
+
+@kernel("void(f8[:,::1], f8[:,::1], i8[::1], i8[::1], f8[::1], i4[::1], i8, i8)")
+def nearest_places(
+    places: Floats,
+    points: Floats,
+    keys: Integers,
+    start: Integers,
+    frame: Floats,
+    nearest: NDArray[np.int32],
+    begin: int,
+    end: int,
+) -> None:
+    """Find the point nearest to each place, within three cubes.
+
+    Parameters
+    ----------
+    places : (n, 3) float array
+    points : (p, 3) float array
+        In the order of their cubes.
+    keys, start, frame : arrays
+        See `tomomesh.kernels.samples`.
+    nearest : (n,) int32 array
+        Result: number of the point, -1 where there is none. The first of several at the same distance.
+    begin, end : int
+        Places to work on.
+    """
+    found = np.empty(MOST, np.int64)
+    for v in range(begin, end):
+        nearest[v] = -1
+        for ring in range(1, 4):
+            best = (ring * frame[3]) ** 2
+            count = gather(points, keys, start, frame, places[v], ring * frame[3], found)
+            for n in range(count):
+                p = found[n]
+                squared = 0.0
+                for axis in range(3):
+                    squared += (points[p, axis] - places[v, axis]) ** 2
+                if squared < best:
+                    best = squared
+                    nearest[v] = p
+            if nearest[v] >= 0:
+                break
+
+
+@kernel("b1(f8[:,::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], i8[::1])")
+def find_foot(
+    samples: Floats,
+    keys: Integers,
+    start: Integers,
+    frame: Floats,
+    place: Floats,
+    normal: Floats,
+    reach: float,
+    foot: Floats,
+    found: Integers,
+) -> bool:
+    """Find how high a place lies over the surface that the samples around it describe.
+
+    The height is a mean, with Gaussian weights, of the heights over the samples' planes (Kolluri 2008), of which
+    each is measured along the mean of the sample's own normal and the common one: then samples of a sphere give
+    no height at all to any place on it.
+
+    Parameters
+    ----------
+    samples : (p, 7) float array
+        Position, normal that faces outward, standard deviation of its weight.
+    keys, start, frame : arrays
+    place, normal : (3,) float arrays
+        The normal of the mesh there: samples that face elsewhere have no say.
+    reach : float
+        How far to look.
+    foot : (4,) float array
+        Result: height, and the unit normal of the surface.
+    found : (m,) int64 array
+        Room to work in.
+
+    Returns
+    -------
+    bool
+        Whether there was any sample.
+    """
+    count = gather(samples, keys, start, frame, place, reach, found)
+    foot[:] = 0.0
+    total = 0.0
+    for n in range(count):
+        p = found[n]
+        facing = over = squared = 0.0
+        for axis in range(3):
+            step = place[axis] - samples[p, axis]
+            facing += normal[axis] * samples[p, 3 + axis]
+            over += step * samples[p, 3 + axis]
+            squared += step * step
+        if facing < FACING:
+            found[n] = -1
+            continue
+        width = samples[p, 6]
+        weight = facing * facing * np.exp(-0.5 * (squared - 0.75 * over * over) / (width * width))
+        total += weight
+        for axis in range(3):
+            foot[1 + axis] += weight * samples[p, 3 + axis]
+    length = np.sqrt(foot[1] ** 2 + foot[2] ** 2 + foot[3] ** 2)
+    if total < 1e-12 or length == 0.0:
+        return False
+    for axis in range(3):
+        foot[1 + axis] /= length
+    for n in range(count):
+        p = found[n]
+        if p < 0:
+            continue
+        facing = over = squared = height = 0.0
+        for axis in range(3):
+            step = place[axis] - samples[p, axis]
+            facing += normal[axis] * samples[p, 3 + axis]
+            over += step * samples[p, 3 + axis]
+            squared += step * step
+            height += 0.5 * step * (samples[p, 3 + axis] + foot[1 + axis])
+        width = samples[p, 6]
+        foot[0] += facing * facing * np.exp(-0.5 * (squared - 0.75 * over * over) / (width * width)) * height / total
+    return True
+
+
+@kernel("void(f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], i8[::1], i8[::1], f8[::1], f8[:,::1], i8, i8)")
+def find_feet(
+    places: Floats,
+    normals: Floats,
+    reach: Floats,
+    samples: Floats,
+    keys: Integers,
+    start: Integers,
+    frame: Floats,
+    feet: Floats,
+    begin: int,
+    end: int,
+) -> None:
+    """Find the foot of each place (see `find_foot`).
+
+    Parameters
+    ----------
+    places, normals : (n, 3) float arrays
+    reach : (n,) float array
+        How far each place looks; 0 where it has no sample.
+    samples, keys, start, frame : arrays
+    feet : (n, 4) float array
+        Result: height and unit normal; zeros where there is no sample.
+    begin, end : int
+        Places to work on.
+    """
+    found = np.empty(MOST, np.int64)
+    for v in range(begin, end):
+        sees = reach[v] > 0.0 and find_foot(
+            samples, keys, start, frame, places[v], normals[v], reach[v], feet[v], found
+        )
+        if not sees:
+            feet[v] = 0.0
+
+
+@kernel("void(i4[:,::1], i8[::1], i4[::1])")
+def list_neighbors(quads: NDArray[np.int32], start: Integers, neighbors: NDArray[np.int32]) -> None:
+    """List the neighbors of each vertex along the sides of the squares.
+
+    Parameters
+    ----------
+    quads : (q, 4) int32 array
+        A closed 2-manifold: every side belongs to two squares, which run through it in opposite directions.
+    start : (n + 1,) int64 array
+        Where the neighbors of each vertex begin, from the number of squares around it.
+    neighbors : (4q,) int32 array
+        Result.
+    """
+    filled = np.zeros(len(start) - 1, np.int32)
+    for q in range(len(quads)):
+        for corner in range(4):
+            v = quads[q, corner]
+            neighbors[start[v] + filled[v]] = quads[q, (corner + 1) % 4]
+            filled[v] += 1
+
+
+@kernel("void(f8[:,::1], i8[::1], i4[::1], f8, f8[:,::1], i8, i8)")
+def average(
+    vertices: Floats,
+    start: Integers,
+    neighbors: NDArray[np.int32],
+    share: float,
+    result: Floats,
+    begin: int,
+    end: int,
+) -> None:
+    """Move each vertex a share of the way to the mean of its neighbors.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float array
+    start, neighbors : arrays
+        From `list_neighbors`.
+    share : float
+    result : (n, 3) float array
+    begin, end : int
+        Vertices to work on.
+    """
+    for v in range(begin, end):
+        count = start[v + 1] - start[v]
+        for axis in range(3):
+            total = 0.0
+            for n in range(start[v], start[v + 1]):
+                total += vertices[neighbors[n], axis]
+            result[v, axis] = vertices[v, axis] + share * (total / count - vertices[v, axis])
+
+
+@kernel("void(f8[:,::1], i4[:,::1], f8[:,::1])")
+def quad_normals(vertices: Floats, quads: NDArray[np.int32], normals: Floats) -> None:
+    """Find unit normals (n, 3) at the vertices: the sum of the vector areas of the squares around each."""
+    normals[:] = 0.0
+    for q in range(len(quads)):
+        a, b, c, d = quads[q, 0], quads[q, 1], quads[q, 2], quads[q, 3]
+        for axis in range(3):
+            one, two = (axis + 1) % 3, (axis + 2) % 3
+            area = (vertices[c, one] - vertices[a, one]) * (vertices[d, two] - vertices[b, two])
+            area -= (vertices[c, two] - vertices[a, two]) * (vertices[d, one] - vertices[b, one])
+            for corner in range(4):
+                normals[quads[q, corner], axis] += area
+    for v in range(len(normals)):
+        length = np.sqrt(normals[v, 0] ** 2 + normals[v, 1] ** 2 + normals[v, 2] ** 2)
+        for axis in range(3):
+            normals[v, axis] /= max(length, 1e-300)
+
+
+@kernel("void(f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8[:,:,::1], f8[::1], i8, i8)")
+def advance(
+    state: NDArray[np.float64],
+    feet: Floats,
+    anchors: Floats,
+    start: Integers,
+    neighbors: NDArray[np.int32],
+    rates: Floats,
+    result: NDArray[np.float64],
+    sums: Floats,
+    begin: int,
+    end: int,
+) -> None:
+    """Take one step of the dynamic mesh: x += h x', x' += h x'' (eq. 5-7, explicit Euler).
+
+    The attraction acts along the normal of the foot. The springs act within the surface there, so that they even
+    the mesh out and shrink nothing: those to the neighbors, and one to where the vertex came from, without which
+    the mesh would creep for ever. Where a vertex has no foot its springs act in all directions.
+
+    Parameters
+    ----------
+    state : (n, 3, 3) float array
+        Position and velocity of each vertex, and where it came from.
+    feet : (n, 4) float array
+        Height over the surface at the anchor, and its unit normal there; zeros where there is no foot.
+    anchors : (n, 3) float array
+        Where each foot was sought.
+    start, neighbors : arrays
+        From `list_neighbors`.
+    rates : (5,) float array
+        Time step, damping over critical damping, longest step that a vertex may take, stiffness of the spring to
+        where it came from over that of all others, and the speed from which a vertex counts as moving.
+    result : (n, 3, 3) float array
+        The state after the step.
+    sums : (8,) float array
+        Result over these vertices: largest speed, largest acceleration; the sums of kinetic energy, potential
+        energy and height; how many were slowed, have no foot, and still move.
+    begin, end : int
+        Vertices to work on.
+    """
+    h, damping, limit, hold = rates[0], rates[1], rates[2], rates[3]
+    pull = np.empty(3)
+    sums[:] = 0.0
+    for v in range(begin, end):
+        count = start[v + 1] - start[v]
+        along = feet[v, 0]
+        tension = speed = change = drawn = 0.0
+        for axis in range(3):
+            total = 0.0
+            for n in range(start[v], start[v + 1]):
+                total += state[neighbors[n], 0, axis]
+            pull[axis] = (total / count + hold * state[v, 2, axis]) / (1 + hold) - state[v, 0, axis]
+            along += feet[v, 1 + axis] * (state[v, 0, axis] - anchors[v, axis])
+            tension += feet[v, 1 + axis] * pull[axis]
+            drawn += feet[v, 1 + axis] ** 2
+        for axis in range(3):
+            pull[axis] -= tension * feet[v, 1 + axis]
+            sums[3] += 0.5 * pull[axis] ** 2
+            pull[axis] -= along * feet[v, 1 + axis] + 2 * damping * state[v, 1, axis]
+            speed += state[v, 1, axis] ** 2
+            change += pull[axis] ** 2
+        slow = min(1.0, limit / max(h * np.sqrt(speed), 1e-300))
+        sums[0] = max(sums[0], slow * np.sqrt(speed))
+        sums[1] = max(sums[1], np.sqrt(change))
+        sums[2] += 0.5 * slow * slow * speed
+        sums[3] += 0.5 * along * along
+        sums[4] += abs(along)
+        sums[5] += slow < 1.0
+        sums[6] += drawn == 0.0
+        sums[7] += max(speed, change) > rates[4] ** 2
+        for axis in range(3):
+            velocity = slow * state[v, 1, axis]
+            result[v, 0, axis] = state[v, 0, axis] + h * velocity
+            result[v, 1, axis] = velocity + h * pull[axis]
+            result[v, 2, axis] = state[v, 2, axis]

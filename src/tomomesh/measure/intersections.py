@@ -1,0 +1,77 @@
+"""Faces of a mesh that pass through each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.intersections import mark_intersections
+from ..kernels.threads import in_blocks
+from ..progress import Progress, silent
+from .tree import Tree
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.mesh import TriMesh
+
+BLOCK = 1_000
+"""Leaves of the tree handled at once: some milliseconds."""
+ROOM = 1_000
+"""Pairs looked for first."""
+
+
+def self_intersections(mesh: TriMesh, *, threads: int = 0, progress: Progress = silent) -> NDArray[np.bool_]:
+    """Mark the faces that pass through others.
+
+    Two faces pass through each other where they have a point in common that is inside of one of them at least:
+    not on its border, so that neighbors may share a vertex or an edge, and faces of different vertices may touch
+    along their sides. Faces in one plane count where they overlap, as a face that is folded onto its neighbor
+    does; a face without area passes through nothing. Exact but for positions that differ by rounding, which count
+    as touching.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        Finite vertices.
+    threads : int
+        0 is one a core.
+    progress : callable
+        Told how far the work is; what it raises ends the work.
+
+    Returns
+    -------
+    (m,) bool array
+    """
+    if len(mesh.faces) == 0:
+        return np.zeros(0, np.bool_)
+    return marked_in(Tree.of_faces(mesh, threads=threads), threads=threads, progress=progress)
+
+
+def marked_in(tree: Tree, *, threads: int = 0, progress: Progress = silent) -> NDArray[np.bool_]:
+    """Mark the faces of a tree that pass through others; see `self_intersections`."""
+    found, marked = np.zeros((2, len(tree.order)), np.bool_)
+    no_pairs = np.empty((0, 2), np.int64)
+
+    def mark(start: int, stop: int) -> None:
+        mark_intersections(tree.vertices, tree.simplices, tree.boxes, found, no_pairs, start, stop)
+
+    def done(count: int) -> None:
+        progress("intersections", count, tree.leaves)
+
+    in_blocks(mark, tree.leaves, block=BLOCK, threads=threads, done=done)
+    marked[tree.order] = found
+    return marked
+
+
+def intersecting_pairs(mesh: TriMesh) -> NDArray[np.int64]:
+    """Return the pairs of faces that pass through each other, the lower number first, sorted, (k, 2)."""
+    if len(mesh.faces) == 0:
+        return np.empty((0, 2), np.int64)
+    tree, count, pairs = Tree.of_faces(mesh), ROOM, np.empty((0, 2), np.int64)
+    while count > len(pairs):
+        pairs, marked = np.empty((count, 2), np.int64), np.zeros(len(tree.order), np.bool_)
+        count = mark_intersections(tree.vertices, tree.simplices, tree.boxes, marked, pairs, 0, tree.leaves)
+    found = np.sort(tree.order[pairs[:count]].astype(np.int64), axis=1)
+    return found[np.lexsort(found.T[::-1])]

@@ -1,0 +1,139 @@
+"""A tree of boxes over triangles or points, and the nearest of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.bvh import curve_keys, enclose_leaves, enclose_nodes, order_keys
+from ..kernels.threads import in_blocks
+from ..kernels.triangles import nearest_simplices
+from ..progress import Progress, silent
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.mesh import TriMesh
+
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int32]
+
+LEAF = 4
+"""Fewest simplices in a leaf, where there are so many; fewer than twice as many are the most."""
+SOME = 2_000
+"""Simplices that tell the usual extent."""
+BLOCK = 50_000
+"""Simplices handled at once, and ten times the points: some milliseconds."""
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Simplices in the order of a space-filling curve, and boxes around more and more of them.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float array
+    simplices : (m, k) int32 array
+        Vertices of each, in the order of the curve.
+    order : (m,) int32 array
+        The number that each had before.
+    boxes : (4 P, 3) float array
+        See `tomomesh.kernels.bvh`.
+    """
+
+    vertices: Floats
+    simplices: Ints
+    order: Ints
+    boxes: Floats
+
+    @classmethod
+    def of_faces(cls, mesh: TriMesh, *, threads: int = 0) -> Tree:
+        """Build the tree of the faces of a mesh; one at least, and finite vertices."""
+        return cls._over(mesh.vertices, mesh.faces.astype(np.int32), threads)
+
+    @classmethod
+    def of_points(cls, points: Floats, *, threads: int = 0) -> Tree:
+        """Build the tree of some points (n, 3); one at least, and finite ones."""
+        return cls._over(points, np.arange(len(points), dtype=np.int32)[:, None], threads)
+
+    @classmethod
+    def _over(cls, vertices: Floats, simplices: Ints, threads: int) -> Tree:
+        vertices = np.ascontiguousarray(vertices, np.float64)
+        order = _along_curve(vertices, simplices, threads)
+        simplices = simplices.take(order, axis=0)
+        leaves = 1 << max(len(simplices) // LEAF, 1).bit_length() - 1
+        boxes = np.empty((4 * leaves, 3))
+        in_blocks(
+            lambda start, stop: enclose_leaves(vertices, simplices, boxes, start, stop),
+            leaves,
+            block=BLOCK // LEAF,
+            threads=threads,
+        )
+        enclose_nodes(boxes)
+        return cls(vertices, simplices, order, boxes)
+
+    @property
+    def leaves(self) -> int:
+        """Number of leaves, a power of two."""
+        return len(self.boxes) // 4
+
+    def nearest(
+        self, points: Floats, *, order: Ints | None = None, threads: int = 0, progress: Progress = silent
+    ) -> tuple[Floats, Ints]:
+        """Find the simplex that is nearest to each point.
+
+        Parameters
+        ----------
+        points : (p, 3) float array
+        order : (p,) int32 array, optional
+            An order in which they are near each other, as that of a tree of them.
+        threads : int
+            0 is one a core.
+        progress : callable
+            Told how many points are done; what it raises ends the work.
+
+        Returns
+        -------
+        (p,) float array
+            Exact distances.
+        (p,) int32 array
+            Numbers of the simplices.
+        """
+        distance, number = np.empty(len(points)), np.empty(len(points), np.int32)
+        if len(points) == 0:
+            return distance, number
+        if order is None:
+            order = _along_curve(points, np.arange(len(points), dtype=np.int32)[:, None], threads)
+        along, squared, nearest = points.take(order, axis=0), distance.copy(), number.copy()
+        in_blocks(
+            lambda start, stop: nearest_simplices(
+                along, self.vertices, self.simplices, self.boxes, squared, nearest, start, stop
+            ),
+            len(points),
+            block=BLOCK // 10,
+            threads=threads,
+            done=lambda count: progress("distances", count, len(points)),
+        )
+        distance[order], number[order] = np.sqrt(squared), self.order[nearest]
+        return distance, number
+
+
+def _along_curve(vertices: Floats, simplices: Ints, threads: int) -> Ints:
+    """Order simplices along a space-filling curve, the large ones after all others."""
+    vertices = np.ascontiguousarray(vertices, np.float64)
+    low = np.array([column.min() for column in vertices.T])
+    side = max(*(float(column.max() - least) for column, least in zip(vertices.T, low, strict=True)), 1e-300)
+    some = vertices[simplices[:: max(len(simplices) // SOME, 1)]]
+    usual = max(float(np.median(np.ptp(some, axis=1).max(axis=1))), 1e-9 * side)
+    keys = np.empty(len(simplices), np.int64)
+    in_blocks(
+        lambda start, stop: curve_keys(vertices, simplices, low, side, usual, keys, start, stop),
+        len(simplices),
+        block=BLOCK,
+        threads=threads,
+    )
+    order = np.empty(len(simplices), np.int32)
+    order_keys(keys, order)
+    return order

@@ -1,0 +1,123 @@
+"""Where the gray levels cross the bounds of a window, between a voxel inside and its neighbor outside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..model.points import BRIDGE, CAP, NEURON
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+CLOSEST = 0.01
+"""A crossing comes no nearer to a voxel's center than this share of the way to its neighbor."""
+BARELY = 0.02
+"""How far the surface lies outside the center of a voxel that was added: its gray level is all but in the window."""
+STEPPED, SAMPLES = 0.5, 5_000
+"""Share of the crossings between two plateaus over which the gray levels are those of a mask, and how many are looked
+at to tell."""
+
+
+@dataclass(frozen=True)
+class Levels:
+    """The gray levels of a study, and a window on them.
+
+    Attributes
+    ----------
+    voxels : (K, J, I) or (K, J, I, L) array
+    lower, upper : float
+        A voxel is inside where lower < k <= upper in every layer.
+    """
+
+    voxels: NDArray[Any]
+    lower: float
+    upper: float
+
+    def nearest(self, places: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return the voxels that are nearest to places (n, 3), which are (x, y, z) and may lie beyond the border."""
+        return np.asarray(np.clip(places, 0, np.array(self.voxels.shape[2::-1], np.int32) - 1))
+
+    def at(self, places: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Return the levels (n, L) of voxels (n, 3); NaN beyond the border, and where they are not finite."""
+        near = self.nearest(places)
+        x, y, z = near.T
+        levels = self.voxels[z, y, x].astype(np.float64).reshape(len(places), -1)
+        levels[(near != places).any(axis=1)] = np.nan
+        levels[np.isinf(levels)] = np.nan
+        return np.asarray(levels)
+
+    def excess(self, places: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Return how far the level of each voxel is outside the window, (n,); infinite where it is unknown."""
+        levels = self.at(places)
+        return np.asarray(np.nan_to_num(np.maximum(self.lower - levels, levels - self.upper).max(axis=1), nan=np.inf))
+
+    def crossed(self, inner: NDArray[np.int32], outer: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Return the share of the way from voxels inside to their neighbors outside where a bound is crossed, (n,).
+
+        Levels are interpolated linearly, and of several layers the first to leave the window counts. Where a level
+        is not known the border is half way.
+        """
+        inside, outside = self.at(inner), self.at(outer)
+        bound = np.where(outside > self.upper, self.upper, self.lower)
+        with np.errstate(divide="ignore", invalid="ignore"):  # a voxel that was added may be no brighter than outside
+            share = (inside - bound) / (inside - outside)
+        within = (outside > self.lower) & (outside <= self.upper)
+        first = np.where(within, np.inf, share).min(axis=1)
+        return np.where(first <= 1, np.clip(first, CLOSEST, 1 - CLOSEST), 0.5)
+
+    def stepped(self, inner: NDArray[np.int32], steps: NDArray[np.int32]) -> bool:
+        """Tell whether most crossings lie between two plateaus, where levels say nothing of the border's place."""
+        every = -(-len(inner) // SAMPLES)
+        inner, steps = inner[::every], steps[::every]
+        before, inside, outside, after = (self.at(inner + n * steps) for n in (-1, 0, 1, 2))
+        plateaus = ((before == inside) & (outside == after)).all(axis=1)
+        return bool(plateaus.sum() > STEPPED * (~np.isnan(outside)).all(axis=1).sum())
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Where a surface crosses the lines between voxels.
+
+    Attributes
+    ----------
+    positions : (q, 3) float array
+        As voxel indices (x, y, z).
+    kinds : (q,) uint8 array
+        ``NEURON`` where gray levels were interpolated, ``CAP`` on the border of the volume, ``BRIDGE`` around a
+        voxel that is not in the window.
+    stepped : bool
+        Whether the gray levels are those of a mask.
+    """
+
+    positions: NDArray[np.float64]
+    kinds: NDArray[np.uint8]
+    stepped: bool
+
+
+def crossings(
+    levels: Levels, inner: NDArray[np.int32], steps: NDArray[np.int32], added: NDArray[np.bool_]
+) -> Crossings:
+    """Find where the boundary of a window crosses the lines between voxels.
+
+    Parameters
+    ----------
+    levels : Levels
+    inner : (q, 3) int32 array
+        Voxels inside, as (x, y, z).
+    steps : (q, 3) int32 array
+        From each to its neighbor outside.
+    added : (q,) bool array
+        Inner voxels that are not in the window.
+
+    Returns
+    -------
+    Crossings
+    """
+    outer = inner + steps
+    share = np.where(added, BARELY, levels.crossed(inner, outer))
+    beyond = (levels.nearest(outer) != outer).any(axis=1)
+    kinds = np.where(added, BRIDGE, np.where(beyond, CAP, NEURON)).astype(np.uint8)
+    return Crossings(inner + share[:, None] * steps, kinds, levels.stepped(inner, steps))

@@ -1,0 +1,309 @@
+"""A net of springs around the voxels of a mask: every vertex moves within a cell of its own (Gibson 1998)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.cells import find_neighbors
+from ..kernels.nets import mean_of, split_squares
+from ..kernels.threads import in_blocks
+from ..kernels.voxels import list_faces, list_fans
+from ..model.cubes import key_step, keys_of
+from ..model.mesh import TriMesh
+from ..progress import Progress, silent
+from .contacts import CORNERS, cells_where
+from .neighbors import DIRECTIONS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from ..settings import FitSettings
+    from .crossings import Crossings
+
+BLOCK = 40_000
+"""Vertices or faces handled in one call: far below 100 ms."""
+WALL = 1e-3
+"""Share of a cell that a vertex keeps from its walls."""
+TENSION = 2.4
+"""Springs' share at a stiffness of 1: at the default the surface turns less than one through the crossings, and is
+as near to them."""
+BENDING, BENDS = 0.4, 40
+"""Share of the bending force that is followed in a step, where half would never rest; and the most steps."""
+
+STEPS = np.array([key_step(direction) for direction in DIRECTIONS])
+MIXED = np.array([0 < case < 255 for case in range(256)])
+OWNED = np.array([sum((case ^ case >> shift) & 1 for shift in (1, 2, 4)) for case in range(256)])
+"""Faces that a cell owns: those between its lowest corner and the next along each axis."""
+
+
+def _linked() -> NDArray[np.bool_]:
+    """Tell for every case which of the six neighbors share a side of a face with the cell: (256, 6)."""
+    inside = np.arange(256)[:, None] >> np.arange(8) & 1
+    beside = [inside[:, CORNERS[:, n // 2] == n % 2].sum(axis=1) for n in range(6)]
+    return np.stack([(count > 0) & (count < 4) for count in beside], axis=1)
+
+
+LINKED = _linked()
+
+
+@dataclass(frozen=True)
+class Net:
+    """The surface of a mask: a vertex in every cell between eight voxels that are not alike.
+
+    Attributes
+    ----------
+    low : (n, 3) float array
+        Lowest corner of each vertex' cell, as voxel indices (x, y, z).
+    links : (n, 6) int32 array
+        Neighbors along the sides of squares, by direction; -1 where there is none.
+    fans : (n, 6) int32 array
+        The squares around each vertex, then -1.
+    quads : (q, 4) int32 array
+        The squares, counter-clockwise from outside in the space of the indices.
+    inner : (q, 3) int32 array
+        The voxel behind each.
+    directions : (q,) uint8 array
+        The direction from it to the voxel outside.
+    """
+
+    low: NDArray[np.float64]
+    links: NDArray[np.int32]
+    fans: NDArray[np.int32]
+    quads: NDArray[np.int32]
+    inner: NDArray[np.int32]
+    directions: NDArray[np.uint8]
+
+    @property
+    def steps(self) -> NDArray[np.int32]:
+        """Steps from the voxels inside to those outside, (q, 3)."""
+        return np.array(DIRECTIONS, np.int32)[self.directions]
+
+
+def net_around(mask: NDArray[np.bool_], threads: int = 0) -> Net:
+    """Span a net around the voxels of a mask.
+
+    Parameters
+    ----------
+    mask : (K, J, I) bool array
+        Well composed, with one layer of background around it; voxel (0, 0, 0) of the study is its (1, 1, 1).
+    threads : int
+
+    Returns
+    -------
+    Net
+        Vertices in the order of their cells, by z, then y, then x.
+    """
+    cells, cases = cells_where(mask, MIXED, threads)
+    table = np.empty((len(cells), 6), np.int32)
+    find_neighbors(keys_of(cells.astype(np.int64)), STEPS, table)
+    table[~LINKED[cases]] = -1
+    owned = OWNED[cases]
+    first = np.cumsum(owned) - owned
+    total = int(owned.sum())
+    quads, directions = np.empty((total, 4), np.int32), np.empty(total, np.uint8)
+    fans = np.empty((len(cells), 6), np.int32)
+
+    def work(start: int, stop: int) -> None:
+        list_faces(cases, table, first, quads, directions, start, stop)
+        list_fans(cases, table, first, fans, start, stop)
+
+    in_blocks(work, len(cells), block=BLOCK, threads=threads)
+    low = cells - np.int32(1)
+    backward = np.maximum(-np.array(DIRECTIONS, np.int32), 0)[directions]
+    return Net(low.astype(np.float64), table, fans, quads, np.repeat(low, owned, axis=0) + backward, directions)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A net at rest.
+
+    Attributes
+    ----------
+    start, positions : (n, 3) float arrays
+        The vertices before and after, as voxel indices (x, y, z).
+    steps : int
+    converged : bool
+        Whether the last step moved no vertex farther than the tolerance.
+    """
+
+    start: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    steps: int
+    converged: bool
+
+
+def settle(
+    net: Net, crossings: Crossings, settings: FitSettings, *, threads: int = 0, progress: Progress = silent
+) -> Rest:
+    """Draw the middles of the squares to their crossings, while springs even the net out.
+
+    At rest  mean(p - c) + s mean(x_j - x) = 0  for every vertex x: p are the crossings and c the middles of the
+    squares around it, x_j its neighbors, s the stiffness. No vertex leaves its cell. Where the gray levels are those
+    of a mask, nothing is drawn, and the net loses its bends instead:  x <- x - b mean(l_j - l),  l = mean(x_j - x).
+
+    Parameters
+    ----------
+    net : Net
+    crossings : Crossings
+        One a square.
+    settings : FitSettings
+    threads : int
+    progress : callable
+
+    Returns
+    -------
+    Rest
+    """
+    motion = _Motion(net, crossings.positions, TENSION * settings.stiffness, threads)
+    start = position = motion.means(crossings.positions, net.fans)
+    advance = motion.unbent if crossings.stepped else motion.drawn
+    most = min(settings.max_steps, BENDS) if crossings.stepped else settings.max_steps
+    farthest, count = np.inf, 0
+    while farthest > settings.tolerance and count < most:
+        position, farthest = advance(position)
+        count += 1
+        progress("fit", count, most)
+    progress("fit", max(count, 1), max(count, 1))
+    return Rest(start, position, count, farthest <= settings.tolerance)
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """The steps of a net; each reads one state and writes the next, block by block."""
+
+    net: Net
+    crossings: NDArray[np.float64]
+    stiffness: float
+    threads: int
+
+    def means(
+        self,
+        values: NDArray[np.float64],
+        members: NDArray[np.int32],
+        finish: Callable[[NDArray[np.float64], slice], None] = lambda found, at: None,
+    ) -> NDArray[np.float64]:
+        """Average rows of an array over lists of them (m, s), and let each block be finished in place: (m, 3)."""
+        found = np.empty((len(members), 3))
+
+        def work(start: int, stop: int) -> None:
+            mean_of(values, members, found, start, stop)
+            finish(found[start:stop], slice(start, stop))
+
+        in_blocks(work, len(members), block=BLOCK, threads=self.threads)
+        return found
+
+    def drawn(self, position: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Move every vertex by the pull of its crossings and of its neighbors; return also the farthest move.
+
+        Both pulls together are at most 1 + 2 s times a vertex' distance from rest, and no step up to twice the inverse
+        overshoots.
+        """
+
+        def pull(middle: NDArray[np.float64], at: slice) -> None:
+            np.subtract(self.crossings[at], middle, out=middle)
+
+        def move(pulled: NDArray[np.float64], at: slice) -> None:
+            pulled += self.stiffness * tension[at]
+            pulled *= share
+            moved.append(self._keep_in_cell(pulled, position, at))
+
+        share, moved = min(1.0, 2 / (1 + 2 * self.stiffness)), [0.0]
+        tension = self._tension(position)
+        return self.means(self.means(position, self.net.quads, pull), self.net.fans, move), max(moved)
+
+    def unbent(self, position: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Move every vertex to where the net bends as it does around; return also the farthest move."""
+
+        def move(around: NDArray[np.float64], at: slice) -> None:
+            np.subtract(tension[at], around, out=around)
+            around *= BENDING
+            moved.append(self._keep_in_cell(around, position, at))
+
+        moved = [0.0]
+        tension = self._tension(position)
+        return self.means(tension, self.net.links, move), max(moved)
+
+    def _tension(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
+        def less(around: NDArray[np.float64], at: slice) -> None:
+            around -= position[at]
+
+        return self.means(position, self.net.links, less)
+
+    def _keep_in_cell(self, step: NDArray[np.float64], position: NDArray[np.float64], at: slice) -> float:
+        """Turn a block of steps into the places they lead to, the walls of the cells kept; return the farthest."""
+        step += position[at]
+        np.clip(step, self.net.low[at] + WALL, self.net.low[at] + (1 - WALL), out=step)
+        return float(np.abs(step - position[at]).max())
+
+
+def triangulated(
+    net: Net, rest: Rest, crossings: Crossings, affine: NDArray[np.float64], threads: int = 0
+) -> tuple[TriMesh, TriMesh, NDArray[np.int32]]:
+    """Split every square by the diagonal that bends it least, and place the net before and after in space.
+
+    Where neither diagonal would keep a square between its two voxels, it is split into four at its crossing. So no
+    two faces meet but at their sides: a square stays in the octahedron of its two voxels and its four vertices, each
+    in a cell of its own, and the octahedra do not overlap (after Ju & Udeshi 2006).
+
+    Parameters
+    ----------
+    net : Net
+    rest : Rest
+    crossings : Crossings
+    affine : (4, 4) float array
+        Voxel indices to millimeters.
+    threads : int
+
+    Returns
+    -------
+    start, mesh : TriMesh
+        The same faces over the vertices before and after: two a square in the order of the squares, then the other
+        two of those that are split into four, whose crossings are the last vertices.
+    fours : (f,) int32 array
+        The squares that are split into four.
+    """
+    before, after = (placed(indices, affine, threads) for indices in (rest.start, rest.positions))
+    halves, apart = np.empty((len(net.quads), 2, 3), np.int64), np.empty(len(net.quads), np.bool_)
+
+    def work(start: int, stop: int) -> None:
+        split_squares(
+            rest.positions, after, net.quads, crossings.positions, net.directions, halves, apart, start, stop
+        )  # fmt: skip
+
+    in_blocks(work, len(apart), block=BLOCK, threads=threads)
+    fours = np.flatnonzero(~apart).astype(np.int32)
+    quarters = _quarters(net.quads[fours], len(after))
+    halves[fours] = quarters[:, :2]
+    faces = np.concatenate([halves.reshape(-1, 3), quarters[:, 2:].reshape(-1, 3)])
+    faces = faces if right_handed(affine) else np.ascontiguousarray(faces[:, ::-1])
+    added = placed(crossings.positions[fours], affine, threads)
+    start, mesh = (TriMesh(np.concatenate([vertices, added]), faces) for vertices in (before, after))
+    return start, mesh, fours
+
+
+def _quarters(quads: NDArray[np.int32], first: int) -> NDArray[np.int64]:
+    """Split squares (q, 4) into four triangles each at centers that are numbered from `first`: (q, 4, 3)."""
+    centers = np.broadcast_to(first + np.arange(len(quads))[:, None], quads.shape)
+    return np.stack([quads, np.roll(quads, -1, axis=1), centers], axis=2).astype(np.int64)
+
+
+def placed(indices: NDArray[np.float64], affine: NDArray[np.float64], threads: int = 0) -> NDArray[np.float64]:
+    """Carry indices (n, 3) to millimeters; in blocks, for which one thread is quicker than a matrix library's many."""
+    found, turn = np.empty_like(indices), np.ascontiguousarray(affine[:3, :3].T)
+
+    def work(start: int, stop: int) -> None:
+        np.matmul(indices[start:stop], turn, out=found[start:stop])
+        found[start:stop] += affine[:3, 3]
+
+    in_blocks(work, len(indices), block=BLOCK, threads=threads)
+    return found
+
+
+def right_handed(affine: NDArray[np.float64]) -> bool:
+    """Tell whether the axes of the indices are right-handed in space."""
+    return bool(np.linalg.det(affine[:3, :3]) > 0)

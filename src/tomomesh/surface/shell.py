@@ -1,0 +1,108 @@
+"""Close the gaps of a shell of cubes, and find what it keeps the outside from.
+
+Topology comes from a coarser scale than geometry: the cubes are dilated until the outside no longer reaches the
+inside, and what was added is taken away again from the outside only (a morphological closing).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..kernels.boards import compose, flood
+from .blocks import Blocks
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from .blocks import Board
+
+NEAR = 2
+"""Steps, beyond twice the dilation, from enclosed space within which an occupied cube counts as near it: noise may
+make a shell two cubes thick, and a dilation leaves little of what is enclosed."""
+
+
+@dataclass(frozen=True)
+class Shell:
+    """A closed set of cubes, and what became of the space around it.
+
+    Attributes
+    ----------
+    blocks : Blocks
+    occupied : board
+        Cubes that hold points.
+    solid : board
+        The objects, filled: all that the outside does not reach.
+    witnesses : board
+        Occupied cubes that tell of an inside: near space that the dilation left empty and the outside does not
+        reach, or surrounded by other occupied cubes.
+    within : (c, 3) int64 array
+        Occupied cubes inside the objects, that belong to nothing that the outside reaches: objects in cavities.
+    closing : int
+        Cubes by which the shell was dilated and eroded.
+    added : int
+        Cubes that were filled to make the solid well composed.
+    """
+
+    blocks: Blocks
+    occupied: Board
+    solid: Board
+    witnesses: Board
+    within: NDArray[np.int64]
+    closing: int
+    added: int
+
+
+def close_shell(cells: NDArray[np.int64], closing: int, *, threads: int = 0) -> Shell:
+    """Dilate the shell, let the outside in, and take back from the outside what the dilation added.
+
+    Parameters
+    ----------
+    cells : (c, 3) int64 array
+        Positions (x, y, z) of the cubes that hold points, or that are known to lie on the surface.
+    closing : int
+        Cubes by which the shell is dilated.
+    threads : int
+
+    Returns
+    -------
+    Shell
+        Its solid is well composed: no two of its cubes, nor two empty ones, touch along an edge or at a corner
+        only, so that its surface is a 2-manifold.
+
+    Notes
+    -----
+    The outside takes back no cube that lines enclosed space, or the erosion would open what the dilation closed.
+    """
+    blocks = Blocks.around(cells, closing + NEAR, threads=threads)
+    occupied = blocks.board_of(cells)
+    dilated = blocks.grown(occupied, closing)
+    outside = blocks.beyond()
+    flood(~dilated, blocks.table, outside)
+    enclosed = ~(dilated | outside)
+    lining = blocks.grown(enclosed)
+    outside = blocks.spread(outside, dilated & ~occupied & ~lining, closing)
+    solid, added = _well_composed(blocks, ~outside)
+    reached = blocks.grown(outside) & dilated
+    flood(dilated, blocks.table, reached)
+    within = blocks.cells(occupied & ~reached)
+    near = blocks.spread(enclosed, solid, 2 * closing + NEAR)
+    deep = ~blocks.grown(~occupied)
+    return Shell(blocks, occupied, solid, occupied & (near | deep), within, closing, added)
+
+
+def _well_composed(blocks: Blocks, solid: Board) -> tuple[Board, int]:
+    """Fill contacts along edges and at corners until there are none; return how many cubes that took.
+
+    What is filled may shut a pocket off from the outside, which then belongs to the solid.
+    """
+    total = 0
+    while True:
+        filled = solid.copy()
+        added = compose(solid, blocks.table, filled, 0, len(blocks))
+        if not added:
+            return solid, total
+        outside = blocks.beyond()
+        flood(~filled, blocks.table, outside)
+        solid, total = ~outside, total + added

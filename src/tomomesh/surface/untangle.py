@@ -1,0 +1,66 @@
+"""Take a mesh back where the fit made it pass through itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from ..model.mesh import TriMesh
+    from .drape import Ring
+
+ROUNDS = 24
+"""Rounds after which what still passes through itself is left, and reported."""
+GENTLE = 4
+"""Rounds in which the mesh is only smoothed; later it also goes back."""
+BACK = 0.25
+"""Share of the way back to where it came from that a vertex takes in a later round."""
+
+
+def untangle(
+    mesh: TriMesh, origin: NDArray[np.float64], ring: Ring, tangled: Callable[[TriMesh], NDArray[np.bool_]]
+) -> tuple[TriMesh, int]:
+    """Smooth a mesh where it passes through itself, and take it back towards where it came from.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    origin : (n, 3) float array
+        Its vertices where it does not pass through itself: before the fit.
+    ring : Ring
+        The neighbors of its vertices.
+    tangled : callable
+        Marks the faces (m,) of a mesh that pass through others.
+
+    Returns
+    -------
+    mesh : TriMesh
+    taken_back : int
+        Vertices that do not lie where the fit had them.
+    """
+    moved = np.zeros(len(mesh.vertices), bool)
+    for count in range(ROUNDS):
+        marked = tangled(mesh)
+        if not marked.any():
+            break
+        region = _around(mesh, marked, 1 + count // GENTLE)
+        moved |= region
+        vertices = ring.smoothed(mesh.vertices, 2)
+        if count >= GENTLE:
+            vertices += BACK * (origin - vertices)
+        mesh = mesh.moved(np.where(region[:, None], vertices, mesh.vertices))
+    return mesh, int(moved.sum())
+
+
+def _around(mesh: TriMesh, marked: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
+    """Return the vertices (n,) of some faces and of those around them."""
+    region = np.zeros(len(mesh.vertices), bool)
+    region[mesh.faces[marked]] = True
+    for _ in range(steps):
+        region[mesh.faces[region[mesh.faces].any(axis=1)]] = True
+    return region
