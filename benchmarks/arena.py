@@ -102,14 +102,18 @@ class Arena:
         """Return what the peers found that have a surface, from the cache where it is there."""
         key = _digest(case.cloud.read_bytes() + case.reference.read_bytes() + str(PINS).encode())
         found = {peer: self._kept(peer, case, key) for peer in PEERS}
-        return {peer: figures for peer, figures in found.items() if figures}
+        return {peer: figures for peer, figures in found.items() if "cd" in figures}
 
     def _kept(self, peer: Method, case: Case, key: str) -> Found:
+        """Return what a peer found; what failed is not kept, for it may not fail again."""
         kept = CACHE / "found" / f"{case.cloud.stem}-{key}-{peer.name}-{peer.depth}.json"
-        if self.fresh or not kept.exists():
+        if kept.exists() and not self.fresh:
+            return Found(json.loads(kept.read_text()))
+        found = self.scored(peer, case)
+        if "cd" in found:
             kept.parent.mkdir(parents=True, exist_ok=True)
-            kept.write_text(json.dumps(self.scored(peer, case)))
-        return Found(json.loads(kept.read_text()))
+            kept.write_text(json.dumps(found))
+        return found
 
     def scored(self, method: Method, case: Case, repeats: int = 0) -> Found:
         """Run a method, and score its surface; see `timed`."""

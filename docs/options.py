@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tomomesh.cli.options import spellings
 from tomomesh.settings import UNSET, limits_of, option_of, parameters
 
 if TYPE_CHECKING:
@@ -31,13 +32,13 @@ def row(entry: Field[Any]) -> str:
     meta = entry.metadata
     switch = meta["kind"] is bool
     negated = switch and entry.default
-    option = option_of(f"no_{entry.name}" if negated else entry.name)
+    options = [option_of(f"no_{entry.name}")] if negated else spellings(entry.name)
     what = f"do not {meta['help']}" if negated else meta["help"]
     allowed = ", ".join(meta["choices"]) or f"{COUNTS[meta['length']]}{limits_of(entry)}"
     default, paper = _value(entry.default), _value(meta["paper"])
     if switch:
         allowed, default, paper = "switch", "off", "" if meta["paper"] is UNSET else "given"
-    return f"| `{option}` | {what} | {meta['unit']} | {allowed} | {default} | {paper} |"
+    return f"| {', '.join(f'`{option}`' for option in options)} | {what} | {meta['unit']} | {allowed} | {default} | {paper} |"
 
 
 def _value(value: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -9,7 +10,11 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from numba.core import config
 
-from tomomesh.model.cubes import CubeGrid, keys_of
+from tomomesh.model.cubes import keys_of
+from tomomesh.model.mesh import QuadMesh
+from tomomesh.surface.blocks import Blocks
+from tomomesh.surface.shell import Shell
+from tomomesh.surface.walls import Walls, walls
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,12 +55,40 @@ def keys_in(solid: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.sort(keys_of(np.argwhere(solid)))
 
 
-def cubes_of(
-    keys: NDArray[np.int64], cell_mm: tuple[float, float, float] = (1.0, 1.0, 1.0), origin: float = 0.0
-) -> CubeGrid:
-    """Return a set of cubes without points."""
-    none = np.zeros(0, np.int64)
-    return CubeGrid(keys, np.full(3, origin), np.array(cell_mm), none, np.zeros(len(keys) + 1, np.int64))
+def contacts(solid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which cells of a grid lie in a block where cubes, or gaps, meet only diagonally: looking at every block."""
+    padded = np.pad(solid, 1)
+    found = np.zeros_like(padded)
+    for shape in ((1, 2, 2), (2, 1, 2), (2, 2, 1), (2, 2, 2)):
+        blocks = np.lib.stride_tricks.sliding_window_view(padded, shape)
+        blocks = blocks.reshape(*blocks.shape[:3], -1)
+        for corner in range(blocks.shape[3] // 2):
+            two = np.isin(np.arange(blocks.shape[3]), [corner, blocks.shape[3] - 1 - corner])
+            bare = (blocks == two).all(axis=3) | (blocks == ~two).all(axis=3)
+            for offset in product(*map(range, shape)):
+                found[tuple(slice(o, o + n) for o, n in zip(offset, bare.shape, strict=True))] |= bare
+    return np.asarray(found[1:-1, 1:-1, 1:-1])
+
+
+def composed(solid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Fill every block in which cubes, or gaps, meet only diagonally, until there is none."""
+    while (contacts(solid) & ~solid).any():
+        solid = solid | contacts(solid)
+    return solid
+
+
+def walls_of(solid: NDArray[np.bool_]) -> Walls:
+    """Return the walls of exactly the cubes in a grid (x, y, z), linings of cavities among them."""
+    cells = np.argwhere(solid)
+    blocks = Blocks.around(cells, 1)
+    board = blocks.board_of(cells)
+    return walls(Shell(blocks, board, board, board, cells[:0], closing=0, added=0))
+
+
+def cuberille_of(solid: NDArray[np.bool_]) -> QuadMesh:
+    """Return the same as a mesh of unit squares."""
+    found = walls_of(solid)
+    return QuadMesh(found.corners.astype(float), found.quads.astype(np.int64), keys_of(found.cells))
 
 
 def sphere(count: int, radius: float = 10.0) -> NDArray[np.float64]:

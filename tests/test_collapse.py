@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import trimesh
 
 from tomomesh import reconstruct_points
@@ -44,12 +45,13 @@ class TestWithoutCollapse:
         assert len(np.unique(found.vertices.astype(np.float32), axis=0)) == len(found.vertices)
 
 
-def test_scattered_strays_become_neither_surface_nor_a_fault() -> None:
+@pytest.mark.parametrize("attraction", ["nearest", "surface"])
+def test_scattered_strays_become_neither_surface_nor_a_fault(attraction: str) -> None:
     rng = np.random.default_rng(3)
     ball = rng.normal(size=(6000, 3))
     ball /= np.linalg.norm(ball, axis=1, keepdims=True)
-    found = reconstruct_points(np.concatenate([ball, rng.uniform(-2, 2, (40, 3))]))
+    found = reconstruct_points(np.concatenate([ball, rng.uniform(-2, 2, (40, 3))]), attraction=attraction)
     assert topology(found.mesh).sound
     assert found.report["quality"]["sound_after_welding"]
-    assert found.report["surface"]["debris"] > 0
+    assert found.report["surface"]["debris"] + found.report["points"].get("strays", 0) > 10
     assert found.report["quality"]["components"] == found.report["surface"]["taken"]

@@ -1,8 +1,8 @@
-"""Cubes: the partition holds every point whatever their order, and a well-composed set has no bare contacts."""
+"""Cubes: the partition holds every point whatever their order, and neighbors are those of a scan."""
 
 from __future__ import annotations
 
-from itertools import combinations, product
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from conftest import keys_in, law, seeds, size, solids
+from conftest import keys_in, law, seeds, solids
 from tomomesh.errors import EmptyError, ResourceError
 from tomomesh.model.cubes import MARGIN, SIDE, cells_of, key_step, keys_of
-from tomomesh.surface.composition import well_composed
 from tomomesh.surface.neighbors import OFFSETS, dilate, neighbor_table
-from tomomesh.surface.partition import partition, sampling_distance
+from tomomesh.surface.partition import is_flat, partition, sampling_distance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,29 +41,6 @@ def clouds(draw: st.DrawFn) -> NDArray[np.float64]:
 def bytes_of(grid: CubeGrid, points: NDArray[np.float64]) -> tuple[bytes, ...]:
     """Return a partition without the numbers of its points: cubes, and the points of each in their order."""
     return grid.keys.tobytes(), grid.origin.tobytes(), points[grid.order].tobytes(), grid.start.tobytes()
-
-
-def as_solid(keys: NDArray[np.int64], pad: int = 2) -> NDArray[np.bool_]:
-    """Return the smallest grid (x, y, z) that holds cubes, padded."""
-    found = cells_of(keys)
-    found = found - found.min(axis=0) + pad
-    solid = np.zeros(found.max(axis=0) + pad + 1, bool)
-    solid[tuple(found.T)] = True
-    return solid
-
-
-def bare_contacts(solid: NDArray[np.bool_]) -> int:
-    """Count the 2 x 2 and 2 x 2 x 2 blocks of a padded grid in which cubes, or gaps, meet only diagonally."""
-    count = 0
-    for a, b in combinations(range(3), 2):
-        blocks = np.lib.stride_tricks.sliding_window_view(solid, (2, 2), axis=(a, b)).reshape(-1, 4)
-        count += sum(pattern in ([True, False, False, True], [False, True, True, False]) for pattern in blocks.tolist())
-    bits = np.lib.stride_tricks.sliding_window_view(solid, (2, 2, 2)).reshape(-1, 8)
-    for block in np.unique(bits, axis=0):
-        for few in (np.flatnonzero(block), np.flatnonzero(~block)):
-            opposite = len(few) == 2 and few.sum() == 7
-            count += bool(opposite)
-    return count
 
 
 class TestKeys:
@@ -148,7 +124,7 @@ class TestSamplingDistance:
         points /= np.linalg.norm(points, axis=1, keepdims=True)
         one = sampling_distance(points)
         assert sampling_distance(points * scale) == pytest.approx(one * scale)
-        assert sampling_distance(np.concatenate([rng.permutation(points)] * 2)) == one
+        assert sampling_distance(rng.permutation(points)) == one
         assert one == pytest.approx(np.sqrt(4 * np.pi / 80), rel=0.35)
 
     def test_is_the_step_of_a_square_lattice(self) -> None:
@@ -157,7 +133,21 @@ class TestSamplingDistance:
         assert sampling_distance(flat) == pytest.approx(0.5, rel=0.05)
 
     def test_is_one_for_a_single_place(self) -> None:
-        assert sampling_distance(np.ones((5, 3))) == 1.0
+        assert sampling_distance(np.ones((1, 3))) == 1.0
+
+
+class TestFlat:
+    @law(40)
+    @given(seed=seeds, directions=st.integers(0, 3), place=st.sampled_from([0.0, -40.0]))
+    def test_are_points_in_a_plane_on_a_line_or_at_a_place(self, seed: int, directions: int, place: float) -> None:
+        rng = np.random.default_rng(seed)
+        points = rng.normal(size=(50, directions)) @ rng.normal(size=(directions, 3)) + place
+        assert is_flat(points, 1.0) == (directions < 3)
+
+    @pytest.mark.parametrize(("thick", "flat"), [(1e-8, True), (1e-3, False)])
+    def test_may_be_a_millionth_thick(self, thick: float, flat: bool) -> None:
+        points = np.random.default_rng(0).random((500, 3)) * [1, 1, thick]
+        assert is_flat(points, 1.0) == flat
 
 
 class TestNeighbors:
@@ -176,42 +166,3 @@ class TestNeighbors:
         moved = [np.argwhere(solid) + offset for offset in product(reach, repeat=3)]
         wanted = np.unique(keys_of(np.concatenate(moved)))
         np.testing.assert_array_equal(dilate(keys_in(solid), steps), wanted)
-
-
-class TestComposition:
-    @law(size(150, 80))
-    @given(solid=solids(5))
-    def test_leaves_no_bare_contact(self, solid: NDArray[np.bool_]) -> None:
-        assert bare_contacts(as_solid(well_composed(keys_in(solid)))) == 0
-
-    @law(100)
-    @given(solid=solids())
-    def test_only_adds(self, solid: NDArray[np.bool_]) -> None:
-        keys = keys_in(solid)
-        composed = well_composed(keys)
-        assert np.isin(keys, composed).all()
-        assert (np.diff(composed) > 0).all()
-        np.testing.assert_array_equal(well_composed(composed), composed)
-
-    @law(60)
-    @given(solid=solids(), axes=st.permutations(range(3)), flips=st.tuples(*[st.booleans()] * 3))
-    def test_a_mirrored_or_turned_set_gives_a_mirrored_or_turned_set(
-        self, solid: NDArray[np.bool_], axes: list[int], flips: tuple[bool, bool, bool]
-    ) -> None:
-        def turned(grid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-            return np.transpose(grid[tuple(slice(None, None, -1 if flip else 1) for flip in flips)], axes)
-
-        one = turned(as_solid(well_composed(keys_in(solid))))
-        np.testing.assert_array_equal(one, as_solid(well_composed(keys_in(turned(solid)))))
-
-    @law(60)
-    @given(solid=solids(5))
-    def test_leaves_alone_what_has_no_bare_contact(self, solid: NDArray[np.bool_]) -> None:
-        keys = keys_in(solid)
-        added = len(well_composed(keys)) - len(keys)
-        assert (added == 0) == (bare_contacts(as_solid(keys)) == 0)
-
-    @pytest.mark.parametrize("offset", [(1, 1, 0), (1, -1, 0), (0, 1, 1), (-1, 0, 1), (1, 1, 1), (-1, 1, -1)])
-    def test_joins_two_cubes_that_touch(self, offset: tuple[int, int, int]) -> None:
-        keys = np.sort(keys_of(np.array([(5, 5, 5), np.add((5, 5, 5), offset)])))
-        assert len(well_composed(keys)) == 2 ** np.count_nonzero(offset)

@@ -12,20 +12,20 @@ from hypothesis import strategies as st
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import spsolve
 
-from conftest import keys_in, law, seeds, size, solids, sphere
+from conftest import composed, cuberille_of, law, seeds, size, solids, sphere
 from tomomesh.errors import UsageError
-from tomomesh.model.cubes import CubeGrid, cells_of
 from tomomesh.settings import FitSettings
-from tomomesh.surface.closing import close_shell
-from tomomesh.surface.composition import well_composed
-from tomomesh.surface.cuberille import track
 from tomomesh.surface.dynamics import Fit, fit
+from tomomesh.surface.holding import CLOSINGS, hold
 from tomomesh.surface.partition import partition
 from tomomesh.surface.smooth import adjacency, low_pass
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
+    from tomomesh.model.cubes import CubeGrid
     from tomomesh.model.mesh import QuadMesh
 
     Floats = NDArray[np.float64]
@@ -33,11 +33,12 @@ if TYPE_CHECKING:
 LIMITS = ["clamp", "shorten"]
 
 
-def shell_of(points: Floats, cell_mm: float, closing: int | None = None) -> tuple[CubeGrid, QuadMesh]:
+def shell_of(
+    points: Floats, cell_mm: float | tuple[float, ...], closings: Iterable[int] = CLOSINGS
+) -> tuple[CubeGrid, QuadMesh]:
     """Return the cubes of a cloud, and their surface."""
-    grid = partition(points, np.full(3, cell_mm))
-    cubes = grid.with_cubes(well_composed(close_shell(grid.keys, closing).keys))
-    return cubes, track(cubes).mesh
+    grid = partition(points, np.broadcast_to(cell_mm, 3).astype(np.float64))
+    return hold(grid.cells, closings).walls.over(grid)
 
 
 def rested(points: Floats, cell_mm: float, settings: FitSettings, *, threads: int = 1) -> tuple[QuadMesh, Fit]:
@@ -55,9 +56,7 @@ def ball(count: int = size(1500, 300)) -> tuple[Floats, float]:
 @st.composite
 def meshes(draw: st.DrawFn) -> tuple[QuadMesh, CubeGrid, Floats]:
     """Draw a small closed surface whose vertices were moved, and the partition of those."""
-    keys = well_composed(keys_in(draw(solids(3))))
-    none = np.zeros(len(keys) + 1, np.int64)
-    quads = track(CubeGrid(keys, np.zeros(3), np.ones(3), none[:0], none)).mesh
+    quads = cuberille_of(composed(draw(solids(3))))
     rng = np.random.default_rng(draw(seeds))
     places = quads.vertices + rng.uniform(-0.3, 0.3, quads.vertices.shape)
     return quads, partition(places, np.ones(3)), places
@@ -132,7 +131,7 @@ class TestForces:
         """A wide closing adds cubes with no point around; such a vertex has no k_d, and with no springs stays."""
         points, cell = ball()
         points = points[points[:, 2] < 7]
-        cubes, mesh = shell_of(points, cell, closing=6)
+        cubes, mesh = shell_of(points, cell, closings=[6])
         settings = FitSettings(stiffness=stiffness)
         found = fit(mesh.vertices, mesh.edges, mesh.vertex_cubes, points, cubes, settings)
         free = found.nearest < 0
@@ -232,11 +231,8 @@ class TestLimit:
 
     def test_uses_the_shortest_edge(self) -> None:
         points, _ = ball(size(1500, 500))
-        cell_mm = np.array([1.5, 2.5, 3.0])
-        grid = partition(points, cell_mm)
-        assert cells_of(grid.keys).max() > 2
-        cubes = grid.with_cubes(well_composed(close_shell(grid.keys).keys))
-        mesh = track(cubes).mesh
+        cubes, mesh = shell_of(points, (1.5, 2.5, 3.0))
+        assert cubes.cells.max() > 2
         far = mesh.vertices * 3.0
         settings = FitSettings(step=1.0, max_steps=2)
         moved = fit(far, mesh.edges, mesh.vertex_cubes, points, cubes, settings).vertices - far

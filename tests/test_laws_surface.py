@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 COUNT = size(1200, 600)
+ATTRACTIONS = ["nearest", "surface"]
 
 
 def bytes_of(surface: Surface) -> tuple[bytes, bytes]:
@@ -40,12 +41,13 @@ def hollow_head() -> Volume:
 
 
 class TestOrder:
-    @law(8)
-    @given(seed=seeds, shape=st.sampled_from([sphere, torus]))
-    def test_changes_no_byte(self, seed: int, shape: Any) -> None:
+    @law(12)
+    @given(seed=seeds, shape=st.sampled_from([sphere, torus]), attraction=st.sampled_from(ATTRACTIONS))
+    def test_changes_no_byte(self, seed: int, shape: Any, attraction: str) -> None:
         points = shape(COUNT)
         shuffled = np.random.default_rng(seed).permutation(points)
-        assert bytes_of(reconstruct_points(points)) == bytes_of(reconstruct_points(shuffled))
+        one, other = (reconstruct_points(some, attraction=attraction) for some in (points, shuffled))
+        assert bytes_of(one) == bytes_of(other)
 
     @law(8)
     @given(seed=seeds)
@@ -55,9 +57,11 @@ class TestOrder:
         again = rng.permutation(np.concatenate([points, points[rng.integers(COUNT, size=COUNT // 2)]]))
         assert bytes_of(reconstruct_points(points)) == bytes_of(reconstruct_points(again))
 
-    def test_nor_do_threads(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("tomomesh.surface.dynamics.BLOCK", 101)
-        one, two = (reconstruct_points(sphere(COUNT), threads=n) for n in (1, 2))
+    @pytest.mark.parametrize("attraction", ATTRACTIONS)
+    def test_nor_do_threads(self, attraction: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        for block, size_of_it in (("dynamics.BLOCK", 101), ("drape.BLOCK", 97), ("blocks.SHARE", 3)):
+            monkeypatch.setattr(f"tomomesh.surface.{block}", size_of_it)
+        one, two = (reconstruct_points(sphere(COUNT), threads=n, attraction=attraction) for n in (1, 2))
         assert bytes_of(one) == bytes_of(two)
 
     def test_nor_do_equal_points_on_a_lattice_with_many_ties(self) -> None:
@@ -77,10 +81,11 @@ class TestOrder:
 
 
 class TestPlace:
+    @pytest.mark.parametrize("attraction", ATTRACTIONS)
     @pytest.mark.parametrize("far", [1e6, 1e9, -1e9])
-    def test_far_away_costs_no_precision_beyond_that_of_the_numbers(self, far: float) -> None:
+    def test_far_away_costs_no_precision_beyond_that_of_the_numbers(self, far: float, attraction: str) -> None:
         points = dyadic(torus(COUNT))
-        here, there = reconstruct_points(points), reconstruct_points(points + far)
+        here, there = (reconstruct_points(points + place, attraction=attraction) for place in (0.0, far))
         assert here.mesh.faces.tobytes() == there.mesh.faces.tobytes()
         assert here.cubes.keys.tobytes() == there.cubes.keys.tobytes()
         off = there.mesh.vertices - far - here.mesh.vertices
@@ -110,10 +115,14 @@ class TestSound:
         assert topology(surface.mesh).sound
         assert topology(surface.mesh).genus == 1
 
-    def test_all_surfaces_of_a_hollow_shell_can_be_asked_for(self) -> None:
-        """The surface of a cavity looks into it, and so encloses a negative volume: that is no fault."""
-        outer, both = (reconstruct_points(sphere(COUNT), surface=kind) for kind in ("outer", "all"))
-        assert both.report["surface"]["taken"] == 2 == 2 * outer.report["surface"]["taken"]
+    @pytest.mark.parametrize("attraction", ATTRACTIONS)
+    def test_a_surface_in_a_cavity_is_taken_where_asked(self, attraction: str) -> None:
+        """It looks inward, and so encloses a negative volume: that is no fault."""
+        points = np.concatenate([sphere(2 * COUNT, 14.0), sphere(COUNT // 2, 5.0)])
+        outer, both = (reconstruct_points(points, surface=kind, attraction=attraction) for kind in ("outer", "all"))
+        assert outer.report["surface"]["taken"] == 1
+        assert (both.report["surface"]["taken"], both.report["surface"]["cavities"]) == (2, 1)
+        assert topology(both.mesh).inward_components == 1
         assert topology(both.mesh).components == 2
         assert topology(both.mesh).boundary_edges == topology(both.mesh).nonmanifold_edges == 0
 

@@ -14,6 +14,7 @@ from scipy.optimize import LinearConstraint, minimize
 from scipy.spatial import cKDTree
 
 from conftest import law, seeds, size, sphere
+from tomomesh.cli.summary import of_check
 from tomomesh.kernels.cells import label_components, nearest_points
 from tomomesh.kernels.threads import in_blocks
 from tomomesh.kernels.triangles import squared_distance
@@ -31,6 +32,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
+
+
+@pytest.fixture(autouse=True)
+def _fewer_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tomomesh.measure.report.SAMPLES", size(20_000, 200))
 
 
 def icosphere(radius: float = 1.0, center: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> TriMesh:
@@ -319,6 +325,19 @@ class TestAssess:
         assert found["volume_mm3"] is None
         assert (found["boundary_loops"], found["boundary_edges"]) == (1, 3)
         assert [own["genus"] for own in found["per_component"]] == [1, 0, 0]
+
+    def test_is_told_in_fifteen_lines(self) -> None:
+        ball = icosphere()
+        parts = [ball.moved(ball.vertices * n + 9 * n) for n in (5, 4, 3, 2, 1)]
+        faces = [part.faces + n * len(ball.vertices) for n, part in enumerate(parts)]
+        faces[0] = faces[0][1:]
+        mesh = TriMesh(np.concatenate([part.vertices for part in parts]), np.concatenate(faces))
+        lines = of_check(assess(mesh, against=ball))
+        assert len(lines) <= 15
+        said = "\n".join(lines)
+        for told in ("3 boundary edges", "1 border(s)", "no face(s) pass", "part 1", "part 3", "and 2 more", "open"):
+            assert told in said
+        assert len(of_check(assess(ball))) == 7
 
     def test_lists_a_hundred_components_and_counts_the_rest(self) -> None:
         tetrahedron = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])

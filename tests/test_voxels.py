@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import nibabel
@@ -15,7 +17,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from skimage.measure import marching_cubes
 
-from conftest import keys_in, law, seeds, size, solids
+from conftest import composed, law, seeds, size, solids
 from studies import AFFINES, shared, write_nifti
 from tomomesh.cli import main
 from tomomesh.errors import EmptyError, ResourceError
@@ -23,7 +25,6 @@ from tomomesh.io import read_mesh, read_points, read_volume
 from tomomesh.measure.intersections import self_intersections
 from tomomesh.measure.report import compare
 from tomomesh.measure.topology import check_promise, topology
-from tomomesh.model.cubes import cells_of
 from tomomesh.model.mesh import TriMesh
 from tomomesh.model.points import CAP, NEURON
 from tomomesh.model.volume import Grid, Volume
@@ -31,15 +32,12 @@ from tomomesh.pipeline import Surface, reconstruct, segment
 from tomomesh.segment.window import window
 from tomomesh.settings import FitSettings
 from tomomesh.surface import nets
-from tomomesh.surface.composition import well_composed
 from tomomesh.surface.contacts import without_contacts
 from tomomesh.surface.crossings import CLOSEST
 from tomomesh.surface.nets import TENSION, WALL
 from tomomesh.surface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
@@ -146,7 +144,7 @@ class TestLaws:
     @given(solid=solids())
     def test_of_equal_levels_the_same_voxels_are_added_as_of_cubes(self, solid: NDArray[np.bool_]) -> None:
         joined = without_contacts(np.pad(solid.T, 1), lambda voxels: np.zeros(len(voxels)))[1:-1, 1:-1, 1:-1]
-        np.testing.assert_array_equal(np.argwhere(joined.T), np.unique(cells_of(well_composed(keys_in(solid))), axis=0))
+        np.testing.assert_array_equal(joined.T, composed(solid))
 
     @law(40)
     @given(gray=levels(), axis=st.integers(0, 2))
@@ -226,6 +224,18 @@ class TestPlace:
         assert found.crossings.stepped
         assert mean_turn(made.mesh) < 0.4 * mean_turn(rough)
         assert radius_error(made.mesh).mean() < radius_error(rough).mean()
+
+    def test_the_numbers_of_labels_do_not_matter(self) -> None:
+        mask = ball(8, kind="mask").voxels > 0
+        one, other = (surface_of(volume_of(np.where(mask, label, 0)), 0.5)[1].mesh for label in (1, 514))
+        np.testing.assert_array_equal(one.vertices, other.vertices)
+
+    @pytest.mark.parametrize(("blur", "noise", "stepped"), [(0.0, 0.05, True), (0.5, 0.05, False), (0.0, 3.0, False)])
+    def test_a_noisy_mask_is_one_but_no_blurred_border(self, blur: float, noise: float, stepped: bool) -> None:
+        mask = ball(10, kind="mask")
+        blurred = ndimage.gaussian_filter(mask.voxels, blur) if blur else mask.voxels
+        rough = blurred + noise * np.random.default_rng(0).normal(size=blurred.shape)
+        assert surface_of(replace(mask, voxels=rough))[0].crossings.stepped == stepped
 
     @pytest.mark.parametrize("spacing", [(1.0, 1.0, 1.0), (1.0, 1.0, 4.0)])
     def test_marching_cubes_finds_the_same_surface(self, spacing: tuple[float, float, float]) -> None:
@@ -346,6 +356,13 @@ class TestWay:
         assert report["quality"]["points_to_surface_mean_mm"] < 0.1 / 8
         assert surface.cuberille.triangulated().face_volumes.sum() == pytest.approx(stage_one.mask.sum() / 8**3)
         assert not surface.cap_faces.any()
+
+    def test_every_key_of_its_report_is_documented(self) -> None:
+        page = (Path(__file__).parents[1] / "docs" / "report.md").read_text(encoding="utf-8")
+        described = set(re.findall(r"^\| `([a-z_]+\.[a-z0-9_]+)` \|", page, re.MULTILINE))
+        report = reconstruct(ball(6), lower=0.0, network="none").report
+        sections = {name: found for name, found in report.items() if name not in ("settings", "warnings")}
+        assert {f"{name}.{key}" for name, found in sections.items() for key in found} <= described
 
     def test_the_plane_of_the_slices_does_not_move_the_surface(self) -> None:
         made = [reconstruct(ball(6), lower=0.0, network="none", slices=plane) for plane in ("axial", "sagittal")]

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .model.cubes import CubeGrid
     from .model.mesh import TriMesh
     from .model.networks import Networks
     from .model.points import PointSet
@@ -28,17 +27,18 @@ if TYPE_CHECKING:
     from .model.volume import Volume
     from .segment.sample import Sampling
     from .settings import Settings
-    from .surface.closing import Shell
-    from .surface.cuberille import Cuberille
+    from .surface.contours import ContourSurface
     from .surface.drape import Draped
     from .surface.holding import Held
     from .surface.samples import Samples
     from .surface.voxels import Boundary, VoxelSurface
 
 SECTIONS = (
-    "study", "window", "networks", "points", "cubes", "voxels", "surface", "fit", "quality", "truth", "timings",
+    "study", "window", "networks", "points", "cubes", "surface", "fit", "quality", "truth", "timings",
     "settings", "versions", "warnings",
 )  # fmt: skip
+ORDER = (*SECTIONS[: SECTIONS.index("surface")], "voxels", *SECTIONS[SECTIONS.index("surface") :])
+"""The same, and what stands in place of networks and cubes where there are none."""
 DRAWN = 0.9
 """Share of the vertices that must have a point near them, else a result is warned of."""
 PLAUSIBLE = 0.15
@@ -137,6 +137,15 @@ class Account:
             "spacing_mm": spacing,
         }
 
+    @property
+    def cavities(self) -> int:
+        """The surfaces taken that line a cavity."""
+        return int(self._sections["surface"]["cavities"])
+
+    def origin(self, lowest: NDArray[np.float64]) -> None:
+        """Note where the lowest corner of a cloud is."""
+        self._sections["points"]["origin"] = lowest.tolist()
+
     def samples(self, count: int, samples: Samples) -> None:
         """Note how far apart the points of a cloud are, how noisy, and how many are strays."""
         spacing, noise = float(np.median(samples.spacing)), float(np.median(samples.noise))
@@ -154,8 +163,10 @@ class Account:
         if samples.strays > STRAYS * count:
             self.warn(f"{samples.strays} of {count} points are strays, and were left out")
 
-    def held(self, held: Held, taken: NDArray[np.bool_], cell: NDArray[np.float64], cubes: int, bridged: int) -> None:
-        """Note the cubes of a cloud, the closing that made them hold, and which surfaces were taken."""
+    def held(
+        self, held: Held, taken: NDArray[np.bool_], cell: NDArray[np.float64], cubes: int, bridged: int = 0
+    ) -> None:
+        """Note the cubes, the closing that made them hold, and which surfaces were taken."""
         shell, walls = held.shell, held.walls
         self._sections["cubes"] = {
             "cell_mm": cell.tolist(),
@@ -163,7 +174,7 @@ class Account:
             "bridge_places": bridged,
             "closing": shell.closing,
             "added_for_composition": shell.added,
-            "two_sided": float(walls.two_sided[taken].min()),
+            "two_sided": held.two_sided,
             "holds": held.holds,
         }
         self._sections["surface"] = {
@@ -175,7 +186,15 @@ class Account:
             "enclosed_cubes": int(walls.volumes[taken].sum()),
         }
         if held.holds and shell.closing > WIDE:
-            self.warn(f"gaps up to {2 * shell.closing} cubes wide were closed: look at the faces marked as filled")
+            self.warn(f"gaps up to {2 * shell.closing} cubes wide were closed: the surface is made up there")
+
+    def unfitted(self, *, flat: bool) -> None:
+        """Warn of a shell that does not hold and was let pass: both its walls would rest on the same points."""
+        self.warn(
+            "the points lie in a plane, on a line or at one place: their shell is smoothed, but not fitted"
+            if flat
+            else "the outside leaks into the shell: its surface has two walls, and is smoothed, but not fitted"
+        )
 
     def draped(self, draped: Draped | None, taken_back: int, filled: NDArray[np.bool_]) -> None:
         """Note how the mesh of a cloud came to rest, and what of it was filled rather than measured."""
@@ -186,29 +205,6 @@ class Account:
         self._sections["fit"] |= {"taken_back": taken_back, "filled_faces": int(filled.sum())}
         if filled.mean() > FILLED:
             self.warn(f"{filled.mean():.0%} of the faces lie where there are no points: they were filled")
-
-    def cubes(self, grid: CubeGrid, shell: Shell, composed: CubeGrid) -> None:
-        """Note the partition, its closing and the cubes added."""
-        self._sections["cubes"] = {
-            "cell_mm": grid.cell_mm.tolist(),
-            "occupied": len(grid.keys),
-            "closing": shell.closing,
-            "added_by_closing": len(shell.keys) - len(grid.keys),
-            "added_for_composition": len(composed.keys) - len(shell.keys),
-            "two_sided": shell.two_sided,
-            "holds": shell.holds,
-        }
-
-    def surface(self, tracked: Cuberille) -> None:
-        """Note which surfaces were found and taken."""
-        self._sections["surface"] = {
-            "found": tracked.surfaces,
-            "cavities": int((tracked.volumes < 0).sum()),
-            "taken": int(tracked.taken.sum()),
-            "debris": tracked.debris,
-            "square_faces": len(tracked.mesh.quads),
-            "enclosed_cubes": tracked.enclosed,
-        }
 
     def fit(self, trace: Trace, vertices: int, collapsed: int) -> None:
         """Note how the mesh came to rest, and how many components were not left as the fit had them."""
@@ -253,13 +249,31 @@ class Account:
         elif rest.steps and not rest.converged:
             self.warn(f"the mesh had not come to rest after {rest.steps} steps")
 
+    def contours(self, made: ContourSurface, distance: float) -> None:
+        """Note the slices of a stack of contours, and the voxels between them."""
+        self._sections["contours"] = {
+            "slices": made.slices,
+            "contours": made.contours,
+            "open": made.open,
+            "slice_distance_mm": distance,
+            "longest_gap": made.reach,
+            "voxel_mm": made.edge,
+            "voxels": made.voxels,
+        }
+        self._sections["fit"]["filled_faces"] = int(made.filled.sum())
+        if made.edge > made.asked_edge:
+            self.warn(f"voxels of {made.asked_edge:.4g} would not fit: they are {made.edge:.4g} wide")
+
     def quality(self, mesh: TriMesh, points: PointSet, cavities: int, progress: Progress = silent) -> None:
         """Measure the mesh, against its points too."""
         self._sections["quality"] = assess(
             mesh, points=points.positions, cavities=cavities, threads=self._settings.run.threads, progress=progress
         )
-        if self._sections["quality"]["self_intersections"]:
-            self.warn(f"{self._sections['quality']['self_intersections']} faces pass through others")
+
+    def decimated(self, filled: NDArray[np.bool_] | None) -> None:
+        """Count the filled faces of the coarser mesh."""
+        if filled is not None:
+            self._sections["fit"]["filled_faces"] = int(filled.sum())
 
     def rings(self, sampling: Sampling) -> None:
         """Compare the volume of the mesh with the areas of the rings times the distance of their slices."""
@@ -281,9 +295,14 @@ class Account:
             "timings": self._timings | {"total_s": sum(self._timings.values())},
             "settings": self._settings.to_dict(),
             "versions": dict(versions()),
-            "warnings": list(self._warnings),
+            "warnings": [*self._warnings, *self._of_crossings()],
         }
-        return {name: sections[name] for name in SECTIONS if name in sections}
+        return {name: sections[name] for name in ORDER if name in sections}
+
+    def _of_crossings(self) -> list[str]:
+        """Say that faces of the mesh that was measured last pass through others."""
+        crossing = self._sections.get("quality", {}).get("self_intersections", 0)
+        return [f"{crossing} faces pass through others"] if crossing else []
 
 
 @cache

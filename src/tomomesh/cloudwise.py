@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import EmptyError, GeometryError, ResourceError
+from .errors import EmptyError, GeometryError
 from .measure.intersections import self_intersections
-from .model.cubes import MARGIN, SIDE, cells_of, keys_of
+from .model.cubes import cells_of, keys_of
 from .model.mesh import QuadMesh, TriMesh
 from .surface.bridges import bridges
 from .surface.drape import Draped, Ring, drape
 from .surface.gaps import widest_gap
-from .surface.holding import hold
+from .surface.holding import SURE, hold
+from .surface.partition import cubes_over, is_flat
 from .surface.samples import Samples, settle_points
 from .surface.untangle import untangle
 
@@ -29,10 +31,15 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-NOISE = 1.8
-"""Edge of the cubes over the noise of the points: smaller ones would show it as handles."""
-FLAT = 1e-6
-"""Thickness of a cloud, in sampling distances, under which it counts as flat."""
+FINE = 0.95
+"""Edge of the cubes over the sampling distance."""
+NOISE = (1.8, 1.3, 1.0)
+"""Edges of the cubes over the noise of the points, tried one after the other: small cubes show noise as handles,
+large ones fill thin parts."""
+SPANS = (5.0, 12.0)
+"""Longest bridges that are tried, sampling distances."""
+TRIED = ((0, 1, 2), (3, 4, 5, 6, 7, 8))
+"""Closings that are tried before and after longer bridges, cubes."""
 
 
 @dataclass(frozen=True)
@@ -71,21 +78,17 @@ def surface_of_cloud(positions: Floats, settings: Settings, account: Account, pr
     threads, origin = settings.run.threads, positions.min(axis=0)
     with account.timed("samples"):
         samples = settle_points(positions - origin, threads=threads, progress=progress)
-    cell = _cell(samples, settings)
     account.samples(len(positions), samples)
-    with account.timed("bridges"):
-        spanned = bridges(samples, float(cell.min()), threads=threads, progress=progress)
     with account.timed("cubes"):
-        lowest, cells = _cells(np.concatenate([samples.positions, spanned.places]), cell)
-        cavities = settings.cubes.surface == "all"
-        held = hold(cells, settings.cubes.closing, cavities=cavities, threads=threads, progress=progress)
-    taken = _taken(held, settings)
-    account.held(held, taken, cell, len(cells), len(spanned.places))
-    fitted = held.holds or not _refused(samples, spanned, origin, settings, account)
+        shell = _hold(samples, settings, progress)
+    held, cell = shell.held, shell.cell
+    taken = held.walls.worth_keeping(largest=settings.cubes.largest)
+    account.held(held, taken, cell, shell.cubes, len(shell.spanned.places))
+    fitted = held.holds or not _refused(samples, shell.spanned, origin, settings, account)
     walls = held.walls.only(taken)
     with account.timed("smooth"):
         ring = Ring(walls.quads, len(walls.corners), threads)
-        lattice = lowest + walls.corners * cell
+        lattice = shell.lowest + walls.corners * cell
         vertices = ring.smoothed(lattice, settings.cubes.smoothing)
     with account.timed("fit"):
         smoothed = TriMesh(vertices, _halves(walls.quads))
@@ -103,37 +106,42 @@ def surface_of_cloud(positions: Floats, settings: Settings, account: Account, pr
     )  # fmt: skip
 
 
-def _cell(samples: Samples, settings: Settings) -> Floats:
-    """Return the edge of the cubes along each axis: the sampling distance, or what the noise needs, or as asked."""
-    own = max(float(np.median(samples.spacing)), NOISE * float(np.median(samples.noise)))
-    asked = settings.cubes.cell_mm or (own,)
-    return np.broadcast_to(np.array(asked, np.float64) * settings.cubes.cell_factor, 3).copy()
+@dataclass(frozen=True)
+class _Shell:
+    """Cubes (c, 3) of an edge from a lowest corner, what spans their holes, and how they hold."""
+
+    cell: Floats
+    lowest: Floats
+    cubes: int
+    spanned: Bridges
+    held: Held
 
 
-def _cells(places: Floats, cell: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """Return the lowest corner of cell (0, 0, 0), and the cells (c, 3) that hold places."""
-    low = places.min(axis=0)
-    widest = float((places.max(axis=0) - low).max())
-    most = SIDE - 2 * MARGIN - 2
-    if (widest / cell).max() > most:
-        raise ResourceError(
-            "the cubes are too small for the extent of the points",
-            found=f"cell = {cell.min():g}",
-            expected=f"at least {widest / most:g}",
-            hint="a larger --cell",
-        )
-    lowest = low - 0.5 * cell
-    keys = keys_of(np.floor((places - lowest) / cell).astype(np.int64))
-    return lowest, cells_of(np.unique(keys))
+def _hold(samples: Samples, settings: Settings, progress: Progress) -> _Shell:
+    """Return the shell that holds with the least that is made up: short bridges, narrow closings, large cubes."""
+    cubes, best = settings.cubes, None
+    closings = TRIED if cubes.closing is None else ((cubes.closing,),)
+    for tried, span, cell in product(closings, SPANS, _cell_edges(samples, settings)):
+        spanned = bridges(samples, float(cell.min()), span=span, threads=settings.run.threads, progress=progress)
+        lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
+        cells = cells_of(np.unique(keys))
+        held = hold(
+            cells, tried, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
+        )  # fmt: skip
+        if best is None or held.two_sided > best.held.two_sided:
+            best = _Shell(cell, lowest, len(cells), spanned, held)
+        if best.held.two_sided >= SURE:
+            break
+    assert best is not None
+    return best
 
 
-def _taken(held: Held, settings: Settings) -> NDArray[np.bool_]:
-    """Return which surfaces are kept: all but debris, or the largest alone."""
-    taken = ~held.walls.debris
-    if settings.cubes.largest:
-        taken[:] = False
-        taken[np.argmax(np.abs(held.walls.volumes))] = True
-    return taken
+def _cell_edges(samples: Samples, settings: Settings) -> list[Floats]:
+    """Return the edges of the cubes along each axis: the sampling distance, or what the noise needs, or as asked."""
+    spacing, noise = float(np.median(samples.spacing)), float(np.median(samples.noise))
+    own = dict.fromkeys(max(FINE * spacing, factor * noise) for factor in NOISE)
+    asked = [settings.cubes.cell_mm] if settings.cubes.cell_mm else [(edge,) for edge in own]
+    return [np.broadcast_to(np.array(one) * settings.cubes.cell_factor, 3).copy() for one in asked]
 
 
 def _refused(samples: Samples, spanned: Bridges, origin: Floats, settings: Settings, account: Account) -> bool:
@@ -141,13 +149,9 @@ def _refused(samples: Samples, spanned: Bridges, origin: Floats, settings: Setti
 
     What is let pass is not fitted: both walls would rest on the same samples, and the mesh would fall flat.
     """
-    flat = _is_flat(samples)
+    flat = is_flat(samples.positions, float(np.median(samples.spacing)))
     if flat or settings.cubes.allow_leaks:
-        account.warn(
-            "the points lie in a plane, on a line or at one place: their shell is smoothed, but not fitted"
-            if flat
-            else "the outside leaks into the shell: its surface has two walls, and is smoothed, but not fitted"
-        )
+        account.unfitted(flat=flat)
         return True
     gap = widest_gap(samples, spanned.sectors)
     where = f"a gap of {gap[0]:.4g} around {_place(gap[1] + origin)}" if gap else f"cell = {account.cell_mm:.4g}"
@@ -157,12 +161,6 @@ def _refused(samples: Samples, spanned: Bridges, origin: Floats, settings: Setti
         expected="points all around the object, without gaps as wide as its holes",
         hint="--open for a sheet with borders, a larger --closing or --cell, or --allow-leaks",
     )
-
-
-def _is_flat(samples: Samples) -> bool:
-    centered = samples.positions - samples.positions.mean(axis=0)
-    thickness = np.linalg.svd(centered.T @ centered / len(centered), compute_uv=False)[-1]
-    return bool(thickness <= (FLAT * float(np.median(samples.spacing))) ** 2)
 
 
 def _place(place: Floats) -> str:

@@ -10,22 +10,21 @@ from scipy.spatial import cKDTree
 
 from .account import Account
 from .cloudwise import surface_of_cloud
-from .errors import GeometryError, UsageError
+from .contourwise import slices_of, surface_of_contours
+from .decimation import decimate, faces_under, require_decimation
+from .errors import EmptyError, GeometryError, UsageError
 from .measure.topology import check_promise
 from .model.points import CAP, PointSet
 from .model.volume import AXES, Volume
 from .progress import Progress, silent
 from .segment.sample import Sampling, sample
-from .segment.signal import moments
 from .segment.study import regions, train_study
 from .segment.window import choose_window, window
 from .settings import Settings
-from .surface.closing import close_shell
 from .surface.collapse import without_collapse
-from .surface.composition import well_composed
-from .surface.cuberille import track
 from .surface.dynamics import fit
-from .surface.partition import partition, sampling_distance
+from .surface.holding import CLOSINGS, hold
+from .surface.partition import is_flat, partition, sampling_distance
 from .surface.samples import distinct
 from .surface.smooth import low_pass
 from .voxelwise import NO_CUBES, NO_NETWORKS, NO_TRACE, find_boundary, mesh_boundary, sampled
@@ -37,12 +36,11 @@ if TYPE_CHECKING:
     from .model.mesh import QuadMesh, TriMesh
     from .model.networks import Networks
     from .model.trace import Trace
+    from .surface.slices import Slices
     from .surface.voxels import Boundary
 
 LEAST = 0.5
 """Share of the rings' volume that a shell must enclose; a slab may be too thin to be seen to hold."""
-FLAT = 1e-6
-"""Thickness of a cloud, in cube edges, under which it counts as flat."""
 
 
 @dataclass(frozen=True)
@@ -86,9 +84,9 @@ class Surface:
     cubes : CubeGrid
     cuberille : QuadMesh
     smoothed, mesh : TriMesh
-        The surface before and after the fit, with the same faces.
+        The surface before and after the fit, with the same faces unless `mesh` was decimated.
     nearest : (n,) int32 array
-        The point that draws each vertex of `mesh`, -1 where there is none.
+        The point that draws each vertex of `mesh`, -1 where there is none; empty for clouds and decimated meshes.
     trace : Trace
     report : dict
     segmentation : Segmentation or None
@@ -147,6 +145,7 @@ def reconstruct(
         Of the kind that fits; see `tomomesh.errors`.
     """
     settings = (settings or Settings()).replace(**changes)
+    require_decimation(settings.run.target_faces)
     account = Account(settings)
     segmentation = _segment(volume, settings, account, progress)
     sampling = segmentation.sampling
@@ -156,6 +155,7 @@ def reconstruct(
         surface = _surface(
             sampling.points, sampling.spacing_mm, settings, account, progress, expected_mm3=sampling.volume_mm3
         )
+    surface = _coarser(surface, settings, account, progress)
     account.rings(sampling)
     if truth is not None:
         account.truth(surface.mesh, surface.cap_faces, truth)
@@ -197,29 +197,68 @@ def reconstruct_points(
     Surface
     """
     settings = (settings or Settings()).replace(**changes)
+    require_decimation(settings.run.target_faces)
     cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)
+    if len(cloud) == 0:
+        raise EmptyError("there are no points", expected="at least one")
+    lowest = cloud.positions.min(axis=0)
+    if settings.run.local_origin:
+        cloud = replace(cloud, positions=cloud.positions - lowest)
     account = Account(settings)
-    if settings.fit.attraction == "nearest":
+    with account.timed("slices"):
+        slices = slices_of(cloud, settings)
+    if slices is not None and settings.fit.attraction != "nearest":
+        surface = _surface_of_contours(cloud, slices, settings, account, progress)
+    elif settings.fit.attraction == "nearest":
         with account.timed("points"):
             spacing = sampling_distance(distinct(cloud.positions))
         account.points(cloud, spacing)
         surface = _surface(cloud, spacing, settings, account, progress)
     else:
         surface = _surface_of_cloud(cloud, settings, account, progress)
+    account.origin(lowest)
+    surface = _coarser(surface, settings, account, progress)
     return replace(surface, report=account.report())
 
 
 def _surface_of_cloud(cloud: PointSet, settings: Settings, account: Account, progress: Progress) -> Surface:
     found = surface_of_cloud(cloud.positions, settings, account, progress)
     with account.timed("quality"):
-        cavities = int(found.held.walls.inward.sum())
-        check_promise(found.mesh, cavities=cavities)
-        account.quality(found.mesh, cloud, cavities, progress)
+        check_promise(found.mesh, cavities=account.cavities)
+        account.quality(found.mesh, cloud, account.cavities, progress)
     trace = NO_TRACE if found.draped is None else found.draped.trace
     return Surface(
         cloud, NO_CUBES, found.cuberille, found.smoothed, found.mesh, np.empty(0, np.int32), trace, {},
         filled=found.filled,
     )  # fmt: skip
+
+
+def _surface_of_contours(
+    cloud: PointSet, slices: Slices, settings: Settings, account: Account, progress: Progress
+) -> Surface:
+    made = surface_of_contours(cloud, slices, settings, account, progress)
+    with account.timed("quality"):
+        check_promise(made.mesh, cavities=account.cavities)
+        account.quality(made.mesh, cloud, account.cavities, progress)
+    return Surface(
+        cloud, NO_CUBES, made.boundary.cuberille, made.rest.smoothed, made.mesh, made.rest.nearest, NO_TRACE, {},
+        filled=made.filled,
+    )  # fmt: skip
+
+
+def _coarser(surface: Surface, settings: Settings, account: Account, progress: Progress) -> Surface:
+    """Leave the mesh the faces that were asked for, and check and measure it anew."""
+    most, threads = settings.run.target_faces, settings.run.threads
+    if most is None or len(surface.mesh.faces) <= most:
+        return surface
+    with account.timed("decimate"):
+        mesh = decimate(surface.mesh, most, cavities=account.cavities, threads=threads)
+        filled = None if surface.filled is None else surface.filled[faces_under(mesh, surface.mesh)]
+    account.decimated(filled)
+    with account.timed("quality"):
+        check_promise(mesh, cavities=account.cavities)
+        account.quality(mesh, surface.points, account.cavities, progress)
+    return replace(surface, mesh=mesh, filled=filled, nearest=np.empty(0, np.int32))
 
 
 def _segment(volume: Volume, settings: Settings, account: Account, progress: Progress) -> Segmentation:
@@ -287,17 +326,18 @@ def _surface(
     *,
     expected_mm3: float = 0.0,
 ) -> Surface:
+    asked, threads = settings.cubes, settings.run.threads
     with account.timed("cubes"):
         grid = partition(points.positions, _cell(spacing, settings))
-        shell = close_shell(grid.keys, settings.cubes.closing, progress)
-        cubes = grid.with_cubes(well_composed(shell.keys))
-    account.cubes(grid, shell, cubes)
+        closings = CLOSINGS if asked.closing is None else (asked.closing,)
+        held = hold(grid.cells, closings, cavities=asked.surface == "all", threads=threads, progress=progress)
+        taken = held.walls.worth_keeping(largest=asked.largest)
+    account.held(held, taken, grid.cell_mm, len(grid.keys))
     with account.timed("cuberille"):
-        tracked = track(cubes, surface=settings.cubes.surface)
-        cuberille = tracked.mesh
-    account.surface(tracked)
-    enclosed = tracked.enclosed * float(cubes.cell_mm.prod())
-    if enclosed < LEAST * expected_mm3 if expected_mm3 else not shell.holds:
+        walls = held.walls.only(taken)
+        cubes, cuberille = walls.over(grid)
+    enclosed = float(walls.volumes.sum() * grid.cell_mm.prod())
+    if enclosed < LEAST * expected_mm3 if expected_mm3 else not held.holds:
         settings = _without_fit(account, settings, points.positions)
     with account.timed("smooth"):
         rough = cuberille.triangulated()
@@ -306,13 +346,13 @@ def _surface(
         springs = cuberille.edges if settings.fit.springs == "quads" else rough.edges
         rest = fit(
             smoothed.vertices, springs, cuberille.vertex_cubes, points.positions, cubes, settings.fit,
-            threads=settings.run.threads, progress=progress,
+            threads=threads, progress=progress,
         )  # fmt: skip
     mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))
     account.fit(rest.trace, len(mesh.vertices), collapsed)
     with account.timed("quality"):
-        check_promise(mesh, cavities=tracked.cavities)
-        account.quality(mesh, points, tracked.cavities)
+        check_promise(mesh, cavities=account.cavities)
+        account.quality(mesh, points, account.cavities)
     return Surface(points, cubes, cuberille, smoothed, mesh, rest.nearest, rest.trace, {})
 
 
@@ -327,14 +367,9 @@ def _without_fit(account: Account, settings: Settings, positions: NDArray[np.flo
 
     What is let pass is not fitted: both walls would rest on the same points, and the mesh would fall flat.
     """
-    _, covariance = moments(positions)
-    flat = np.linalg.eigvalsh(covariance)[0] <= (FLAT * account.cell_mm) ** 2
+    flat = is_flat(positions, account.cell_mm)
     if flat or settings.cubes.allow_leaks:
-        account.warn(
-            "the points lie in a plane, on a line or at one place: their shell is smoothed, but not fitted"
-            if flat
-            else "the outside leaks into the shell: its surface has two walls, and is smoothed, but not fitted"
-        )
+        account.unfitted(flat=flat)
         return settings.replace(max_steps=0)
     raise GeometryError(
         "the outside leaks into the shell of cubes, so its surface would have two walls",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from argparse import Namespace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,7 +81,7 @@ def _segment(chosen: Namespace) -> None:
     with Bars(quiet=chosen.quiet) as progress:
         volume = _read(chosen.study, settings, progress)
         found = segment(volume, settings, progress=progress)
-        io.write_points(found.points, chosen.output, **_frame(found, settings))
+        io.write_points(found.points, chosen.output, **_frame(found.report, settings))
         _write_stage_one(chosen, found)
         _write_documents(chosen, found.report, settings)
         _draw(chosen.figures, found, None, settings, progress)
@@ -212,20 +213,36 @@ def _check_files(chosen: Namespace, *taken: str) -> None:
 def _write(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> None:
     """Write the mesh, and whatever else was asked for."""
     stage_one = surface.segmentation
-    io.write_mesh(surface.mesh, chosen.output, **_frame(stage_one, settings))
+    frame = _frame(surface.report, settings)
+    io.write_mesh(surface.mesh, chosen.output, **frame, **_fields(surface, chosen.output))
     if getattr(chosen, "points", None):
-        io.write_points(surface.points, chosen.points, **_frame(stage_one, settings))
+        io.write_points(surface.points, chosen.points, **frame)
     if stage_one is not None:
         _write_stage_one(chosen, stage_one)
     _write_documents(chosen, surface.report, settings)
     _draw(chosen.figures, stage_one, surface, settings, progress)
 
 
-def _frame(stage_one: Segmentation | None, settings: Settings) -> dict[str, str]:
+def _frame(report: dict[str, Any], settings: Settings) -> dict[str, str]:
     """Name unit and frame: a study is written in patient millimeters, a cloud in whatever its numbers are in."""
-    if stage_one is not None:
+    if "study" in report:
         return {"unit": "mm", "frame": "LPS"}
-    return {"unit": settings.run.units, "frame": "unknown"}
+    corner = ",".join(repr(place).removesuffix(".0") for place in report["points"]["origin"])
+    return {"unit": settings.run.units, "frame": f"local:{corner}" if settings.run.local_origin else "unknown"}
+
+
+def _fields(surface: Surface, output: str | Path) -> dict[str, dict[str, NDArray[Any]]]:
+    """Return what the format keeps beside the mesh: what is known of the points, and which faces were filled."""
+    from ..surface.attributes import carry
+
+    points, at_vertices, on_faces = surface.points, {}, {}
+    kept = {name: values for name, values in points.attributes.items() if io.keeps(output, name)}
+    if kept:
+        at_vertices = carry(replace(points, attributes=kept), surface.mesh.vertices)
+    if io.keeps(output, "filled", on_faces=True):
+        filled = surface.filled if surface.segmentation is None else surface.cap_faces
+        on_faces = {} if filled is None else {"filled": filled}
+    return {"vertex_fields": at_vertices, "face_fields": on_faces}
 
 
 def _write_stage_one(chosen: Namespace, found: Segmentation) -> None:

@@ -18,10 +18,24 @@ POINTS = "an unoriented cloud: PLY, XYZ, TXT, CSV, NPY, NPZ, PCD, LAS, LAZ or E5
 MESH = "STL, PLY or OBJ"
 STAGE_ONE = ("read", "window", "network")
 STAGE_TWO = ("cubes", "fit")
-SEVERAL = tuple(option_of(entry.name) for _, entry in parameters() if entry.metadata["length"] == (1, 3))
+ALIASES = {"cell_mm": "--cell"}
+"""Second spellings: the numbers of a cloud need not be millimeters."""
+
+
+def spellings(name: str) -> list[str]:
+    """Return the options by which a parameter goes."""
+    return [option_of(name), *([ALIASES[name]] if name in ALIASES else [])]
+
+
+SEVERAL = tuple(
+    option for _, entry in parameters() if entry.metadata["length"] == (1, 3) for option in spellings(entry.name)
+)
 """Options that take one number or three."""
-CUBES_ONLY = ("cell_mm", "cell_factor", "closing", "allow_leaks", "surface", "smoothing")
-"""Parameters of the cubes that do not matter to the points."""
+SURFACE_ONLY = (
+    "cell_mm", "cell_factor", "closing", "contours", "largest", "allow_leaks", "surface", "smoothing", "local_origin",
+    "target_faces",
+)  # fmt: skip
+"""Parameters that do not matter to the points."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -60,7 +74,7 @@ def build_parser() -> argparse.ArgumentParser:
     stage_one.add_argument("study", metavar="STUDY", help=STUDY)
     stage_one.add_argument("-o", "--output", required=True, metavar="POINTS", help="PLY, XYZ, CSV or NPY")
     _add_outputs(stage_one, "labels", "figures")
-    _add_settings(stage_one, (*STAGE_ONE, "cubes", "run"), without=CUBES_ONLY)
+    _add_settings(stage_one, (*STAGE_ONE, "cubes", "run"), without=SURFACE_ONLY)
 
     stage_two = _command(commands, "surface", "stages two and three alone: points in, a closed surface out")
     stage_two.add_argument("cloud", metavar="POINTS", help=POINTS)
@@ -72,7 +86,7 @@ def build_parser() -> argparse.ArgumentParser:
     network.add_argument("region", metavar="REGION", help="square, triangle, cube, or one picture (PNG or TIFF)")
     network.add_argument("-o", "--output", default="tomomesh-network", metavar="FOLDER", help="default: %(default)s")
     _add_outputs(network)
-    _add_settings(network, ("window", "network", "run"), without=("slices", "signal", "units"))
+    _add_settings(network, ("window", "network", "run"), without=("slices", "signal", "units", "local_origin", "target_faces"))
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
     inspect.add_argument("study", metavar="STUDY", help=STUDY)
@@ -159,17 +173,17 @@ def _title(section: str) -> str:
 
 
 def _add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
-    meta, option, name = entry.metadata, option_of(entry.name), entry.name
+    meta, options, name = entry.metadata, spellings(entry.name), entry.name
     if meta["kind"] is bool:
-        negated = option_of(f"no_{name}") if entry.default else option
+        negated = option_of(f"no_{name}") if entry.default else option_of(name)
         action = "store_false" if entry.default else "store_true"
         text = f"do not {meta['help']}" if entry.default else meta["help"]
         group.add_argument(negated, dest=name, action=action, default=argparse.SUPPRESS, help=text)
         return
-    one_or_three = option in SEVERAL
+    one_or_three = options[0] in SEVERAL
     several = meta["length"][0] if meta["length"] and not one_or_three else None
     group.add_argument(
-        option,
+        *options,
         dest=name,
         type=_numbers if one_or_three else meta["kind"],
         nargs=several,

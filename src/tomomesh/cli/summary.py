@@ -7,6 +7,8 @@ from typing import Any
 from ..measure.topology import FAULTS
 
 BARS = " ▁▂▃▄▅▆▇█"
+LARGEST = 3
+"""Components that are described one by one."""
 
 
 def of_surface(report: dict[str, Any], output: str) -> list[str]:
@@ -18,8 +20,9 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
         *_of_stage_one(report),
         f"points    {_of_points(report)}",
         _of_cubes(report),
-        f"fit       {fit['iterations']} steps, {'at rest' if fit['converged'] else 'NOT at rest'}",
-        f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}",
+        f"fit       {fit['iterations']} steps, {'at rest' if fit['converged'] else 'NOT at rest'}{_of_filled(report)}",
+        f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}, "
+        f"{quality['self_intersections'] or 'no'} face(s) pass through others",
         f"          {quality['components']} component(s), genus {quality['genus']}, "
         f"area {quality['area_mm2']:.6g} {unit}^2, volume {quality['volume_mm3']:.6g} {unit}^3{_of_rings(quality)}",
         f"distance  points to surface: mean {quality['points_to_surface_mean_mm']:.3g}, "
@@ -78,16 +81,20 @@ def of_check(report: dict[str, Any]) -> list[str]:
     faults = [f"{report[name]} {name.replace('_', ' ')}" for name in FAULTS if report[name]]
     shape = "closed, manifold, outward" if report["sound"] else f"NOT sound: {', '.join(faults)}"
     same = "the same" if report["sound_after_welding"] == report["sound"] else "NOT the same"
+    loops = f", {report['boundary_loops']} border(s)" if report["boundary_loops"] else ""
     lines = [
         f"mesh      {report['vertices']} vertices, {report['faces']} faces",
         f"topology  {shape}; {same} after welding at 32 bits",
         f"          {report['components']} component(s), Euler number {report['euler_number']}"
-        + (f", genus {report['genus']}" if report["sound"] else ""),
-        f"size      area {report['area_mm2']:.6g}, volume {report['volume_mm3']:.6g}",
+        + (f", genus {report['genus']}" if report["sound"] else "")
+        + loops,
+        f"crossing  {report['self_intersections'] or 'no'} face(s) pass through others",
+        f"size      area {report['area_mm2']:.6g}{_volume(report)}",
         f"edges     {report['shortest_edge_mm']:.4g} to {report['longest_edge_mm']:.4g}, "
-        f"median {report['median_edge_mm']:.4g}",
-        f"angles    smallest {report['smallest_angle_deg']:.1f} deg, "
+        f"median {report['median_edge_mm']:.4g}; the surface turns by {report['mean_turn_deg']:.1f} deg on average",
+        f"angles    {report['smallest_angle_deg']:.1f} to {report['largest_angle_deg']:.1f} deg, "
         f"mean of the smallest {report['mean_smallest_angle_deg']:.1f} deg",
+        *_parts(report),
     ]
     if "mean_mm" in report:
         lines += [
@@ -97,6 +104,25 @@ def of_check(report: dict[str, Any]) -> list[str]:
             f"largest {report['back_max_mm']:.4g}",
         ]
     return lines
+
+
+def _parts(report: dict[str, Any]) -> list[str]:
+    """Say what the largest components are, where there are several."""
+    parts = report["per_component"]
+    if len(parts) < 2:
+        return []
+    lines = [
+        f"part {n}    {part['faces']} faces, {part['self_intersections'] or 'no'} crossing, "
+        f"area {part['area_mm2']:.4g}{_volume(part)}, genus {part['genus']}"
+        for n, part in enumerate(parts[:LARGEST], 1)
+    ]
+    more = report["components"] - len(lines)
+    return [*lines, f"          and {more} more"] if more else lines
+
+
+def _volume(found: dict[str, Any]) -> str:
+    """Name the volume of what is closed, and say so of what is not."""
+    return ", open" if found["volume_mm3"] is None else f", volume {found['volume_mm3']:.6g}"
 
 
 def _of_stage_one(report: dict[str, Any]) -> list[str]:
@@ -128,15 +154,30 @@ def _of_cubes(report: dict[str, Any]) -> str:
         return f"voxels    {report['surface']['square_faces']} faces, {places}, {voxels['added_for_composition']} added"
     cubes = report["cubes"]
     edge = f"edge {_edges(cubes['cell_mm'])} {_unit(report)}"
-    return f"cubes     {edge}, {cubes['occupied']} occupied, closed by {cubes['closing']}"
+    walls = "" if "study" in report else ", one wall" if cubes["holds"] else ", TWO walls"
+    return f"cubes     {edge}, {cubes['occupied']} occupied, closed by {cubes['closing']}{walls}"
 
 
 def _of_points(report: dict[str, Any]) -> str:
-    points = report["points"]
-    bridges = "added voxels" if "study" in report and "networks" not in report else "bridged gaps"
-    made = f", {points['on_bridges']} on {points['bridged_gaps']} {bridges}, {points['on_caps']} on caps"
-    made = made if points["on_bridges"] or points["on_caps"] else ""
-    return f"{points['count']}{made}, r = {points['spacing_mm']:.4g} {_unit(report)}"
+    points, unit = report["points"], _unit(report)
+    if "noise_mm" in points:
+        return (
+            f"{points['count']}, {points['strays'] or 'no'} stray(s) left out, {points['spacing_mm']:.4g} {unit} apart, "
+            f"noise {points['noise_mm']:.2g} {unit}"
+        )
+    made = ""
+    if points.get("on_bridges") or points.get("on_caps"):
+        bridges = "bridged gaps" if "networks" in report else "added voxels"
+        made = f", {points['on_bridges']} on {points['bridged_gaps']} {bridges}, {points['on_caps']} on caps"
+    return f"{points['count']}{made}, r = {points['spacing_mm']:.4g} {unit}"
+
+
+def _of_filled(report: dict[str, Any]) -> str:
+    """Say what share of the mesh lies where a cloud has no points."""
+    if "filled_faces" not in report["fit"]:
+        return ""
+    share = report["fit"]["filled_faces"] / report["quality"]["faces"]
+    return f", {100 * share:.3g} % of the faces filled, not measured"
 
 
 def _unit(report: dict[str, Any]) -> str:

@@ -9,7 +9,7 @@ from .atomic import check_output, replacing
 from .documents import read_settings, write_document, write_settings
 from .images import read_picture
 from .labels import LABEL_WRITERS, write_labels
-from .meshes import MESH_READERS, MESH_WRITERS, read_mesh, write_mesh
+from .meshes import MESH_READERS, MESH_WRITERS, keeps, read_mesh, write_mesh
 from .points import POINT_READERS, POINT_WRITERS, read_points, write_points
 from .volumes import VOLUME_READERS, read_volume
 
@@ -21,6 +21,7 @@ __all__ = [
     "POINT_WRITERS",
     "VOLUME_READERS",
     "check_output",
+    "keeps",
     "read_mesh",
     "read_picture",
     "read_points",

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import EmptyError, FormatError, OutputError
 from ..model.mesh import TriMesh
+from ..model.points import COLORS
 from .atomic import check_output, replacing
 from .colors import named_colors
 from .fields import AXES, flat_columns
@@ -34,8 +35,11 @@ if TYPE_CHECKING:
 STL_ROW = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
 """One face of a binary STL file."""
 
-STL_HEAD = 84
-"""Bytes before the first face: 80 of text, 4 of their count."""
+STL_TEXT = 80
+"""Bytes of text at the start of a binary STL file."""
+
+STL_HEAD = STL_TEXT + 4
+"""Bytes before the first face: the text, and the count of faces."""
 
 
 def read_mesh(path: str | Path) -> TriMesh:
@@ -152,15 +156,29 @@ def write_mesh(
     MESH_WRITERS[suffix_of(path)](mesh, path, Written(signature(unit, frame), at_vertices, on_faces))
 
 
+def keeps(path: str | Path, field: str, *, on_faces: bool = False) -> bool:
+    """Whether the format of a mesh file keeps a field: PLY all of them, OBJ the colors at vertices."""
+    suffix = suffix_of(path)
+    return suffix == ".ply" or (suffix == ".obj" and field in COLORS and not on_faces)
+
+
 def _write_stl(mesh: TriMesh, path: str | Path, beside: Written) -> None:
     rows = np.zeros(len(mesh.faces), STL_ROW)
     rows["corners"] = _single(mesh.vertices, path)[mesh.faces]
     length = np.linalg.norm(mesh.face_vectors, axis=1, keepdims=True)
     rows["normal"] = mesh.face_vectors / np.where(length > 0, length, 1.0)
     with replacing(path) as file:
-        file.write(beside.head.encode("ascii")[:80].ljust(80))
+        file.write(_shortened(beside.head).encode("ascii").ljust(STL_TEXT))
         file.write(np.array(len(rows), "<u4").tobytes())
         file.write(rows.tobytes())
+
+
+def _shortened(head: str) -> str:
+    """Drop whole words until the rest fits, the frame last: a number that is cut off would be another one."""
+    words = head.split()
+    while len(" ".join(words)) > STL_TEXT:
+        del words[1 if len(words) > 2 else -1]
+    return " ".join(words)
 
 
 def _single(vertices: NDArray[np.float64], path: str | Path) -> NDArray[np.float32]:
@@ -173,7 +191,7 @@ def _single(vertices: NDArray[np.float64], path: str | Path) -> NDArray[np.float
             "the 32-bit coordinates of STL cannot keep the vertices apart",
             file=str(path),
             found=f"largest coordinate = {np.abs(vertices).max():g}",
-            hint="a .ply file, which keeps 64 bits",
+            hint="a .ply file, which keeps 64 bits, or --local-origin for a cloud",
         )
     return single
 

@@ -36,7 +36,7 @@ def popcount(word: np.uint64) -> int:
     word = word + (word >> EIGHT)
     word = word + (word >> np.uint64(16))
     word = word + (word >> np.uint64(32))
-    return np.int64(word & np.uint64(127))
+    return int(word & np.uint64(127))
 
 
 @kernel("u8(u8, u8, i8)")
@@ -87,7 +87,7 @@ def grow_along(board: Board, table: Table, axis: int, grown: Board, begin: int, 
     begin, end : int
         Blocks to work on.
     """
-    dx, dy, dz = np.int64(axis == 0), np.int64(axis == 1), np.int64(axis == 2)
+    dx, dy, dz = int(axis == 0), int(axis == 1), int(axis == 2)
     for b in range(begin, end):
         for z in range(8):
             both = neighbor(board, table, b, z, dx, dy, dz) | neighbor(board, table, b, z, -dx, -dy, -dz)
@@ -116,14 +116,14 @@ def flood_block(open_: Board, table: Table, reached: Board, b: int) -> bool:
 def touches(reached: Board, b: int, column: int) -> bool:
     """Tell whether a block is reached along the side that a column of its table stands for."""
     if column == 4 or column == 22:
-        return reached[b, 7 * (column > 13)] != ZERO
+        return bool(reached[b, 7 * (column > 13)] != ZERO)
     side = LAST_COLUMN if column == 14 else FIRST_COLUMN
     if column == 10 or column == 16:
         side = FIRST_ROW << (LONG if column == 16 else ZERO)
     touched = ZERO
     for z in range(8):
         touched |= reached[b, z] & side
-    return touched != ZERO
+    return bool(touched != ZERO)
 
 
 @kernel("void(u8[:,::1], i4[:,::1], u8[:,::1])")
@@ -168,16 +168,18 @@ def flood(open_: Board, table: Table, reached: Board) -> None:
                         length += 1
 
 
-@kernel("i8(u8[:,::1], i4[:,::1], u8[:,::1], i8, i8)")
-def compose(solid: Board, table: Table, filled: Board, begin: int, end: int) -> int:
+@kernel("i8(u8[:,::1], i4[:,::1], u8[:,::1], u8[:,::1], i8, i8)")
+def compose(solid: Board, table: Table, near: Board, filled: Board, begin: int, end: int) -> int:
     """Fill every contact along an edge only or at a corner only, once (Latecki 1997).
 
     Parameters
     ----------
     solid : (b + s, 8) uint64 array
     table : (b, 27) int32 array
+    near : (b + s, 8) uint64 array
+        Empty cubes among whose 26 neighbors are solid ones.
     filled : (b + s, 8) uint64 array
-        Result: `solid` and the cubes added.
+        `solid` on entry. Result: the same and the cubes added.
     begin, end : int
         Blocks to work on.
 
@@ -195,6 +197,8 @@ def compose(solid: Board, table: Table, filled: Board, begin: int, end: int) -> 
     added = 0
     for b in range(begin, end):
         for z in range(8):
+            if near[b, z] == ZERO:
+                continue
             fill = ZERO
             for dz in (-1, 1):
                 up = neighbor(solid, table, b, z, 0, 0, dz)
@@ -212,7 +216,7 @@ def compose(solid: Board, table: Table, filled: Board, begin: int, end: int) -> 
                         fill |= ahead & slope & ~(side | up | turn | rise | corner)
                         fill |= side & rise & ~(ahead | up | turn | slope | corner)
                         fill |= up & turn & ~(ahead | side | slope | rise | corner)
-            fill &= ~solid[b, z]
+            fill &= near[b, z]
             filled[b, z] = solid[b, z] | fill
             added += popcount(fill)
     return added
@@ -256,9 +260,7 @@ def mark_surface(solid: Board, table: Table, corners: Board, faces: NDArray[np.i
 
 
 @kernel("void(u8[:,::1], i8[:,::1], i8[:,::1], i8[:,::1])")
-def list_cubes(
-    board: Board, blocks: NDArray[np.int64], before: NDArray[np.int64], cells: NDArray[np.int64]
-) -> None:
+def list_cubes(board: Board, blocks: NDArray[np.int64], before: NDArray[np.int64], cells: NDArray[np.int64]) -> None:
     """List the cubes of a board, block by block.
 
     Parameters
@@ -288,7 +290,7 @@ def corner_number(corners: Board, table: Table, before: NDArray[np.int64], b: in
     """Return the number of the vertex at a corner (x, y, z), 0 to 8, of a block."""
     there = table[b, 13 + (x >> 3) + 3 * (y >> 3) + 9 * (z >> 3)]
     mask = (ONE << np.uint64(8 * (y & 7) + (x & 7))) - ONE
-    return before[there, z & 7] + popcount(corners[there, z & 7] & mask)
+    return int(before[there, z & 7]) + popcount(corners[there, z & 7] & mask)
 
 
 @kernel("void(u8[:,::1], i4[:,::1], u8[:,::1], i8[:,::1], i8[:,::1], i8[:,:,::1], i4[:,::1], i4[:,::1])")

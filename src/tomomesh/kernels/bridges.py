@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 SECTORS = 16
 """Directions around a point that are told apart."""
+TANGENT = 0.41421356237309503
+"""Tangent of the angle of a sector: pi / 8."""
 MOST = 1024
 """Neighbors that are looked at."""
 STEEP = 0.5
@@ -27,12 +29,18 @@ ALIKE = 0.5
 
 @kernel("i8(f8[:,::1], f8[::1])")
 def sector(axes: Floats, step: Floats) -> int:
-    """Return the sector of a step (3,) in the plane of two axes (2, 3)."""
+    """Return the sector of a step (3,) in the plane of two axes (2, 3): the quadrant, and a quarter of it."""
     u = v = 0.0
     for axis in range(3):
         u += axes[0, axis] * step[axis]
         v += axes[1, axis] * step[axis]
-    return np.int64((np.arctan2(v, u) / (2 * np.pi) + 0.5) * SECTORS) % SECTORS
+    quadrant = 0
+    if u < 0.0:
+        quadrant, u, v = 2, -u, -v
+    if v < 0.0:
+        quadrant, u, v = quadrant + 3, -v, u
+    quarter = np.int64(v > TANGENT * u) if v < u else 2 + np.int64(u < TANGENT * v)
+    return (4 * quadrant + quarter) % SECTORS
 
 
 @kernel("b1(i8, i8)")
@@ -42,11 +50,11 @@ def is_open(sectors: int, towards: int) -> bool:
     return (sectors & three) == 0
 
 
-@kernel("void(f8[:,::1], i8[::1], i8[::1], f8[::1], f8, i8[::1], i8, i8)")
+@kernel("void(f8[:,::1], i8[::1], i4[::1], f8[::1], f8, i8[::1], i8, i8)")
 def full_sectors(
     samples: Floats,
-    keys: Integers,
-    start: Integers,
+    blocks: Integers,
+    start: NDArray[np.int32],
     frame: Floats,
     sight: float,
     sectors: Integers,
@@ -59,7 +67,7 @@ def full_sectors(
     ----------
     samples : (p, 7) float array
         Position, unit normal, spacing; in the order of their cubes.
-    keys, start, frame : arrays
+    blocks, start, frame : arrays
         See `tomomesh.kernels.samples`.
     sight : float
         How far to look, times the spacing.
@@ -71,7 +79,7 @@ def full_sectors(
     found, axes, step = np.empty(MOST, np.int64), np.empty((2, 3)), np.empty(3)
     for p in range(begin, end):
         tangents(samples[p, 3:6], axes)
-        count = gather(samples, keys, start, frame, samples[p], sight * samples[p, 6], found)
+        count = gather(samples, blocks, start, frame, samples[p], sight * samples[p, 6], found)
         sectors[p] = 0
         for n in range(count):
             q = found[n]
@@ -81,11 +89,11 @@ def full_sectors(
                 sectors[p] |= 1 << sector(axes, step)
 
 
-@kernel("i8(f8[:,::1], i8[::1], i8[::1], f8[::1], i8[::1], f8, f8, f8[:,::1], i8, i8)")
+@kernel("i8(f8[:,::1], i8[::1], i4[::1], f8[::1], i8[::1], f8, f8, f8[:,::1], i8, i8)")
 def bridge(
     samples: Floats,
-    keys: Integers,
-    start: Integers,
+    blocks: Integers,
+    start: NDArray[np.int32],
     frame: Floats,
     sectors: Integers,
     span: float,
@@ -100,7 +108,7 @@ def bridge(
     ----------
     samples : (p, 7) float array
         Position, unit normal, spacing; in the order of their cubes.
-    keys, start, frame : arrays
+    blocks, start, frame : arrays
     sectors : (p,) int64 array
         From `full_sectors`.
     span : float
@@ -127,7 +135,7 @@ def bridge(
         if not rim:
             continue
         tangents(samples[p, 3:6], axes)
-        count = gather(samples, keys, start, frame, samples[p], span * samples[p, 6], found)
+        count = gather(samples, blocks, start, frame, samples[p], span * samples[p, 6], found)
         for n in range(count):
             q = found[n]
             if q <= p:

@@ -15,10 +15,10 @@ from .compile import kernel
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-BITS = 19
-"""Bits of the space-filling curve on each axis; six more tell the size of a simplex."""
+BITS, SIZE = 18, 55
+"""Bits of the space-filling curve on each axis, and the first of the bits that tell the size of a simplex."""
 DIGIT, DIGITS = 11, 6
-"""Bits of a digit of keys, and digits: 63 bits in all need six."""
+"""Bits of a digit of keys, and digits: five for the curve, and one for the size."""
 
 
 @kernel("void(f8[:,::1], i4[:,::1], f8[::1], f8, f8, i8[::1], i8, i8)")
@@ -41,7 +41,7 @@ def curve_keys(
         Numbers of their vertices.
     low : (3,) float array
     side : float
-        Corner and edge of a cube that holds all vertices.
+        Corner and edge of a cube that holds most simplices; those beyond it count as in its outermost cells.
     usual : float
         Extent of a usual simplex. Those of extents up to 8, 64, 512, ... times as large are kept apart, or one
         large simplex would widen the boxes of its small neighbors.
@@ -59,16 +59,17 @@ def curve_keys(
                 least = min(least, vertices[simplices[m, k], axis])
                 most = max(most, vertices[simplices[m, k], axis])
             extent = max(extent, most - least)
-            cell = np.int64(min((0.5 * (least - low[axis] + most - low[axis])) / side * cells, cells - 1.0))
+            along = 0.5 * (least - low[axis] + most - low[axis]) / side * cells
+            cell = np.int64(min(max(along, 0.0), cells - 1.0))
             cell = (cell | cell << 32) & 0x1F00000000FFFF
             cell = (cell | cell << 16) & 0x1F0000FF0000FF
             cell = (cell | cell << 8) & 0x100F00F00F00F00F
             cell = (cell | cell << 4) & 0x10C30C30C30C30C3
             cell = (cell | cell << 2) & 0x1249249249249249
             key |= cell << axis
-        while extent > 8.0 * usual and key < np.int64(60) << 57:
+        while extent > 8.0 * usual and key < np.int64(200) << SIZE:
             extent /= 8.0
-            key += np.int64(1) << 57
+            key += np.int64(1) << SIZE
         keys[m] = key
 
 

@@ -49,29 +49,44 @@ def order_half_edges(faces: Ints, count: int, order: Ints, first: Ints) -> int:
     Sorts by counting, first by the higher ends and then by the lower, so the cost is linear.
     """
     vertex = faces.reshape(-1)
-    before = np.arange(len(vertex)).astype(np.int32)
-    for by_lower in range(2):
-        begin = np.zeros(count + 1, np.int32)
-        for half in range(len(vertex)):
-            a, b = vertex[half], vertex[corner_after(half)]
-            begin[(min(a, b) if by_lower else max(a, b)) + 1] += 1
-        for v in range(count):
-            begin[v + 1] += begin[v]
-        for half in before:
-            a, b = vertex[half], vertex[corner_after(half)]
-            end = min(a, b) if by_lower else max(a, b)
-            order[begin[end]] = half
-            begin[end] += 1
-        before[:] = order
-    edges, low, high = 0, -1, -1
+    before = np.empty_like(order)
+    begin = np.zeros((2, count + 1), np.int32)
+    for half in range(len(vertex)):
+        a, b = vertex[half], vertex[corner_after(half)]
+        begin[0, max(a, b) + 1] += 1
+        begin[1, min(a, b) + 1] += 1
+    for v in range(count):
+        begin[0, v + 1] += begin[0, v]
+        begin[1, v + 1] += begin[1, v]
+    for half in range(len(vertex)):
+        high = max(vertex[half], vertex[corner_after(half)])
+        before[begin[0, high]] = half
+        begin[0, high] += 1
+    for n in range(len(before)):
+        half = int(before[n])
+        low = min(vertex[half], vertex[corner_after(half)])
+        order[begin[1, low]] = half
+        begin[1, low] += 1
+    edges, pair = 0, (-1, -1)
     for n in range(len(order)):
-        a, b = vertex[order[n]], vertex[corner_after(order[n])]
-        if min(a, b) != low or max(a, b) != high:
-            low, high = min(a, b), max(a, b)
+        half = int(order[n])
+        a, b = int(vertex[half]), int(vertex[corner_after(half)])
+        if (min(a, b), max(a, b)) != pair:
+            pair = (min(a, b), max(a, b))
             first[edges] = n
             edges += 1
     first[edges] = len(order)
     return edges
+
+
+@kernel("i8(i4[:,::1], i4[::1], i4[::1])")
+def count_misoriented(faces: Ints, order: Ints, first: Ints) -> int:
+    """Count the edges that have two faces, and both run through it in one direction. See `order_half_edges`."""
+    vertex, count = faces.reshape(-1), 0
+    for edge in range(len(first) - 1):
+        if first[edge + 1] - first[edge] == 2:
+            count += vertex[order[first[edge]]] == vertex[order[first[edge] + 1]]
+    return count
 
 
 @kernel("void(i4[::1], i8, i8)")
@@ -87,11 +102,14 @@ def join(roots: Ints, a: int, b: int) -> None:
         a = above
 
 
-@kernel("void(i4[::1])")
-def find_roots(roots: Ints) -> None:
-    """Let every number point to the lowest of its set."""
+@kernel("i8(i4[::1])")
+def find_roots(roots: Ints) -> int:
+    """Let every number point to the lowest of its set; return the number of sets."""
+    sets = 0
     for n in range(len(roots)):
         roots[n] = roots[roots[n]]
+        sets += roots[n] == n
+    return sets
 
 
 @kernel("void(i4[:,::1], i4[::1])")
@@ -110,8 +128,8 @@ def join_vertices(faces: Ints, roots: Ints) -> None:
     find_roots(roots)
 
 
-@kernel("void(i4[:,::1], i4[::1], i4[::1], i4[::1])")
-def join_corners(faces: Ints, order: Ints, first: Ints, roots: Ints) -> None:
+@kernel("i8(i4[:,::1], i4[::1], i4[::1], i4[::1])")
+def join_corners(faces: Ints, order: Ints, first: Ints, roots: Ints) -> int:
     """Join the corners at one vertex across the edges between their faces.
 
     Parameters
@@ -122,6 +140,11 @@ def join_corners(faces: Ints, order: Ints, first: Ints, roots: Ints) -> None:
         See `order_half_edges`.
     roots : (3 m,) int32 array
         Its own numbers on entry. Result: the lowest corner of the fan that each belongs to.
+
+    Returns
+    -------
+    int
+        Number of fans.
     """
     vertex = faces.reshape(-1)
     for edge in range(len(first) - 1):
@@ -132,7 +155,7 @@ def join_corners(faces: Ints, order: Ints, first: Ints, roots: Ints) -> None:
                 other, other_end = other_end, other
             join(roots, one, other)
             join(roots, one_end, other_end)
-    find_roots(roots)
+    return find_roots(roots)
 
 
 @kernel("void(i4[::1], i4[::1])")

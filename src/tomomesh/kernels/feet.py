@@ -23,12 +23,12 @@ FACING = 0.2
 """Cosine of the angle between a sample's normal and the mesh's under which the sample belongs to another side."""
 
 
-@kernel("void(f8[:,::1], f8[:,::1], i8[::1], i8[::1], f8[::1], i4[::1], i8, i8)")
+@kernel("void(f8[:,::1], f8[:,::1], i8[::1], i4[::1], f8[::1], i4[::1], i8, i8)")
 def nearest_places(
     places: Floats,
     points: Floats,
-    keys: Integers,
-    start: Integers,
+    blocks: Integers,
+    start: NDArray[np.int32],
     frame: Floats,
     nearest: NDArray[np.int32],
     begin: int,
@@ -41,7 +41,7 @@ def nearest_places(
     places : (n, 3) float array
     points : (p, 3) float array
         In the order of their cubes.
-    keys, start, frame : arrays
+    blocks, start, frame : arrays
         See `tomomesh.kernels.samples`.
     nearest : (n,) int32 array
         Result: number of the point, -1 where there is none. The first of several at the same distance.
@@ -53,7 +53,7 @@ def nearest_places(
         nearest[v] = -1
         for ring in range(1, 4):
             best = (ring * frame[3]) ** 2
-            count = gather(points, keys, start, frame, places[v], ring * frame[3], found)
+            count = gather(points, blocks, start, frame, places[v], ring * frame[3], found)
             for n in range(count):
                 p = found[n]
                 squared = 0.0
@@ -66,17 +66,18 @@ def nearest_places(
                 break
 
 
-@kernel("b1(f8[:,::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], i8[::1])")
+@kernel("b1(f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], i8[::1], f8[::1])")
 def find_foot(
     samples: Floats,
-    keys: Integers,
-    start: Integers,
+    blocks: Integers,
+    start: NDArray[np.int32],
     frame: Floats,
     place: Floats,
     normal: Floats,
     reach: float,
     foot: Floats,
     found: Integers,
+    weights: Floats,
 ) -> bool:
     """Find how high a place lies over the surface that the samples around it describe.
 
@@ -88,14 +89,14 @@ def find_foot(
     ----------
     samples : (p, 7) float array
         Position, normal that faces outward, standard deviation of its weight.
-    keys, start, frame : arrays
+    blocks, start, frame : arrays
     place, normal : (3,) float arrays
         The normal of the mesh there: samples that face elsewhere have no say.
     reach : float
         How far to look.
     foot : (4,) float array
         Result: height, and the unit normal of the surface.
-    found : (m,) int64 array
+    found, weights : (m,) int64 and float arrays
         Room to work in.
 
     Returns
@@ -103,7 +104,7 @@ def find_foot(
     bool
         Whether there was any sample.
     """
-    count = gather(samples, keys, start, frame, place, reach, found)
+    count = gather(samples, blocks, start, frame, place, reach, found)
     foot[:] = 0.0
     total = 0.0
     for n in range(count):
@@ -114,14 +115,14 @@ def find_foot(
             facing += normal[axis] * samples[p, 3 + axis]
             over += step * samples[p, 3 + axis]
             squared += step * step
+        weights[n] = 0.0
         if facing < FACING:
-            found[n] = -1
             continue
         width = samples[p, 6]
-        weight = facing * facing * np.exp(-0.5 * (squared - 0.75 * over * over) / (width * width))
-        total += weight
+        weights[n] = facing * facing * np.exp(-0.5 * (squared - 0.75 * over * over) / (width * width))
+        total += weights[n]
         for axis in range(3):
-            foot[1 + axis] += weight * samples[p, 3 + axis]
+            foot[1 + axis] += weights[n] * samples[p, 3 + axis]
     length = np.sqrt(foot[1] ** 2 + foot[2] ** 2 + foot[3] ** 2)
     if total < 1e-12 or length == 0.0:
         return False
@@ -129,28 +130,21 @@ def find_foot(
         foot[1 + axis] /= length
     for n in range(count):
         p = found[n]
-        if p < 0:
-            continue
-        facing = over = squared = height = 0.0
+        height = 0.0
         for axis in range(3):
-            step = place[axis] - samples[p, axis]
-            facing += normal[axis] * samples[p, 3 + axis]
-            over += step * samples[p, 3 + axis]
-            squared += step * step
-            height += 0.5 * step * (samples[p, 3 + axis] + foot[1 + axis])
-        width = samples[p, 6]
-        foot[0] += facing * facing * np.exp(-0.5 * (squared - 0.75 * over * over) / (width * width)) * height / total
+            height += (place[axis] - samples[p, axis]) * (samples[p, 3 + axis] + foot[1 + axis])
+        foot[0] += 0.5 * weights[n] * height / total
     return True
 
 
-@kernel("void(f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], i8[::1], i8[::1], f8[::1], f8[:,::1], i8, i8)")
+@kernel("void(f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8[:,::1], i8, i8)")
 def find_feet(
     places: Floats,
     normals: Floats,
     reach: Floats,
     samples: Floats,
-    keys: Integers,
-    start: Integers,
+    blocks: Integers,
+    start: NDArray[np.int32],
     frame: Floats,
     feet: Floats,
     begin: int,
@@ -163,16 +157,16 @@ def find_feet(
     places, normals : (n, 3) float arrays
     reach : (n,) float array
         How far each place looks; 0 where it has no sample.
-    samples, keys, start, frame : arrays
+    samples, blocks, start, frame : arrays
     feet : (n, 4) float array
         Result: height and unit normal; zeros where there is no sample.
     begin, end : int
         Places to work on.
     """
-    found = np.empty(MOST, np.int64)
+    found, weights = np.empty(MOST, np.int64), np.empty(MOST)
     for v in range(begin, end):
         sees = reach[v] > 0.0 and find_foot(
-            samples, keys, start, frame, places[v], normals[v], reach[v], feet[v], found
+            samples, blocks, start, frame, places[v], normals[v], reach[v], feet[v], found, weights
         )
         if not sees:
             feet[v] = 0.0
@@ -289,17 +283,18 @@ def advance(
         Vertices to work on.
     """
     h, damping, limit, hold = rates[0], rates[1], rates[2], rates[3]
-    pull = np.empty(3)
+    pull, total = np.empty(3), np.empty(3)
     sums[:] = 0.0
     for v in range(begin, end):
         count = start[v + 1] - start[v]
         along = feet[v, 0]
         tension = speed = change = drawn = 0.0
+        total[:] = 0.0
+        for n in range(start[v], start[v + 1]):
+            for axis in range(3):
+                total[axis] += state[neighbors[n], 0, axis]
         for axis in range(3):
-            total = 0.0
-            for n in range(start[v], start[v + 1]):
-                total += state[neighbors[n], 0, axis]
-            pull[axis] = (total / count + hold * state[v, 2, axis]) / (1 + hold) - state[v, 0, axis]
+            pull[axis] = (total[axis] / count + hold * state[v, 2, axis]) / (1 + hold) - state[v, 0, axis]
             along += feet[v, 1 + axis] * (state[v, 0, axis] - anchors[v, axis])
             tension += feet[v, 1 + axis] * pull[axis]
             drawn += feet[v, 1 + axis] ** 2

@@ -1,8 +1,9 @@
-"""Loops over points and their neighbors, sought row by row among sorted cubes.
+"""Loops over points and their neighbors, sought among cubes that are sorted into blocks of 8 x 8 x 8.
 
-The points stand in the order of their cubes, and ``start[q]:start[q + 1]`` are those of cube q. Cubes that follow
-each other along x have consecutive keys, so that all points of a row of cubes are one range. A *frame* is the
-(4,) array of the lowest corner of cell (0, 0, 0) and the edge of the cubes.
+The points stand in the order of their blocks, and within a block of their cubes along x, then y, then z. *Blocks*
+are the keys of the occupied ones, rising; the points of cube c of block b are ``start[512 b + c]`` up to
+``start[512 b + c + 1]``. A *frame* is the (4,) array of the lowest corner of cell (0, 0, 0) and the edge of the
+cubes. `tomomesh.surface.search` makes all three.
 """
 
 from __future__ import annotations
@@ -19,9 +20,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
 
-SIDE = 1 << 21
-MARGIN = 256
-"""As in `tomomesh.model.cubes`, which packs cells into keys."""
+BITS = 18
+"""Bits of a block's key for each axis."""
 SIGHT = 2.5
 """Standard deviations of a Gaussian weight that are looked at."""
 MOST = 1024
@@ -35,55 +35,64 @@ BEND = 8.0
 
 
 @kernel("i8(i8[::1], i8)")
-def first_at_least(keys: Integers, wanted: int) -> int:
-    """Return the number of the first key that is not below the one wanted."""
-    low, high = 0, len(keys)
+def block_number(blocks: Integers, wanted: int) -> int:
+    """Return the number of a block among the rising ones, -1 where it is not there."""
+    low, high = 0, len(blocks)
     while low < high:
         middle = (low + high) >> 1
-        if keys[middle] < wanted:
+        if blocks[middle] < wanted:
             low = middle + 1
         else:
             high = middle
-    return low
+    return low if low < len(blocks) and blocks[low] == wanted else -1
 
 
-@kernel("void(f8[::1], f8[::1], i8[::1])")
-def cell_of(place: Floats, frame: Floats, cell: Integers) -> None:
-    """Return the cell (3,) of a place (3,)."""
-    for axis in range(3):
-        cell[axis] = np.int64(np.floor((place[axis] - frame[axis]) / frame[3]))
-
-
-@kernel("i8(f8[:,::1], i8[::1], i8[::1], f8[::1], f8[::1], f8, i8[::1])")
+@kernel("i8(f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], f8, i8[::1])")
 def gather(
-    points: Floats, keys: Integers, start: Integers, frame: Floats, place: Floats, radius: float, found: Integers
+    points: Floats,
+    blocks: Integers,
+    start: NDArray[np.int32],
+    frame: Floats,
+    place: Floats,
+    radius: float,
+    found: Integers,
 ) -> int:
-    """List the points (their first three columns) within a radius of a place; return how many, at most `MOST`."""
-    cell = np.empty(3, np.int64)
-    cell_of(place, frame, cell)
-    reach = np.int64(np.ceil(radius / frame[3]))
+    """List the points (their first three columns) within a radius of a place; return how many, at most all of `found`.
+
+    Notes
+    -----
+    Cubes that follow each other along x within a block are one range of points.
+    """
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+    for axis in range(3):
+        low[axis] = max(np.int64(np.floor((place[axis] - radius - frame[axis]) / frame[3])), 0)
+        high[axis] = np.int64(np.floor((place[axis] + radius - frame[axis]) / frame[3]))
     count = 0
-    for dz in range(-reach, reach + 1):
-        for dy in range(-reach, reach + 1):
-            row = ((cell[2] + dz + MARGIN) * SIDE + cell[1] + dy + MARGIN) * SIDE + cell[0] + MARGIN
-            q = first_at_least(keys, row - reach)
-            while q < len(keys) and keys[q] <= row + reach:
-                for p in range(start[q], start[q + 1]):
-                    squared = 0.0
-                    for axis in range(3):
-                        squared += (points[p, axis] - place[axis]) ** 2
-                    if squared <= radius * radius and count < len(found):
-                        found[count] = p
-                        count += 1
-                q += 1
+    for bz in range(low[2] >> 3, (high[2] >> 3) + 1):
+        for by in range(low[1] >> 3, (high[1] >> 3) + 1):
+            for bx in range(low[0] >> 3, (high[0] >> 3) + 1):
+                block = block_number(blocks, (((bz << BITS) | by) << BITS) | bx)
+                if block < 0:
+                    continue
+                first, last = max(low[0] - 8 * bx, 0), min(high[0] - 8 * bx, 7)
+                for z in range(max(low[2] - 8 * bz, 0), min(high[2] - 8 * bz, 7) + 1):
+                    for y in range(max(low[1] - 8 * by, 0), min(high[1] - 8 * by, 7) + 1):
+                        row = 512 * block + 64 * z + 8 * y
+                        for p in range(start[row + first], start[row + last + 1]):
+                            squared = 0.0
+                            for axis in range(3):
+                                squared += (points[p, axis] - place[axis]) ** 2
+                            if squared <= radius * radius and count < len(found):
+                                found[count] = p
+                                count += 1
     return count
 
 
-@kernel("void(f8[:,::1], i8[::1], i8[::1], f8[::1], f8, f8[::1], i8, i8)")
+@kernel("void(f8[:,::1], i8[::1], i4[::1], f8[::1], f8, f8[::1], i8, i8)")
 def local_spacing(
     points: Floats,
-    keys: Integers,
-    start: Integers,
+    blocks: Integers,
+    start: NDArray[np.int32],
     frame: Floats,
     radius: float,
     spacing: Floats,
@@ -94,26 +103,28 @@ def local_spacing(
 
     Parameters
     ----------
-    points : (p, 3) float array
-    keys, start, frame : arrays
+    points : (p, 4) float array
+        Position and mass.
+    blocks, start, frame : arrays
     radius : float
-        Where to begin; it is doubled while it holds fewer than 8 points, and halved while it holds over 64.
+        Where to begin; it is doubled, to 16 times at most, while it holds fewer than 8 points, and halved while it
+        holds over 64.
     spacing : (p,) float array
-        Result: sqrt(pi radius^2 / points), infinite where not even 16 radii hold 8 points.
+        Result: sqrt(pi radius^2 / points).
     begin, end : int
         Points to work on.
     """
     found = np.empty(MOST, np.int64)
     for p in range(begin, end):
         sight = radius
-        count = gather(points, keys, start, frame, points[p], sight, found)
+        count = gather(points, blocks, start, frame, points[p], sight, found)
         while count < 8 and sight < 16 * radius:
             sight *= 2
-            count = gather(points, keys, start, frame, points[p], sight, found)
+            count = gather(points, blocks, start, frame, points[p], sight, found)
         while count > 64 and sight > radius / 16:
             sight /= 2
-            count = gather(points, keys, start, frame, points[p], sight, found)
-        spacing[p] = sight * np.sqrt(np.pi / max(count, 1)) if count >= 8 or sight < radius else np.inf
+            count = gather(points, blocks, start, frame, points[p], sight, found)
+        spacing[p] = sight * np.sqrt(np.pi / max(count, 1))
 
 
 @kernel("void(f8[:,::1], f8[::1])")
@@ -153,11 +164,11 @@ def smallest_axis(matrix: Floats, axis: Floats) -> None:
         axis[k] = vectors[k, least]
 
 
-@kernel("void(f8[:,::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[:,::1], i8, i8)")
+@kernel("void(f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], f8[:,::1], i8, i8)")
 def fit_planes(
     points: Floats,
-    keys: Integers,
-    start: Integers,
+    blocks: Integers,
+    start: NDArray[np.int32],
     frame: Floats,
     width: Floats,
     planes: Floats,
@@ -168,8 +179,9 @@ def fit_planes(
 
     Parameters
     ----------
-    points : (p, 3) float array
-    keys, start, frame : arrays
+    points : (p, 4) float array
+        Position and mass.
+    blocks, start, frame : arrays
     width : (p,) float array
         Standard deviation of the weights; points where it is 0 are passed over.
     planes : (p, 5) float array
@@ -183,7 +195,7 @@ def fit_planes(
     for p in range(begin, end):
         if width[p] == 0.0:
             continue
-        count = gather(points, keys, start, frame, points[p], SIGHT * width[p], found)
+        count = gather(points, blocks, start, frame, points[p], SIGHT * width[p], found)
         total = 0.0
         mean[:] = 0.0
         for n in range(count):
@@ -191,7 +203,7 @@ def fit_planes(
             squared = 0.0
             for axis in range(3):
                 squared += (points[q, axis] - points[p, axis]) ** 2
-            weights[n] = np.exp(-0.5 * squared / (width[p] * width[p]))
+            weights[n] = points[q, 3] * np.exp(-0.5 * squared / (width[p] * width[p]))
             total += weights[n]
             for axis in range(3):
                 mean[axis] += weights[n] * (points[q, axis] - points[p, axis])
@@ -255,12 +267,12 @@ def tangents(normal: Floats, axes: Floats) -> None:
         axes[1, axis] = normal[one] * axes[0, two] - normal[two] * axes[0, one]
 
 
-@kernel("void(f8[:,::1], f8[:,::1], i8[::1], i8[::1], f8[::1], f8[::1], b1[::1], f8[:,::1], i8, i8)")
+@kernel("void(f8[:,::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], b1[::1], f8[:,::1], i8, i8)")
 def settle(
     points: Floats,
     planes: Floats,
-    keys: Integers,
-    start: Integers,
+    blocks: Integers,
+    start: NDArray[np.int32],
     frame: Floats,
     width: Floats,
     stray: NDArray[np.bool_],
@@ -275,10 +287,11 @@ def settle(
 
     Parameters
     ----------
-    points : (p, 3) float array
+    points : (p, 4) float array
+        Position and mass.
     planes : (p, 5) float array
         From `fit_planes`.
-    keys, start, frame : arrays
+    blocks, start, frame : arrays
     width : (p,) float array
         Standard deviation of the weights.
     stray : (p,) bool array
@@ -293,7 +306,7 @@ def settle(
     for p in range(begin, end):
         h = width[p]
         tangents(planes[p, :3], axes)
-        count = gather(points, keys, start, frame, points[p], SIGHT * h + abs(planes[p, 3]), found)
+        count = gather(points, blocks, start, frame, points[p], SIGHT * h + abs(planes[p, 3]), found)
         used = 0
         for n in range(count):
             q = found[n]
@@ -312,7 +325,8 @@ def settle(
             if abs(same) < ALIKE or abs(height) > 2 * planes[p, 4] + STEEP * np.sqrt(flat):
                 continue
             rows[used, 0], rows[used, 1], rows[used, 2] = u / h, v / h, (raw - planes[p, 3]) / h
-            rows[used, 3] = np.exp(-0.5 * (flat + height * height) / (h * h) - BEND * (1 - abs(same)))
+            bent = 0.5 * (flat + height * height) / (h * h) + BEND * (1 - abs(same))
+            rows[used, 3] = points[q, 3] * np.exp(-bent)
             used += 1
         matrix[:] = 0.0
         right[:] = 0.0
@@ -341,3 +355,30 @@ def settle(
             settled[p, axis] = points[p, axis] + (planes[p, 3] + h * right[0]) * planes[p, axis]
             tilt = right[1] * axes[0, axis] + right[2] * axes[1, axis]
             settled[p, 3 + axis] = (planes[p, axis] - tilt) / length
+
+
+@kernel("void(f8[::1], i8[::1], i8[::1], i8, f8, f8[::1])")
+def region_medians(
+    values: Floats, order: Integers, start: Integers, few: int, usual: float, medians: Floats
+) -> None:
+    """Find the median of the values in each region.
+
+    Parameters
+    ----------
+    values : (p,) float array
+    order, start : arrays
+        The points of region q are ``order[start[q]:start[q + 1]]``.
+    few : int
+        Points under which a region has no median of its own.
+    usual : float
+        What such a region is given.
+    medians : (p,) float array
+        Result: the median of the region of each point.
+    """
+    for q in range(len(start) - 1):
+        mine = order[start[q] : start[q + 1]]
+        median = usual
+        if len(mine) >= few:
+            median = np.sort(values[mine])[len(mine) // 2]
+        for p in mine:
+            medians[p] = median

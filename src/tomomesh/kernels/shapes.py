@@ -104,7 +104,7 @@ def edge_shapes(
         Result.
     turns : (e,) float array
         Result: angle between the normals of the two faces in radians, the one turned over if both run along the
-        edge in one direction; not a number where there are not two faces, or one has no area.
+        edge in one direction; 0 where there are not two faces.
     start, stop : int
         Edges to work on.
     """
@@ -115,18 +115,15 @@ def edge_shapes(
         squared = 0.0
         for axis in range(3):
             squared += sides[half % 3, axis] * sides[half % 3, axis]
-        lengths[edge], turns[edge] = np.sqrt(squared), np.nan
+        lengths[edge], turns[edge] = np.sqrt(squared), 0.0
         if edges[edge + 1] - edges[edge] == 2:
             twin = order[edges[edge] + 1]
             take_sides(vertices, faces, twin // 3, sides, other)
-            along = across = ones = others = 0.0
+            along = across = 0.0
             for axis in range(3):
                 after, last = (axis + 1) % 3, (axis + 2) % 3
                 along += one[axis] * other[axis]
                 across += (one[after] * other[last] - one[last] * other[after]) ** 2
-                ones += one[axis] * one[axis]
-                others += other[axis] * other[axis]
             if faces[half // 3, half % 3] == faces[twin // 3, twin % 3]:
                 along = -along
-            if ones > 0.0 and others > 0.0:
-                turns[edge] = np.arctan2(np.sqrt(across), along)
+            turns[edge] = np.arctan2(np.sqrt(across), along)

@@ -15,25 +15,6 @@ if TYPE_CHECKING:
 TINY = 1e-300
 
 
-@kernel("f8(f8[:,::1], i8, f8[:,::1], i4[:,::1], i8, f8, f8)")
-def squared_to(
-    points: NDArray[np.float64],
-    p: int,
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int32],
-    m: int,
-    s: float,
-    t: float,
-) -> float:
-    """Return the squared distance from point p to a + s (b - a) + t (c - a) of face m."""
-    squared = 0.0
-    for axis in range(3):
-        a = vertices[faces[m, 0], axis]
-        b, c = vertices[faces[m, 1], axis] - a, vertices[faces[m, 2], axis] - a
-        squared += (points[p, axis] - a - s * b - t * c) ** 2
-    return squared
-
-
 @kernel("f8(f8[:,::1], i8, f8[:,::1], i4[:,::1], i8)")
 def squared_distance(
     points: NDArray[np.float64], p: int, vertices: NDArray[np.float64], faces: NDArray[np.int32], m: int
@@ -57,11 +38,18 @@ def squared_distance(
     area = bb * cc - bc * bc
     s, t = cc * bp - bc * cp, bb * cp - bc * bp
     inside = area > 0.0 and s >= 0.0 and t >= 0.0 and s + t <= area
-    foot = squared_to(points, p, vertices, faces, m, s / area, t / area) if inside else np.inf
-    s, t = min(max(bp / max(bb, TINY), 0.0), 1.0), min(max(cp / max(cc, TINY), 0.0), 1.0)
-    far = min(max((cp - bp + bb - bc) / max(bb - 2.0 * bc + cc, TINY), 0.0), 1.0)
-    one, two = squared_to(points, p, vertices, faces, m, s, 0.0), squared_to(points, p, vertices, faces, m, 0.0, t)
-    return min(foot, one, two, squared_to(points, p, vertices, faces, m, 1.0 - far, far))
+    s, t = (s / area, t / area) if inside else (0.0, 0.0)
+    u, v = min(max(bp / max(bb, TINY), 0.0), 1.0), min(max(cp / max(cc, TINY), 0.0), 1.0)
+    w = min(max((cp - bp + bb - bc) / max(bb - 2.0 * bc + cc, TINY), 0.0), 1.0)
+    foot = one = two = far = 0.0
+    for axis in range(3):
+        a = vertices[faces[m, 0], axis]
+        b, c, d = vertices[faces[m, 1], axis] - a, vertices[faces[m, 2], axis] - a, points[p, axis] - a
+        foot += (d - s * b - t * c) ** 2
+        one += (d - u * b) ** 2
+        two += (d - v * c) ** 2
+        far += (d - (1.0 - w) * b - w * c) ** 2
+    return min(foot, one, two, far)
 
 
 @kernel("f8(f8[:,::1], i8, f8[:,::1], i8)")

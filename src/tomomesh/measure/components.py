@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,90 +12,71 @@ if TYPE_CHECKING:
     from .links import Links
 
     Floats = NDArray[np.float64]
+    Ints = NDArray[np.int32]
 
 LISTED = 100
 """Components that are listed at most."""
 
 
-@dataclass(frozen=True)
-class Measures:
-    """What was measured of the faces and edges of a mesh, and of points near it.
+class Components:
+    """The table of the components of a mesh in the making, that of the largest area first; `LISTED` at most.
 
-    Attributes
-    ----------
-    areas, volumes : (m,) float arrays
-    crossing : (m,) bool array
-        Faces that pass through others.
-    lengths : (e,) float array
-        Edges, in the order of the adjacency.
-    distances : (p,) float array, optional
-        Of points to the mesh.
-    nearest : (p,) int array, optional
-        The faces nearest to them.
+    See docs/report.md for the columns.
     """
 
-    areas: Floats
-    volumes: Floats
-    crossing: NDArray[np.bool_]
-    lengths: Floats
-    distances: Floats | None = None
-    nearest: NDArray[np.int32] | None = None
+    def __init__(self, links: Links, areas: Floats, volumes: Floats, lengths: Floats) -> None:
+        """Start with what the adjacency, areas (m,), volumes (m,) and edge lengths (e,) tell."""
+        self._piece, self._count = links.face_pieces, links.pieces
+        total = self._sums(areas)
+        self._largest = np.argsort(-total, kind="stable")[:LISTED]
+        self._columns: dict[str, list[Any]] = {
+            "faces": self._sums()[self._largest].tolist(),
+            "area_mm2": total[self._largest].tolist(),
+        }
+        self._add_topology(links, self._sums(volumes)[self._largest].tolist())
+        self._add_edges(self._grouped(lengths, links.edge_pieces))
 
+    def add_crossing(self, crossing: NDArray[np.bool_]) -> None:
+        """Count the faces of each component that pass through others, given those of all, (m,)."""
+        count = np.bincount(self._piece[crossing], minlength=self._count)
+        self._columns["self_intersections"] = count[self._largest].tolist()
 
-def per_component(links: Links, measures: Measures) -> list[dict[str, Any]]:
-    """Return what was measured of each component, that of the largest area first, `LISTED` at most.
+    def add_distances(self, distances: Floats, nearest: Ints) -> None:
+        """Sum up the distances of points (p,) at the component that holds the nearest face of each, (p,)."""
+        near = self._grouped(distances, self._piece[nearest])
+        self._columns["points"] = [len(own) for own in near]
+        self._columns["points_to_surface_mean_mm"] = [float(own.mean()) if len(own) else None for own in near]
+        p95 = [float(np.percentile(own, 95)) if len(own) else None for own in near]
+        self._columns["points_to_surface_p95_mm"] = p95
 
-    See docs/report.md for the keys.
-    """
-    piece = links.face_pieces
-    areas = _sums(piece, links, measures.areas)
-    largest = np.argsort(-areas, kind="stable")[:LISTED]
-    columns: dict[str, list[Any]] = {
-        "faces": _sums(piece, links)[largest].tolist(),
-        "area_mm2": areas[largest].tolist(),
-        **_borders(links, _sums(piece, links, measures.volumes), largest),
-        "self_intersections": _sums(piece[measures.crossing], links)[largest].tolist(),
-    }
-    lengths = _grouped(measures.lengths, piece[links.edge_faces], largest)
-    columns["shortest_edge_mm"] = [float(own.min()) for own in lengths]
-    columns["median_edge_mm"] = [float(np.median(own)) for own in lengths]
-    columns["longest_edge_mm"] = [float(own.max()) for own in lengths]
-    if measures.distances is not None and measures.nearest is not None:
-        near = _grouped(measures.distances, piece[measures.nearest], largest)
-        columns["points"] = [len(own) for own in near]
-        columns["points_to_surface_mean_mm"] = [float(own.mean()) if len(own) else None for own in near]
-        columns["points_to_surface_p95_mm"] = [float(np.percentile(own, 95)) if len(own) else None for own in near]
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    def rows(self) -> list[dict[str, Any]]:
+        """Return one dictionary a component."""
+        return [dict(zip(self._columns, row, strict=True)) for row in zip(*self._columns.values(), strict=True)]
 
+    def _add_topology(self, links: Links, volumes: list[float]) -> None:
+        """Add volume, genus and borders; a component with a border has no volume."""
+        borders = np.bincount(self._piece[links.borders // 3], minlength=self._count)[self._largest]
+        loops = np.bincount(self._piece[links.fans_and_loops[1] // 3], minlength=self._count)
+        vertices = np.bincount(links.vertex_pieces[links.used], minlength=self._count)
+        euler = vertices - np.bincount(links.edge_pieces, minlength=self._count) + self._sums()
+        self._columns["volume_mm3"] = [None if b else v for b, v in zip(borders, volumes, strict=True)]
+        self._columns["genus"] = (1 - (euler + loops) // 2)[self._largest].tolist()
+        self._columns["boundary_edges"] = borders.tolist()
+        self._columns["boundary_loops"] = loops[self._largest].tolist()
 
-def _borders(links: Links, volumes: Floats, largest: NDArray[np.intp]) -> dict[str, list[Any]]:
-    """Return volume, genus and borders of the largest components; one with a border has no volume."""
-    edges = _sums(links.face_pieces[links.borders // 3], links)
-    loops = _sums(links.face_pieces[links.loops // 3], links)
-    euler = (
-        _sums(links.vertex_pieces[links.used], links)
-        - _sums(links.face_pieces[links.edge_faces], links)
-        + _sums(links.face_pieces, links)
-    )
-    genus = 1 - (euler + loops) // 2
-    return {
-        "volume_mm3": [None if edges[c] else float(volumes[c]) for c in largest],
-        "genus": genus[largest].astype(int).tolist(),
-        "boundary_edges": edges[largest].tolist(),
-        "boundary_loops": loops[largest].tolist(),
-    }
+    def _add_edges(self, lengths: list[Floats]) -> None:
+        self._columns["shortest_edge_mm"] = [float(own.min()) for own in lengths]
+        self._columns["median_edge_mm"] = [float(np.median(own)) for own in lengths]
+        self._columns["longest_edge_mm"] = [float(own.max()) for own in lengths]
 
+    def _sums(self, weights: Floats | None = None) -> NDArray[Any]:
+        """Count the faces of each component, or add up what they weigh."""
+        return np.bincount(self._piece, weights, self._count)
 
-def _sums(piece: NDArray[np.int32], links: Links, weights: Floats | None = None) -> NDArray[Any]:
-    """Count, or add up, what belongs to each component."""
-    return np.bincount(piece, weights, links.pieces)
-
-
-def _grouped(values: Floats, piece: NDArray[np.int32], chosen: NDArray[np.intp]) -> list[Floats]:
-    """Return the values that belong to each of some components."""
-    if len(chosen) == 1 and not piece.any():
-        return [values]
-    order = np.argsort(piece, kind="stable")
-    begin = np.searchsorted(piece[order], chosen, side="left")
-    end = np.searchsorted(piece[order], chosen, side="right")
-    return [values[order[b:e]] for b, e in zip(begin, end, strict=True)]
+    def _grouped(self, values: Floats, piece: Ints) -> list[Floats]:
+        """Return the values that belong to each of the largest components."""
+        if self._count == 1:
+            return [values]
+        order = np.argsort(piece, kind="stable")
+        begin, end = (np.searchsorted(piece[order], self._largest, side=side) for side in ("left", "right"))
+        return [values[order[b:e]] for b, e in zip(begin, end, strict=True)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model.points import PointSet
 from ..progress import Progress, silent
-from .components import Measures, per_component
+from .components import Components
 from .distance import distance_to_surface, spread_of
 from .intersections import marked_in
 from .links import Links
@@ -61,27 +61,38 @@ def assess(
     dict
         Counts, areas, volumes, triangle shapes and distances; each key names its unit (see docs/report.md).
     """
-    links, (areas, volumes) = Links(mesh), areas_and_volumes(mesh, threads=threads)
-    counts = topology_of(links, volumes, cavities=cavities)
-    found = _counted(mesh, counts, cavities)
-    found["area_mm2"] = float(areas.sum())
-    found["volume_mm3"] = float(volumes.sum()) if found["closed"] else None
-    lengths, turns = lengths_and_turns(mesh, links, threads=threads)
-    found |= shapes_of_edges(lengths, turns) | shapes_of_faces(mesh, threads=threads)
+    found, table = _of_surface(mesh, cavities, threads, progress)
     tree = Tree.of_faces(mesh, threads=threads)
-    crossing = marked_in(tree, threads=threads, progress=_part(progress, 10, 50))
+    crossing = marked_in(tree, threads=threads, progress=_part(progress, 15, 50))
     found["self_intersections"] = int(crossing.sum())
-    distances = nearest = None
+    table.add_crossing(crossing)
     if points is not None:
         points = points.positions if isinstance(points, PointSet) else points
         distances, nearest, back = _distances(mesh, tree, points, threads, progress)
         found |= spread_of(distances, "points_to_surface_") | spread_of(back, "vertices_to_points_")
-    found["per_component"] = per_component(links, Measures(areas, volumes, crossing, lengths, distances, nearest))
-    found["components_not_listed"] = counts.components - len(found["per_component"])
+        table.add_distances(distances, nearest)
+    found["per_component"] = table.rows()
+    found["components_not_listed"] = found["components"] - len(found["per_component"])
     if against is not None:
         found |= compare(mesh, against, threads=threads)
     progress("measure", HUNDRED, HUNDRED)
     return found
+
+
+def _of_surface(mesh: TriMesh, cavities: int, threads: int, progress: Progress) -> tuple[dict[str, Any], Components]:
+    """Return what can be told of the faces and edges alone, and the table of components so far."""
+    links = Links(mesh)
+    areas, volumes = areas_and_volumes(links, threads=threads)
+    found = _counted(mesh, topology_of(links, volumes, cavities=cavities), cavities)
+    progress("measure", 5, HUNDRED)
+    found["area_mm2"] = float(areas.sum())
+    found["volume_mm3"] = float(volumes.sum()) if found["closed"] else None
+    lengths, turns = lengths_and_turns(links, threads=threads)
+    found |= shapes_of_edges(lengths, turns, int((links.uses == 2).sum()))
+    progress("measure", 10, HUNDRED)
+    found |= shapes_of_faces(links, threads=threads)
+    progress("measure", 15, HUNDRED)
+    return found, Components(links, areas, volumes, lengths)
 
 
 def _counted(mesh: TriMesh, counts: Topology, cavities: int) -> dict[str, Any]:
@@ -131,14 +142,14 @@ def compare(
     dict
         Mean, percentiles and maximum from `mesh` to `other`, and, prefixed with ``back_``, from `other`.
     """
-    there = distance_to_surface(area_samples(mesh, leave_out=leave_out), other, threads=threads)
-    back = distance_to_surface(area_samples(other), mesh, threads=threads)
+    there = distance_to_surface(area_samples(mesh, SAMPLES, leave_out=leave_out), other, threads=threads)
+    back = distance_to_surface(area_samples(other, SAMPLES), mesh, threads=threads)
     return spread_of(there, "") | spread_of(back, "back_")
 
 
 def area_samples(mesh: TriMesh, count: int = SAMPLES, *, leave_out: NDArray[np.bool_] | None = None) -> Floats:
     """Draw points uniformly by area from a mesh, (count, 3); the same points every time."""
-    areas = areas_and_volumes(mesh)[0]
+    areas = areas_and_volumes(Links(mesh))[0]
     areas = areas if leave_out is None else np.where(leave_out, 0.0, areas)
     rng = np.random.default_rng(0)
     reached = np.cumsum(areas)

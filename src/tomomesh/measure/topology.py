@@ -83,24 +83,26 @@ def topology(mesh: TriMesh, *, cavities: int = 0) -> Topology:
     -------
     Topology
     """
-    return topology_of(Links(mesh), areas_and_volumes(mesh)[1], cavities=cavities)
+    links = Links(mesh)
+    return topology_of(links, areas_and_volumes(links)[1], cavities=cavities)
 
 
 def topology_of(links: Links, volumes: NDArray[np.float64], *, cavities: int = 0) -> Topology:
     """Count what `topology` counts, from the adjacency of a mesh and the volumes (m,) under its faces."""
-    euler = int(links.used.sum()) - len(links.uses) + len(links.faces)
+    vertices, (fans, loops) = int(links.used.sum()), links.fans_and_loops
+    euler = vertices - len(links.uses) + len(links.faces)
     inward = np.bincount(links.face_pieces, volumes, links.pieces) < 0
     inward[links.face_pieces[links.borders // 3]] = False
     return Topology(
         components=links.pieces,
         euler_number=euler,
-        genus=links.pieces - (euler + len(links.loops)) // 2,
+        genus=links.pieces - (euler + len(loops)) // 2,
         boundary_edges=len(links.borders),
         nonmanifold_edges=int((links.uses > 2).sum()),
-        nonmanifold_vertices=links.fan_count - int(links.used.sum()),
+        nonmanifold_vertices=fans - vertices,
         misoriented_edges=links.misoriented,
         inward_components=abs(int(inward.sum()) - cavities),
-        boundary_loops=len(links.loops),
+        boundary_loops=len(loops),
     )
 
 
@@ -114,7 +116,7 @@ def welded(mesh: TriMesh, dtype: type[np.floating[Any]] = np.float32) -> TriMesh
 
     Faces that lose a corner are dropped.
     """
-    rounded = mesh.vertices.astype(dtype).astype(np.float64)
+    rounded = np.array(mesh.vertices.astype(dtype, copy=False), np.float64, order="C")
     first = _first_alike(rounded)
     kept = first == np.arange(len(first))
     faces = (np.cumsum(kept) - 1)[first][mesh.faces]
@@ -158,13 +160,14 @@ def check_promise(mesh: TriMesh, *, cavities: int = 0, open_: bool = False) -> N
 
 def distinct_positions(mesh: TriMesh, dtype: type[np.floating[Any]]) -> int:
     """Count the positions that stay apart at a precision."""
-    first = _first_alike(mesh.vertices.astype(dtype).astype(np.float64))
+    first = _first_alike(np.array(mesh.vertices.astype(dtype, copy=False), np.float64, order="C"))
     return int((first == np.arange(len(first))).sum())
 
 
 def _first_alike(positions: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Return the first vertex at the position of each, (n,); 0 and -0 are the same position."""
-    rows = np.ascontiguousarray(positions + 0.0).view(np.int64)
+    """Return the first vertex at the position of each, (n,). -0 becomes 0, which is the same position."""
+    positions += 0.0
+    rows = positions.view(np.int64)
     bits = len(rows).bit_length() + 1
     first = np.empty(len(rows), np.int32)
     first_alike(rows, _stirred(rows.view(np.uint64), bits), np.full(1 << bits, -1, np.int32), first)

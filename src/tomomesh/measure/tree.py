@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 LEAF = 4
 """Fewest simplices in a leaf, where there are so many; fewer than twice as many are the most."""
 SOME = 2_000
-"""Simplices that tell the usual extent."""
-BLOCK = 50_000
-"""Simplices handled at once, and ten times the points: some milliseconds."""
+"""Simplices that tell the usual place and extent."""
+BLOCK = 20_000
+"""Simplices handled at once, and five times the points: some milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +51,16 @@ class Tree:
     @classmethod
     def of_faces(cls, mesh: TriMesh, *, threads: int = 0) -> Tree:
         """Build the tree of the faces of a mesh; one at least, and finite vertices."""
-        return cls._over(mesh.vertices, mesh.faces.astype(np.int32), threads)
+        return cls.over(mesh.vertices, mesh.faces.astype(np.int32), threads=threads)
 
     @classmethod
     def of_points(cls, points: Floats, *, threads: int = 0) -> Tree:
         """Build the tree of some points (n, 3); one at least, and finite ones."""
-        return cls._over(points, np.arange(len(points), dtype=np.int32)[:, None], threads)
+        return cls.over(points, np.arange(len(points), dtype=np.int32)[:, None], threads=threads)
 
     @classmethod
-    def _over(cls, vertices: Floats, simplices: Ints, threads: int) -> Tree:
+    def over(cls, vertices: Floats, simplices: Ints, *, threads: int = 0) -> Tree:
+        """Build the tree of simplices (m, k) over vertices (n, 3)."""
         vertices = np.ascontiguousarray(vertices, np.float64)
         order = _along_curve(vertices, simplices, threads)
         simplices = simplices.take(order, axis=0)
@@ -112,7 +113,7 @@ class Tree:
                 along, self.vertices, self.simplices, self.boxes, squared, nearest, start, stop
             ),
             len(points),
-            block=BLOCK // 10,
+            block=BLOCK // 5,
             threads=threads,
             done=lambda count: progress("distances", count, len(points)),
         )
@@ -123,10 +124,11 @@ class Tree:
 def _along_curve(vertices: Floats, simplices: Ints, threads: int) -> Ints:
     """Order simplices along a space-filling curve, the large ones after all others."""
     vertices = np.ascontiguousarray(vertices, np.float64)
-    low = np.array([column.min() for column in vertices.T])
-    side = max(*(float(column.max() - least) for column, least in zip(vertices.T, low, strict=True)), 1e-300)
     some = vertices[simplices[:: max(len(simplices) // SOME, 1)]]
-    usual = max(float(np.median(np.ptp(some, axis=1).max(axis=1))), 1e-9 * side)
+    low, high = np.percentile(some.mean(axis=1), [1, 99], axis=0)
+    span = max(float((high - low).max()), 1e-300)
+    usual = max(float(np.median(np.ptp(some, axis=1).max(axis=1))), 1e-9 * span)
+    low, side = low - span, 3 * span
     keys = np.empty(len(simplices), np.int64)
     in_blocks(
         lambda start, stop: curve_keys(vertices, simplices, low, side, usual, keys, start, stop),

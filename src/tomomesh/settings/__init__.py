@@ -155,7 +155,7 @@ class CubeSettings(Group):
     """Space partition, cuberille and low-pass filter (Fig. 8)."""
 
     cell_mm: tuple[float, ...] | None = param(
-        None, "edge of the cubes, one or one an axis (x y z); by default r, the widest gap between neighboring points",
+        None, "edge of the cubes, one or one an axis (x y z), in a cloud's own unit; by default what the points ask for",
         unit="mm", above=0, length=(1, 3),
     )  # fmt: skip
     cell_factor: float = param(1.0, "dilation factor on the edge of the cubes, for coarser models", above=0)
@@ -164,6 +164,11 @@ class CubeSettings(Group):
         None, "cubes by which gaps in the shell are closed; by default the fewest that keep the outside out",
         kind=int, unit="cubes", low=0, high=64,
     )  # fmt: skip
+    contours: str = param(
+        "auto",
+        "take points on parallel slices as contours, each with its inside, and close what lies between; none never does",
+        choices=("auto", "none"),
+    )
     largest: bool = param(False, "keep the largest surface alone")
     allow_leaks: bool = param(False, "write the surface even where the outside leaks into the shell")
     surface: str = param(
@@ -226,7 +231,10 @@ class RunSettings(Group):
         choices=("mm", "cm", "m", "unknown"),
     )
     local_origin: bool = param(
-        False, "write a cloud's mesh relative to the lowest corner of the points; the report tells where that is"
+        False, "count a cloud's coordinates from its lowest corner, which report and file name: for STL far from 0"
+    )
+    target_faces: int | None = param(
+        None, "most faces of the mesh, which is made coarser where it has more", kind=int, unit="faces", low=4
     )
 
 

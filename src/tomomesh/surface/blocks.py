@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import ResourceError
 from ..kernels.boards import grow_along, list_cubes
 from ..kernels.cells import label_components
 from ..kernels.threads import in_blocks
-from ..model.cubes import cells_of, keys_of
-from .neighbors import FACE_COLUMNS, column_of, dilate, neighbor_table
+from ..model.cubes import SIDE, cells_of, keys_of
+from .neighbors import FACE_COLUMNS, dilate, neighbor_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +25,8 @@ EDGE = 8
 """Cubes along a block."""
 SHARE = 4_096
 """Blocks worked on in one call: a few milliseconds."""
-BELOW = column_of((0, 0, -1))
+MOST = 4_000_000
+"""Blocks over which no set is begun: their table alone takes half a gigabyte."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +56,13 @@ class Blocks:
     @classmethod
     def around(cls, cells: NDArray[np.int64], margin: int, *, threads: int = 0) -> Blocks:
         """Take every block within some cubes of the given cells (x, y, z), (c, 3)."""
-        own = np.unique(keys_of(cells // EDGE))
-        keys = dilate(own, -(-margin // EDGE))
-        wide = dilate(keys, 1)
+        keys = np.unique(keys_of(cells // EDGE))
+        for _ in range(-(-margin // EDGE)):
+            keys = dilate(_few_enough(keys), 1)
+        wide = dilate(_few_enough(keys), 1)
         inner = np.isin(wide, keys, assume_unique=True)
         table = neighbor_table(wide)
-        rows = len(keys) + _spaces(table, inner)
+        rows = len(keys) + _spaces(wide, table, inner)
         rows[inner] = np.arange(len(keys))
         return cls(keys, rows[table[inner]].astype(np.int32), int(rows.max()) + 1 - len(keys), threads)
 
@@ -118,17 +121,40 @@ def before(count: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.asarray(np.cumsum(count.ravel()).reshape(count.shape) - count)
 
 
-def _spaces(table: NDArray[np.int32], inner: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Number the pieces of space that the empty blocks around the inner ones belong to: 0 is outside.
+def _few_enough(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    if len(keys) > MOST:
+        raise ResourceError(
+            "the cubes around the points would not fit into memory",
+            found=f"{len(keys)} blocks of {EDGE} x {EDGE} x {EDGE} cubes",
+            expected=f"at most {MOST}",
+            hint="a larger --cell-mm or a smaller --closing",
+        )
+    return keys
 
-    The empty blocks fall apart into pieces that are connected over faces, one around each object and one lining
-    each cavity. The lowest block of a cavity has the object right below it; the lowest around an object has not.
+
+def _spaces(keys: NDArray[np.int64], table: NDArray[np.int32], inner: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Find the piece of space that each empty block around the inner ones belongs to: 0 is outside.
+
+    The empty blocks fall apart into layers that are connected over faces: one around each object, one lining each
+    cavity. What comes next below the lowest block of a layer tells: an object below the lining of a cavity; below
+    the layer around an object nothing, or another layer, on the far side of the space that both lie in.
     """
     labels = np.full(len(inner), -1, np.int32)
-    count = label_components(np.ascontiguousarray(table[:, FACE_COLUMNS]), ~inner, labels)
+    label_components(np.ascontiguousarray(table[:, FACE_COLUMNS]), ~inner, labels)
     empty = np.flatnonzero(~inner)
-    _, first = np.unique(labels[empty], return_index=True)
-    below = table[empty[first], BELOW]
+    layers, first = np.unique(labels[empty], return_index=True)
+    below = _next_below(keys, empty[first])
     lining = (below >= 0) & inner[below]
-    number = np.where(lining, np.cumsum(lining), 0)
-    return np.asarray(np.append(number, 0)[labels]) if count else np.zeros(len(inner), np.int64)
+    space = np.where((below < 0) | lining, layers, labels[below])
+    while (space != space[space]).any():
+        space = space[space]
+    return np.asarray(np.append((np.cumsum(lining) * lining)[space], 0)[labels])
+
+
+def _next_below(keys: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the row of the next block below some blocks, however far; -1 where there is none."""
+    columns = keys_of(cells_of(keys)[:, ::-1])
+    order = np.argsort(columns)
+    at = np.searchsorted(columns[order], columns[rows])
+    below = order[at - 1]
+    return np.where((at > 0) & (columns[below] // SIDE == columns[rows] // SIDE), below, -1)

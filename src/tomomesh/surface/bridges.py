@@ -23,6 +23,8 @@ SIGHT = 2.5
 """How far a point looks for neighbors around it, times its spacing."""
 SPAN = 5.0
 """Longest bridge, times the spacing: points thrown at random leave holes as wide, once in 10 million."""
+ROOM = 8
+"""Places a sample for which there is room at first."""
 DENSE = 0.5
 """Distance of the places on a bridge, cube edges."""
 
@@ -43,7 +45,7 @@ class Bridges:
     sectors: NDArray[np.int64]
 
 
-def bridges(samples: Samples, edge: float, *, threads: int = 0, progress: Progress = silent) -> Bridges:
+def bridges(samples: Samples, edge: float, *, span: float = SPAN, threads: int = 0, progress: Progress = silent) -> Bridges:
     """Lay places on straight lines across the holes between samples.
 
     A line joins two samples that have no neighbors in its direction, and lies flat on the surface at both. So
@@ -54,6 +56,8 @@ def bridges(samples: Samples, edge: float, *, threads: int = 0, progress: Progre
     samples : Samples
     edge : float
         Edge of the cubes that the places must fill without a gap.
+    span : float
+        Longest bridge, times the spacing.
     threads : int
     progress : callable
 
@@ -63,19 +67,20 @@ def bridges(samples: Samples, edge: float, *, threads: int = 0, progress: Progre
     """
     index = Index.of(samples.positions, SIGHT * float(np.median(samples.spacing)))
     rows = np.column_stack([samples.positions, samples.normals, samples.spacing])[index.order]
-    cells, count = (index.keys, index.start, index.frame), len(rows)
+    cells, count = index.cells, len(rows)
     sectors = np.empty(count, np.int64)
     found: dict[int, NDArray[np.float64]] = {}
 
     def look(start: int, stop: int) -> None:
         full_sectors(rows, *cells, SIGHT, sectors, start, stop)
 
-    def span(start: int, stop: int) -> None:
-        places = bridge(rows, *cells, sectors, SPAN, DENSE * edge, np.empty((0, 3)), start, stop)
-        found[start] = np.empty((places, 3))
-        bridge(rows, *cells, sectors, SPAN, DENSE * edge, found[start], start, stop)
+    def lay(start: int, stop: int) -> None:
+        places, room = np.empty((ROOM * (stop - start), 3)), 0
+        while (room := bridge(rows, *cells, sectors, span, DENSE * edge, places, start, stop)) > len(places):
+            places = np.empty((room, 3))
+        found[start] = places[:room].copy()
 
-    for stage, work in enumerate((look, span)):
+    for stage, work in enumerate((look, lay)):
         done = stage * count
         in_blocks(
             work, count, block=BLOCK, threads=threads, done=lambda n, d=done: progress("bridges", d + n, 2 * count)  # type: ignore[misc]

@@ -16,9 +16,9 @@ CLOSEST = 0.01
 """A crossing comes no nearer to a voxel's center than this share of the way to its neighbor."""
 BARELY = 0.02
 """How far the surface lies outside the center of a voxel that was added: its gray level is all but in the window."""
-STEPPED, SAMPLES = 0.5, 5_000
-"""Share of the crossings between two plateaus over which the gray levels are those of a mask, and how many are looked
-at to tell."""
+STEPPED, SAMPLES = 0.9, 5_000
+"""Share of a border's height between two voxels over which the gray levels are those of a mask, and how many crossings
+are looked at to tell. Studies have 0.4 to 0.6, the built-in head 0.66."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,10 @@ class Levels:
         levels[np.isinf(levels)] = np.nan
         return np.asarray(levels)
 
+    def kept(self, levels: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which levels lie in the window."""
+        return (levels > self.lower) & (levels <= self.upper)
+
     def excess(self, places: NDArray[np.int32]) -> NDArray[np.float64]:
         """Return how far the level of each voxel is outside the window, (n,); infinite where it is unknown."""
         levels = self.at(places)
@@ -64,17 +68,21 @@ class Levels:
         bound = np.where(outside > self.upper, self.upper, self.lower)
         with np.errstate(divide="ignore", invalid="ignore"):  # a voxel that was added may be no brighter than outside
             share = (inside - bound) / (inside - outside)
-        within = (outside > self.lower) & (outside <= self.upper)
-        first = np.where(within, np.inf, share).min(axis=1)
+        first = np.where(self.kept(outside), np.inf, share).min(axis=1)
         return np.where(first <= 1, np.clip(first, CLOSEST, 1 - CLOSEST), 0.5)
 
     def stepped(self, inner: NDArray[np.int32], steps: NDArray[np.int32]) -> bool:
-        """Tell whether most crossings lie between two plateaus, where levels say nothing of the border's place."""
+        """Tell whether the levels are those of a mask, and so say nothing about where between voxels the border is.
+
+        Looks at four voxels in a line, two inside and two outside. Sampled by anything that has an extent, a border
+        takes about half of its height between the middle two; in a mask it takes all of it.
+        """
         every = -(-len(inner) // SAMPLES)
         inner, steps = inner[::every], steps[::every]
         before, inside, outside, after = (self.at(inner + n * steps) for n in (-1, 0, 1, 2))
-        plateaus = ((before == inside) & (outside == after)).all(axis=1)
-        return bool(plateaus.sum() > STEPPED * (~np.isnan(outside)).all(axis=1).sum())
+        whole, step = (np.abs(one - other).sum(axis=1) for one, other in ((before, after), (inside, outside)))
+        clear = self.kept(before).all(axis=1) & ~self.kept(after).all(axis=1) & (whole > 0)
+        return bool(2 * clear.sum() > len(clear) and np.median(step[clear] / whole[clear]) > STEPPED)
 
 
 @dataclass(frozen=True)
@@ -89,7 +97,7 @@ class Crossings:
         ``NEURON`` where gray levels were interpolated, ``CAP`` on the border of the volume, ``BRIDGE`` around a
         voxel that is not in the window.
     stepped : bool
-        Whether the gray levels are those of a mask.
+        Whether the gray levels are those of a mask: then all crossings are half way.
     """
 
     positions: NDArray[np.float64]
@@ -116,8 +124,8 @@ def crossings(
     -------
     Crossings
     """
-    outer = inner + steps
-    share = np.where(added, BARELY, levels.crossed(inner, outer))
+    outer, stepped = inner + steps, levels.stepped(inner, steps)
+    share = np.full(len(inner), 0.5) if stepped else np.where(added, BARELY, levels.crossed(inner, outer))
     beyond = (levels.nearest(outer) != outer).any(axis=1)
     kinds = np.where(added, BRIDGE, np.where(beyond, CAP, NEURON)).astype(np.uint8)
-    return Crossings(inner + share[:, None] * steps, kinds, levels.stepped(inner, steps))
+    return Crossings(inner + share[:, None] * steps, kinds, stepped)

@@ -35,11 +35,11 @@ SIGHT = 2.5
 """Standard deviations of the weights that are looked at."""
 STALE = 0.15
 """Way, in cube edges, after which a vertex seeks its foot anew."""
-SEEKING = (3, 6, 10, 15)
+SEEKING = (2, 4, 7, 10)
 """Steps before which feet are sought anew, and vertices are held where they then are; later, feet at every tenth."""
 HOLD = 0.5
 """Stiffness of the spring that holds a vertex where it was, over that of its other springs."""
-RESTLESS = 1e-2
+RESTLESS = 0.05
 """Share of the vertices that may still move where the mesh counts as at rest."""
 SAGITTA = 0.5
 """Share of the height of a square's middle by which its corners rise: a chord lies below the curve, and this much
@@ -125,7 +125,8 @@ def drape(
     Draped
     """
     ground = _Ground.under(vertices, ring, samples, threads)
-    feet, anchors = ground.feet(vertices, ring.normals(vertices), ground.first_reach), vertices
+    feet = ground.feet(vertices, ring.normals(vertices), ground.first_reach(vertices))
+    anchors = vertices
     state = np.stack([vertices, np.zeros_like(vertices), vertices], axis=1)
     history: list[Floats] = []
     while len(history) < settings.max_steps and not _rests(history, len(vertices)):
@@ -141,8 +142,8 @@ def drape(
     placed = np.ascontiguousarray(state[:, 0])
     feet = ground.feet(placed, ground.towards(feet, ring.normals(placed)), ground.reach)
     placed = placed - feet[:, :1] * feet[:, 1:]
-    placed, faces = ground.split(placed, ring)
     filled = (feet[:, 1:] == 0).all(axis=1)
+    placed, faces = _split(placed, np.where(filled[:, None], ring.normals(placed), feet[:, 1:]), ring)
     return Draped(placed, faces, filled, _trace(history, edge, len(vertices)))
 
 
@@ -179,8 +180,7 @@ class _Ground:
 
     samples: Floats
     index: Index
-    width: Floats
-    first_reach: Floats
+    nearest: NDArray[np.int32]
     threads: int
 
     @classmethod
@@ -196,21 +196,24 @@ class _Ground:
         index = Index.of(rows[:, :3], index.frame[3])
         rows = np.ascontiguousarray(rows[index.order])
         near = np.empty(len(vertices), np.int32)
-        cells = (index.keys, index.start, index.frame)
+        cells = index.cells
         in_blocks(lambda a, b: nearest_places(vertices, rows, *cells, near, a, b), len(vertices), block=BLOCK, threads=threads)
-        away = np.sqrt(((rows[near, :3] - vertices) ** 2).sum(axis=1))
-        width = np.where(near >= 0, rows[near, 6], 0.0)
-        return cls(rows, index, width, np.where(near >= 0, SIGHT * width + away, 0.0), threads)
+        return cls(rows, index, near, threads)
 
     @property
     def reach(self) -> Floats:
-        """How far each vertex looks once it is near its foot, (n,)."""
-        return SIGHT * self.width
+        """How far each vertex looks, (n,); 0 where it has no sample near."""
+        return np.where(self.nearest >= 0, SIGHT * self.samples[self.nearest, 6], 0.0)
+
+    def first_reach(self, places: Floats) -> Floats:
+        """How far each place looks before the mesh has moved: to the nearest sample and on, (n,)."""
+        away = np.sqrt(((self.samples[self.nearest, :3] - places) ** 2).sum(axis=1))
+        return np.where(self.nearest >= 0, self.reach + away, 0.0)
 
     def feet(self, places: Floats, normals: Floats, reach: Floats) -> Floats:
         """Return height and normal of the surface below places, (n, 4)."""
         feet = np.empty((len(places), 4))
-        cells = (self.index.keys, self.index.start, self.index.frame)
+        cells = self.index.cells
 
         def work(begin: int, end: int) -> None:
             find_feet(places, normals, reach, self.samples, *cells, feet, begin, end)
@@ -232,30 +235,28 @@ class _Ground:
         seen = (feet[:, 1:] != 0).any(axis=1, keepdims=True)
         return np.ascontiguousarray(np.where(seen, feet[:, 1:], normals))
 
-    def split(self, vertices: Floats, ring: Ring) -> tuple[Floats, NDArray[np.int64]]:
-        """Split the squares by the diagonals nearer to the surface, and raise their corners by a part of the sagitta."""
-        normals = ring.normals(vertices)
-        corners = ring.quads.T
-        reach = np.maximum.reduce([self.reach[corner] for corner in corners])
-        heights = []
-        for one, two in (corners[[0, 2]], corners[[1, 3]]):
-            middle = 0.5 * (vertices[one] + vertices[two])
-            towards = normals[one] + normals[two]
-            towards /= np.maximum(np.sqrt((towards**2).sum(axis=1, keepdims=True)), 1e-300)
-            heights.append(self.feet(middle, towards, reach)[:, 0])
-        first, second = heights
-        turned = (np.abs(second) < np.abs(first)).astype(np.int64)
-        mean = np.bincount(ring.quads.ravel(), np.repeat(0.5 * (first + second), 4), len(vertices))
-        rise = SAGITTA * mean / np.diff(ring.start)
-        a, b, c, d = (ring.quads[np.arange(len(turned)), (turned + n) % 4] for n in range(4))
-        faces = np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3).astype(np.int64)
-        return vertices - rise[:, None] * normals, faces
+
+def _split(vertices: Floats, normals: Floats, ring: Ring) -> tuple[Floats, NDArray[np.int64]]:
+    """Split the squares by the diagonals nearer to the surface, and raise their corners by a part of the sagitta.
+
+    A chord d between places with normals m and n lies (n - m) d / 8 below the middle of the arc.
+    """
+    first, second = (
+        ((normals[two] - normals[one]) * (vertices[two] - vertices[one])).sum(axis=1) / 8
+        for one, two in (ring.quads.T[[0, 2]], ring.quads.T[[1, 3]])
+    )
+    turned = (np.abs(second) < np.abs(first)).astype(np.int64)
+    mean = np.bincount(ring.quads.ravel(), np.repeat(0.5 * (first + second), 4), len(vertices))
+    rise = SAGITTA * mean / np.diff(ring.start)
+    a, b, c, d = (ring.quads[np.arange(len(turned)), (turned + n) % 4] for n in range(4))
+    faces = np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3).astype(np.int64)
+    return vertices + rise[:, None] * normals, faces
 
 
 def _nearest(rows: Floats, vertices: Floats, edge: float, threads: int) -> NDArray[np.int64]:
     """Return the vertex nearest to each sample, (p,); -1 where none is near."""
     index = Index.of(vertices, edge)
-    places, cells = vertices[index.order], (index.keys, index.start, index.frame)
+    places, cells = vertices[index.order], index.cells
     near = np.empty(len(rows), np.int32)
     positions = np.ascontiguousarray(rows[:, :3])
     in_blocks(lambda a, b: nearest_places(positions, places, *cells, near, a, b), len(rows), block=BLOCK, threads=threads)

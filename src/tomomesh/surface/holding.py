@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,14 +12,18 @@ from .shell import close_shell
 from .walls import HELD, Walls, walls
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     from .shell import Shell
 
-WIDEST = 8
-"""Largest closing that is tried by itself, cubes."""
+CLOSINGS = tuple(range(9))
+"""Closings that are tried by themselves, cubes."""
 LEAKING = 1
 """Closing of a shell that none makes hold, as of a sheet or a thin slab: it fills single holes."""
+SURE = 0.8
+"""Share of occupied cubes that tell of an inside from which no wider closing is tried."""
 HOPELESS = 0.1
 """Share of the occupied cubes that must tell of an inside for the surfaces to be looked at one by one."""
 
@@ -32,29 +36,37 @@ class Held:
     ----------
     shell : Shell
     walls : Walls
-    holds : bool
+    two_sided : float
+        Least share, over the surfaces, of occupied cubes that tell of an inside: near 1 where the shell holds, near
+        0 where the outside leaks in and the surface would be two-walled.
     """
 
     shell: Shell
     walls: Walls
-    holds: bool
+    two_sided: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the outside stays out."""
+        return self.two_sided >= HELD
 
 
 def hold(
     cells: NDArray[np.int64],
-    closing: int | None = None,
+    closings: Iterable[int] = CLOSINGS,
     *,
     cavities: bool = False,
     threads: int = 0,
     progress: Progress = silent,
 ) -> Held:
-    """Close a shell by a given number of cubes, or by the fewest that make it hold.
+    """Close a shell by the fewest cubes that make it hold.
 
     Parameters
     ----------
     cells : (c, 3) int64 array
         Positions (x, y, z) of the cubes that hold points.
-    closing : int, optional
+    closings : iterable of int
+        What to try, cubes.
     cavities : bool
         Also take the objects inside of objects: their walls face inward, those inside of these outward again.
     threads : int
@@ -63,21 +75,25 @@ def hold(
     Returns
     -------
     Held
-        Where no closing up to `WIDEST` holds, closed by `LEAKING`.
+        The first that surely holds, else the one that holds best; closed by `LEAKING` where none holds at all.
     """
-    tried = range(WIDEST + 1) if closing is None else [closing]
+    tried = list(closings)
+    best: Held | None = None
     for count, steps in enumerate(tried):
         progress("closing", count, len(tried))
         shell = close_shell(cells, steps, threads=threads)
-        if closing is None and _share(shell) < HOPELESS:
+        if len(tried) > 1 and _share(shell) < HOPELESS:
             continue
         found = walls(shell)
-        if found.holds or closing is not None:
-            progress("closing", len(tried), len(tried))
-            return Held(shell, _with_cavities(shell, found) if cavities else found, found.holds)
+        held = Held(shell, found, found.least_two_sided)
+        best = held if best is None or held.two_sided > best.two_sided else best
+        if best.two_sided >= SURE:
+            break
     progress("closing", len(tried), len(tried))
-    shell = close_shell(cells, LEAKING, threads=threads)
-    return Held(shell, walls(shell), False)
+    if best is None:
+        shell = close_shell(cells, LEAKING, threads=threads)
+        best = Held(shell, walls(shell), 0.0)
+    return replace(best, walls=_with_cavities(best.shell, best.walls)) if cavities else best
 
 
 def _share(shell: Shell) -> float:

@@ -18,6 +18,10 @@ ASKED = 10_000
 """Points whose neighbors are sought to find the sampling distance of all."""
 
 
+FLAT = 1e-6
+"""Thickness of points, over a length that is given, under which they count as flat."""
+
+
 def partition(positions: NDArray[np.float64], cell_mm: NDArray[np.float64]) -> CubeGrid:
     """Flag the cubes that hold points, and register the points of each.
 
@@ -31,7 +35,27 @@ def partition(positions: NDArray[np.float64], cell_mm: NDArray[np.float64]) -> C
     Returns
     -------
     CubeGrid
-        The lowest point lies in the middle of its cube.
+
+    Raises
+    ------
+    As `cubes_over`.
+    """
+    origin, keys = cubes_over(positions, cell_mm)
+    order = np.lexsort((*positions.T, keys))
+    present, first = np.unique(keys[order], return_index=True)
+    return CubeGrid(present, origin, cell_mm, order, np.append(first, len(keys)))
+
+
+def cubes_over(
+    positions: NDArray[np.float64], cell_mm: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the lowest corner of cell (0, 0, 0), and the key of the cube that holds each point, (n,).
+
+    Parameters
+    ----------
+    positions : (n, 3) float array
+        The lowest lies in the middle of its cube.
+    cell_mm : (3,) float array
 
     Raises
     ------
@@ -52,10 +76,14 @@ def partition(positions: NDArray[np.float64], cell_mm: NDArray[np.float64]) -> C
             hint="a larger --cell-mm",
         )
     origin = low - 0.5 * cell_mm
-    keys = keys_of(np.floor((positions - origin) / cell_mm).astype(np.int64))
-    order = np.lexsort((*positions.T, keys))
-    present, first = np.unique(keys[order], return_index=True)
-    return CubeGrid(present, origin, cell_mm, order, np.append(first, len(keys)))
+    return origin, keys_of(np.floor((positions - origin) / cell_mm).astype(np.int64))
+
+
+def is_flat(positions: NDArray[np.float64], length: float) -> bool:
+    """Tell whether points lie in a plane, on a line or at one place, up to a millionth of a length."""
+    centered = positions - positions.mean(axis=0)
+    variance = np.linalg.svd(centered.T @ centered / len(positions), compute_uv=False)
+    return bool(variance[-1] <= (FLAT * length) ** 2)
 
 
 def sampling_distance(positions: NDArray[np.float64], *, neighbors: int = 6) -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.samples import fit_planes, local_spacing, settle
+from ..kernels.samples import fit_planes, local_spacing, region_medians, settle
 from ..kernels.threads import in_blocks
 from ..progress import Progress, silent
 from .partition import sampling_distance
@@ -40,10 +40,22 @@ POWER = 0.8
 """Power of the noise with which the width grows: it balances what noise and curvature do to a quadratic."""
 FIRST = 0.8
 """Width of the first planes, sampling distances."""
-ROUGH = 1.4
+WIDER = 1.25
+"""Growth of the width for which planes are fitted anew."""
+SLAB = 1.25
+"""Noise, in sampling distances, over which points fill a slab rather than a surface, and are merged."""
+COARSER = 1.4
+"""Growth of the sampling distance where points are merged."""
+LEAST_POINTS = 16
+"""Points under which there is no telling what surface they describe: they stay where they are."""
+ROUGH = 1.15
 """Noise over the roughness that a plane of few points leaves."""
-LONELY = 3.0
+STEEPEST = 0.95
+"""Roughness, over the width of the weights, that is taken at most."""
+LONELY = 1.7
 """Spacing over that of the region from which a point is a stray."""
+LOOSE = 0.3
+"""Least distance of the neighbors from the quadratic under a point, sampling distances, from which it is a stray."""
 SPARSE = 8.0
 """Spacing over that of the whole cloud from which a point is a stray, whatever its region is like."""
 OFF = 5.0
@@ -91,39 +103,110 @@ def settle_points(positions: Floats, *, threads: int = 0, progress: Progress = s
     Returns
     -------
     Samples
-        In the order of their coordinates.
+        In the order of their cubes.
 
     Notes
     -----
     A quadratic over the local plane, with Gaussian weights whose width follows the noise (Levin 1998; Cheng et
-    al. 2008). Two sheets are kept apart by the planes of their points.
+    al. 2008). Two sheets are kept apart by the planes of their points. Where the noise is so large that the points
+    fill a slab, they are first merged in cubes: a fit to the means, weighted by how many points each stands for,
+    is all but the fit to the points.
     """
     points = distinct(positions)
-    index = Index.of(points, SIGHT * sampling_distance(points))
-    points = points[index.order]
-    cells = (index.keys, index.start, index.frame)
-    run = _Runner(len(points), threads, progress)
-    spacing = np.empty(len(points))
-    run(0, lambda a, b: local_spacing(points, *cells, index.frame[3], spacing, a, b))
-    regions = _Regions.of(points, REGION * float(np.median(spacing)))
-    usual = regions.median(spacing)
-    stray = spacing > np.minimum(LONELY * usual, SPARSE * float(np.median(spacing)))
-    spacing = np.where(stray, usual, np.sqrt(spacing * usual))
-    planes, width = np.zeros((len(points), 5)), FIRST * spacing
-    run(1, lambda a, b: fit_planes(points, *cells, width, planes, a, b))
-    noise = ROUGH * regions.median(planes[:, 4])
-    wide = _width(noise, spacing)
-    again = np.where(0.5 * wide > 1.25 * width, 0.5 * wide, 0.0)
-    run(2, lambda a, b: fit_planes(points, *cells, again, planes, a, b))
+    apart = sampling_distance(points)
+    if len(points) < LEAST_POINTS:
+        level = np.full(len(points), apart)
+        return Samples(points, np.zeros_like(points), level, 0 * level, level, 0)
+    cloud = _Cloud.of(np.column_stack([points, np.ones(len(points))]), apart, threads, progress)
+    spacing, stray = cloud.spacing()
+    planes, noise, width = cloud.planes(spacing)
+    while np.median(noise) > SLAB * np.median(spacing) and len(cloud.points) > LEAST_POINTS:
+        edge = COARSER * float(np.median(spacing))
+        merged = _merged(cloud.points[~stray], edge)
+        cloud = _Cloud.of(merged, edge, threads, progress)
+        spacing, stray = np.full(len(merged), edge), np.zeros(len(merged), bool)
+        planes, noise, width = cloud.planes(spacing)
     off = np.abs(planes[:, 3])
-    stray |= off > np.maximum(OFF * regions.median(off), 0.5 * FIRST * spacing)
-    settled = np.empty((len(points), 7))
-    run(3, lambda a, b: settle(points, planes, *cells, wide, stray, settled, a, b))
-    noise = regions.median(settled[:, 6])
+    stray |= off > np.maximum(OFF * cloud.regions.median(off), 0.5 * FIRST * spacing)
+    settled = cloud.settled(planes, width, stray)
+    noise = cloud.regions.median(settled[:, 6])
+    stray |= settled[:, 6] > np.maximum(OFF * noise, LOOSE * spacing)
     kept = np.flatnonzero(~stray)
-    return Samples(
-        settled[kept, :3], settled[kept, 3:6], spacing[kept], noise[kept], wide[kept], len(points) - len(kept)
-    )
+    strays = int(len(points) - cloud.points[kept, 3].sum())
+    return Samples(settled[kept, :3], settled[kept, 3:6], spacing[kept], noise[kept], width[kept], strays)
+
+
+@dataclass(frozen=True)
+class _Cloud:
+    """Points (p, 4), each with the number of points that it stands for, sorted into cubes."""
+
+    points: Floats
+    index: Index
+    regions: _Regions
+    threads: int
+    progress: Progress
+
+    @classmethod
+    def of(cls, points: Floats, apart: float, threads: int, progress: Progress) -> _Cloud:
+        index = Index.of(points[:, :3], SIGHT * apart)
+        points = np.ascontiguousarray(points[index.order])
+        return cls(points, index, _Regions.of(points[:, :3], REGION * apart), threads, progress)
+
+    def spacing(self) -> tuple[Floats, NDArray[np.bool_]]:
+        """Return how far apart the points lie around each, and which are too far from all others."""
+        spacing = np.empty(len(self.points))
+        radius = float(self.index.frame[3])
+        self._run(0, lambda a, b: local_spacing(self.points, *self._cells, radius, spacing, a, b))
+        usual = self.regions.median(spacing)
+        stray = spacing > np.minimum(LONELY * usual, SPARSE * float(np.median(spacing)))
+        return np.where(stray, usual, np.sqrt(spacing * usual)), stray
+
+    def planes(self, spacing: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the plane at each point, the noise about it, and the width of the quadratic that this asks for."""
+        planes, width = np.zeros((len(self.points), 5)), FIRST * spacing
+        used = width
+        for stage in (1, 2):
+            self._run(stage, lambda a, b, w=width: fit_planes(self.points, *self._cells, w, planes, a, b))  # type: ignore[misc]
+            used = np.where(width > 0, width, used)
+            noise = self.regions.median(_noise(planes[:, 4], used))
+            wide = _width(noise, spacing)
+            width = np.where(0.5 * wide > WIDER * used, 0.5 * wide, 0.0)
+            if not width.any():
+                break
+        return planes, noise, wide
+
+    def settled(self, planes: Floats, width: Floats, stray: NDArray[np.bool_]) -> Floats:
+        """Return position, normal and residual of each point on the surface that its neighbors describe, (p, 7)."""
+        settled = np.empty((len(self.points), 7))
+        self._run(3, lambda a, b: settle(self.points, planes, *self._cells, width, stray, settled, a, b))
+        return settled
+
+    @property
+    def _cells(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Floats]:
+        return self.index.cells
+
+    def _run(self, stage: int, work: Callable[[int, int], None]) -> None:
+        count = len(self.points)
+        done = stage * count
+        in_blocks(
+            work, count, block=BLOCK, threads=self.threads,
+            done=lambda n: self.progress("samples", done + n, 4 * count),
+        )  # fmt: skip
+
+
+def _noise(rough: Floats, width: Floats) -> Floats:
+    """Return the noise behind the roughness of planes: Gaussian weights of a width see s w / sqrt(s^2 + w^2) of s."""
+    seen = np.minimum(rough, STEEPEST * width)
+    return np.asarray(ROUGH * seen / np.sqrt(1 - (seen / width) ** 2))
+
+
+def _merged(points: Floats, edge: float) -> Floats:
+    """Replace the points (p, 4) in each cube by their mean."""
+    index = Index.of(points[:, :3], edge)
+    ordered = points[index.order]
+    mass = np.add.reduceat(ordered[:, 3], index.groups[:-1])
+    means = np.add.reduceat(ordered[:, :3] * ordered[:, 3:], index.groups[:-1], axis=0) / mass[:, None]
+    return np.column_stack([means, mass])
 
 
 def distinct(positions: Floats) -> Floats:
@@ -138,39 +221,17 @@ def _width(noise: Floats, spacing: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class _Runner:
-    """Run kernels over all points, and tell how far they are."""
-
-    count: int
-    threads: int
-    progress: Progress
-
-    def __call__(self, stage: int, work: Callable[[int, int], None]) -> None:
-        done = stage * self.count
-        in_blocks(
-            work, self.count, block=BLOCK, threads=self.threads,
-            done=lambda count: self.progress("samples", done + count, 4 * self.count),
-        )  # fmt: skip
-
-
-@dataclass(frozen=True)
 class _Regions:
     """Cubes over which something is taken as even: large, so that edges and thin spots of a surface do not count."""
 
-    labels: NDArray[np.int64]
-    count: int
+    index: Index
 
     @classmethod
     def of(cls, points: Floats, edge: float) -> _Regions:
-        index = Index.of(points, edge)
-        labels = np.empty(len(points), np.int64)
-        labels[index.order] = np.repeat(np.arange(len(index.keys)), np.diff(index.start))
-        return cls(labels, len(index.keys))
+        return cls(Index.of(points, edge))
 
     def median(self, values: Floats) -> Floats:
         """Return the median of the region of each point, (p,); that of all points where a region has few."""
-        order = np.lexsort((values, self.labels))
-        size = np.bincount(self.labels, minlength=self.count)
-        middle = np.cumsum(size) - size + size // 2
-        medians = np.where(size < FEW, np.median(values), values[order][middle])
-        return np.asarray(medians[self.labels])
+        medians, values = np.empty(len(values)), np.ascontiguousarray(values)
+        region_medians(values, self.index.order, self.index.groups, FEW, float(np.median(values)), medians)
+        return medians

@@ -7,39 +7,71 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model.cubes import keys_of
+from ..errors import ResourceError
+from ..kernels.samples import BITS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+EDGE = 8
+"""Cubes along a block."""
+
 
 @dataclass(frozen=True)
 class Index:
-    """Points in the order of their cubes.
+    """Points in the order of their cubes, block by block (see `tomomesh.kernels.samples`).
 
     Attributes
     ----------
     order : (p,) int64 array
         Numbers of the points, cube by cube; within a cube as they came.
-    keys : (c,) int64 array
-        Occupied cubes, rising.
-    start : (c + 1,) int64 array
-        The points of cube q are ``order[start[q]:start[q + 1]]``.
+    groups : (c + 1,) int64 array
+        The points of the q-th occupied cube are ``order[groups[q]:groups[q + 1]]``.
+    blocks : (b,) int64 array
+        Occupied blocks of 8 x 8 x 8 cubes, rising.
+    start : (512 b + 1,) int32 array
+        The points of cube c of block b are ``order[start[512 b + c]:start[512 b + c + 1]]``.
     frame : (4,) float array
         Lowest corner of cell (0, 0, 0), and the edge of the cubes.
     """
 
     order: NDArray[np.int64]
-    keys: NDArray[np.int64]
-    start: NDArray[np.int64]
+    groups: NDArray[np.int64]
+    blocks: NDArray[np.int64]
+    start: NDArray[np.int32]
     frame: NDArray[np.float64]
 
     @classmethod
     def of(cls, positions: NDArray[np.float64], edge: float) -> Index:
-        """Sort points (p, 3) into cubes of an edge."""
-        origin = positions.min(axis=0)
-        keys = keys_of(((positions - origin) / edge).astype(np.int64))
+        """Sort points (p, 3) into cubes of an edge.
+
+        Raises
+        ------
+        ResourceError
+            Where the points reach farther than cubes can be numbered.
+        """
+        origin, widest = positions.min(axis=0), float(np.ptp(positions, axis=0).max())
+        most = EDGE << BITS
+        if widest / edge >= most:
+            raise ResourceError(
+                "the points lie too far apart for their spacing",
+                found=f"extent = {widest:g}",
+                expected=f"at most {most * edge:g}",
+                hint="leaving far points out",
+            )
+        x, y, z = ((positions - origin) / edge).astype(np.int64).T
+        local = ((z % EDGE) * EDGE + y % EDGE) * EDGE + x % EDGE
+        keys = ((((z // EDGE << BITS) | y // EDGE) << BITS) | x // EDGE) * EDGE**3 + local
         order = np.argsort(keys, kind="stable")
         keys = keys[order]
-        first = np.flatnonzero(np.append(True, keys[1:] != keys[:-1]))
-        return cls(order, keys[first], np.append(first, len(keys)), np.append(origin, edge))
+        groups = np.append(np.flatnonzero(np.append(True, keys[1:] != keys[:-1])), len(keys))
+        cubes = keys[groups[:-1]]
+        blocks, block = np.unique(cubes // EDGE**3, return_inverse=True)
+        count = np.zeros(len(blocks) * EDGE**3 + 1, np.int32)
+        count[block * EDGE**3 + cubes % EDGE**3 + 1] = np.diff(groups)
+        return cls(order, groups, blocks, np.cumsum(count, dtype=np.int32), np.append(origin, edge))
+
+    @property
+    def cells(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
+        """What kernels take: blocks, start and frame."""
+        return self.blocks, self.start, self.frame

@@ -9,11 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..kernels.boards import compose, flood
+from ..kernels.cells import label_components
+from ..model.cubes import keys_of
 from .blocks import Blocks
+from .neighbors import FACE_COLUMNS, neighbor_table
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from .blocks import Board
@@ -21,6 +25,8 @@ if TYPE_CHECKING:
 NEAR = 2
 """Steps, beyond twice the dilation, from enclosed space within which an occupied cube counts as near it: noise may
 make a shell two cubes thick, and a dilation leaves little of what is enclosed."""
+ROOM = 0.005
+"""Cubes of a piece of enclosed space, over the occupied ones, under which it is a pocket."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +42,7 @@ class Shell:
         The objects, filled: all that the outside does not reach.
     witnesses : board
         Occupied cubes that tell of an inside: near space that the dilation left empty and the outside does not
-        reach, or surrounded by other occupied cubes.
+        reach.
     within : (c, 3) int64 array
         Occupied cubes inside the objects, that belong to nothing that the outside reaches: objects in cavities.
     closing : int
@@ -87,9 +93,25 @@ def close_shell(cells: NDArray[np.int64], closing: int, *, threads: int = 0) -> 
     reached = blocks.grown(outside) & dilated
     flood(dilated, blocks.table, reached)
     within = blocks.cells(occupied & ~reached)
-    near = blocks.spread(enclosed, solid, 2 * closing + NEAR)
-    deep = ~blocks.grown(~occupied)
-    return Shell(blocks, occupied, solid, occupied & (near | deep), within, closing, added)
+    near = blocks.spread(_roomy(blocks, enclosed, ROOM * len(cells)), solid, 2 * closing + NEAR)
+    return Shell(blocks, occupied, solid, occupied & near, within, closing, added)
+
+
+def _roomy(blocks: Blocks, enclosed: Board, least: float) -> Board:
+    """Leave out the small pieces of enclosed space: pockets in a thick wall tell of no inside."""
+    large = blocks.empty()
+    large[len(blocks) :] = enclosed[len(blocks) :]
+    flood(enclosed, blocks.table, large)
+    cells = blocks.cells(enclosed & ~large)
+    if len(cells) == 0:
+        return large
+    keys = keys_of(cells)
+    order = np.argsort(keys)
+    labels = np.full(len(keys), -1, np.int32)
+    table = np.ascontiguousarray(neighbor_table(keys[order])[:, FACE_COLUMNS])
+    label_components(table, np.ones(len(keys), np.bool_), labels)
+    kept = (np.bincount(labels) >= least)[labels]
+    return large | blocks.board_of(cells[order][kept])
 
 
 def _well_composed(blocks: Blocks, solid: Board) -> tuple[Board, int]:
@@ -99,8 +121,8 @@ def _well_composed(blocks: Blocks, solid: Board) -> tuple[Board, int]:
     """
     total = 0
     while True:
-        filled = solid.copy()
-        added = compose(solid, blocks.table, filled, 0, len(blocks))
+        filled, near = solid.copy(), blocks.grown(solid) & ~solid
+        added = compose(solid, blocks.table, near, filled, 0, len(blocks))
         if not added:
             return solid, total
         outside = blocks.beyond()

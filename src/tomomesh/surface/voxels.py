@@ -15,7 +15,8 @@ from ..model.points import PointSet
 from ..progress import Progress, silent
 from .contacts import without_contacts
 from .crossings import Crossings, Levels, crossings
-from .nets import Net, Rest, net_around, placed, right_handed, settle, triangulated
+from .diagonals import placed, right_handed, triangulated
+from .nets import Net, Rest, net_around, settle
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

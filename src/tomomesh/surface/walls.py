@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.boards import label_quads, list_faces, mark_surface
-from ..model.cubes import cells_of
+from ..model.cubes import cells_of, keys_of
+from ..model.mesh import QuadMesh
 from .blocks import EDGE, before
-from .neighbors import DIRECTIONS
+from .neighbors import DIRECTIONS, once_each
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..model.cubes import CubeGrid
     from .shell import Shell
 
 
@@ -33,12 +35,12 @@ def _squares() -> NDArray[np.int64]:
 SQUARES = _squares()
 
 
-HEARD = 0.01
-"""Share of the occupied faces under which a surface has no say in whether the shell holds."""
-HELD = 0.5
-"""Share of a surface's occupied cubes that must tell of an inside for the surface to hold."""
-CRUMB = 0.01
-"""Share of all faces under which a surface without an inside is debris, and left out."""
+HELD = 0.45
+"""Share of a surface's occupied cubes that must tell of an inside for the surface to hold: in thin parts a dilation
+leaves no inside."""
+CRUMB = 0.05
+"""Share of all faces under which a surface without an inside is debris: left out, and without a say in whether the
+shell holds."""
 
 
 @dataclass(frozen=True)
@@ -95,11 +97,6 @@ class Walls:
         occupied = np.bincount(self.face_labels, self.occupied, self.count)
         return np.asarray(np.bincount(self.face_labels, self.witness, self.count) / np.maximum(occupied, 1))
 
-    @cached_property
-    def held(self) -> NDArray[np.bool_]:
-        """Which surfaces keep the outside out, (count,)."""
-        return self.two_sided >= HELD
-
     @property
     def debris(self) -> NDArray[np.bool_]:
         """Which surfaces are crumbs: small, and around nothing, (count,)."""
@@ -107,11 +104,13 @@ class Walls:
         return crumbs if not crumbs.all() else np.zeros(self.count, bool)
 
     @property
-    def holds(self) -> bool:
-        """Whether every surface that has a say keeps the outside out."""
-        occupied = np.bincount(self.face_labels, self.occupied, self.count)
-        heard = occupied >= HEARD * occupied.sum()
-        return bool(self.held[heard].all())
+    def least_two_sided(self) -> float:
+        """The least share of occupied cubes that tell of an inside, over the surfaces that are no debris."""
+        return float(self.two_sided[~self.debris].min())
+
+    def worth_keeping(self, *, largest: bool = False) -> NDArray[np.bool_]:
+        """Tell which surfaces to keep: all but debris, or the largest alone, (count,)."""
+        return np.arange(self.count) == np.abs(self.volumes).argmax() if largest else ~self.debris
 
     def only(self, taken: NDArray[np.bool_]) -> Walls:
         """Keep some of the surfaces, (count,)."""
@@ -122,6 +121,13 @@ class Walls:
             self.witness[faces], (np.cumsum(taken, dtype=np.int32) - np.int32(1))[self.labels[vertices]],
             int(taken.sum()), self.inward[taken],
         )  # fmt: skip
+
+    def over(self, grid: CubeGrid) -> tuple[CubeGrid, QuadMesh]:
+        """Return the partition with the cubes behind the faces, and the faces in its place and size."""
+        behind = keys_of(self.cells)
+        cubes = grid.with_cubes(once_each(np.concatenate([grid.keys, behind])))
+        vertices = grid.origin + self.corners * grid.cell_mm
+        return cubes, QuadMesh(vertices, self.quads.astype(np.int64), np.searchsorted(cubes.keys, behind))
 
     def turned(self) -> Walls:
         """Turn every surface inside out."""

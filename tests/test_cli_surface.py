@@ -1,0 +1,365 @@
+"""The door for clouds: what is written beside the mesh, and bad input and faults."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import trimesh
+
+from conftest import sphere, torus
+from test_cli import ERROR
+from tomomesh.cli import main
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from _pytest.capture import CaptureFixture
+    from numpy.typing import NDArray
+
+STEP = 2.0**-17
+"""Detail that clouds near 2^30 keep in 64 bits."""
+FAR = 2.0**30
+PLY = "ply\nformat ascii 1.0\nelement vertex {0}\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+LATTICE = np.indices((8, 8)).reshape(2, -1).T.astype(float)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
+    """An empty folder for outputs, in which nothing unfinished may be left."""
+    made = tmp_path / "out"
+    made.mkdir()
+    yield made
+    assert not [path.name for path in made.iterdir() if path.name.startswith(".")]
+
+
+def saved(points: NDArray[np.float64], folder: Path) -> str:
+    path = folder / "cloud.npy"
+    np.save(path, points)
+    return str(path)
+
+
+def refused(cloud: str, folder: Path, code: int, capsys: CaptureFixture[str], *options: str) -> str:
+    """Run ``surface``, which must fail with one clean line and leave nothing, and return the line."""
+    before = Path(cloud).read_bytes() if Path(cloud).is_file() else b""
+    assert main(["surface", cloud, "-o", str(folder / "m.ply"), "--quiet", *options]) == code
+    heard = capsys.readouterr()
+    assert heard.out == ""
+    (said,) = heard.err.splitlines()
+    assert ERROR.match(said), said
+    assert list(folder.iterdir()) == []
+    assert before == (Path(cloud).read_bytes() if before else b"")
+    return said
+
+
+def surfaced(cloud: str, folder: Path, *options: str, suffix: str = ".ply") -> tuple[trimesh.Trimesh, dict]:
+    """Run ``surface``, which must give a closed mesh, and return it with its report."""
+    mesh, report = folder / f"m{suffix}", folder / "r.json"
+    assert main(["surface", cloud, "-o", str(mesh), "--report", str(report), "--quiet", *options]) == 0
+    found = trimesh.load(mesh, process=False)
+    assert trimesh.load(mesh).is_watertight
+    assert trimesh.load(mesh).is_winding_consistent
+    assert found.volume > 0
+    return found, json.loads(report.read_text())
+
+
+class TestBesideTheMesh:
+    @pytest.fixture
+    def cloud(self, tmp_path: Path) -> str:
+        points = sphere(600)
+        rows = [f"{x!r} {y!r} {z!r} 9 {128 if x > 0 else 64} 7 {2 * z!r}" for x, y, z in points.tolist()]
+        path = tmp_path / "cloud.xyz"
+        path.write_text("\n".join(["x y z red green blue heat", *rows]))
+        return str(path)
+
+    def test_ply_holds_what_is_known_of_the_points_and_the_filled_faces(self, cloud: str, folder: Path) -> None:
+        mesh, _ = surfaced(cloud, folder)
+        held = mesh.metadata["_ply_raw"]
+        at_vertices, on_faces = held["vertex"]["data"], held["face"]["data"]
+        assert (at_vertices["red"] == 9).all()
+        aside = np.abs(mesh.vertices[:, 0]) > 1.5
+        np.testing.assert_array_equal(at_vertices["green"][aside], np.where(mesh.vertices[aside, 0] > 0, 128, 64))
+        np.testing.assert_allclose(at_vertices["heat"], 2 * mesh.vertices[:, 2], atol=1)
+        assert not on_faces["filled"].any()
+
+    def test_a_hole_is_marked_as_filled(self, folder: Path, tmp_path: Path) -> None:
+        points = sphere(3000)
+        mesh, report = surfaced(saved(points[points[:, 2] < 9.6], tmp_path), folder)
+        filled = mesh.metadata["_ply_raw"]["face"]["data"]["filled"].astype(bool).ravel()
+        assert filled.sum() == report["fit"]["filled_faces"] > 0
+        centers = mesh.triangles_center
+        assert (centers[filled, 2] > 9).all()
+        assert filled[np.hypot(centers[:, 0], centers[:, 1]) < 1].any()
+
+    def test_obj_holds_the_colors_and_stl_nothing(self, cloud: str, folder: Path) -> None:
+        surfaced(cloud, folder, suffix=".obj")
+        assert len((folder / "m.obj").read_text().splitlines()[1].split()) == 7
+        surfaced(cloud, folder, suffix=".stl")
+
+    def test_a_study_marks_its_caps(self, folder: Path, tmp_path: Path) -> None:
+        from studies import write_nifti
+        from test_end_to_end import ball
+
+        write_nifti(tmp_path / "ball.nii", ball(), np.eye(4))
+        assert main(["reconstruct", str(tmp_path / "ball.nii"), "-o", str(folder / "m.ply"), "--quiet"]) == 0
+        mesh = trimesh.load(folder / "m.ply", process=False)
+        filled = mesh.metadata["_ply_raw"]["face"]["data"]["filled"].astype(bool).ravel()
+        height = mesh.triangles_center[:, 2]
+        assert 0 < filled.sum() < 0.5 * len(filled)
+        assert filled[np.argmax(height)]
+        assert filled[np.argmin(height)]
+
+    def test_cell_is_another_name(self, folder: Path, tmp_path: Path) -> None:
+        cloud = saved(sphere(600), tmp_path)
+        _, one = surfaced(cloud, folder, "--cell", "1.5")
+        first = (folder / "m.ply").read_bytes()
+        _, other = surfaced(cloud, folder, "--cell-mm", "1.5")
+        assert one["cubes"] == other["cubes"]
+        assert first == (folder / "m.ply").read_bytes()
+
+    def test_three_cells_may_stand_before_the_cloud(self, folder: Path, tmp_path: Path) -> None:
+        cloud = saved(sphere(600), tmp_path)
+        line = ["surface", "--cell", "1.2", "1.4", "1.6", cloud, "-o", str(folder / "m.stl"), "--quiet"]
+        assert main([*line, "--report", str(folder / "r.json")]) == 0
+        assert json.loads((folder / "r.json").read_text())["cubes"]["cell_mm"] == [1.2, 1.4, 1.6]
+
+
+class TestFarFromZero:
+    """FAULTS row 31."""
+
+    @pytest.fixture
+    def near(self) -> NDArray[np.float64]:
+        return np.round(torus(2000, 0.02, 0.008) / STEP) * STEP
+
+    def test_a_local_origin_gives_the_bytes_of_the_near_mesh(
+        self, near: NDArray[np.float64], folder: Path, tmp_path: Path
+    ) -> None:
+        for suffix in (".ply", ".stl"):
+            bodies = []
+            for points in (near, near + FAR):
+                _, report = surfaced(saved(points, tmp_path), folder, "--local-origin", suffix=suffix)
+                assert report["points"]["origin"] == points.min(axis=0).tolist()
+                assert report["quality"]["sound_after_welding"]
+                bodies.append((folder / f"m{suffix}").read_bytes())
+            corner = ",".join(repr(c).removesuffix(".0") for c in points.min(axis=0).tolist())
+            assert f"frame=local:{corner}".encode() in bodies[1]
+            cut = [body.partition(b"end_header\n")[2] if suffix == ".ply" else body[80:] for body in bodies]
+            assert cut[0] == cut[1]
+
+    def test_without_it_the_mesh_is_the_shifted_one(
+        self, near: NDArray[np.float64], folder: Path, tmp_path: Path
+    ) -> None:
+        one, report = surfaced(saved(near, tmp_path), folder)
+        assert report["points"]["origin"] == near.min(axis=0).tolist()
+        other, _ = surfaced(saved(near + FAR, tmp_path), folder)
+        np.testing.assert_array_equal(one.faces, other.faces)
+        np.testing.assert_allclose(other.vertices - FAR, one.vertices, rtol=0, atol=4e-7)
+
+    def test_stl_names_the_way_out(
+        self, near: NDArray[np.float64], folder: Path, tmp_path: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        cloud = saved(near + FAR, tmp_path)
+        assert main(["surface", cloud, "-o", str(folder / "m.stl"), "--quiet"]) == 8
+        assert re.search(r"\.ply.*--local-origin", capsys.readouterr().err)
+        assert list(folder.iterdir()) == []
+
+    @pytest.mark.parametrize("apart", [1e2, 1e6, 1e12])
+    def test_two_far_spheres_are_two_spheres_or_too_far(
+        self, apart: float, folder: Path, tmp_path: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        cloud = saved(np.concatenate([sphere(1000), sphere(1000) + [apart, 0, 0]]), tmp_path)
+        code = main(["surface", cloud, "-o", str(folder / "m.ply"), "--report", str(folder / "r.json"), "--quiet"])
+        if code:
+            assert code == 7
+            assert "Traceback" not in capsys.readouterr().err
+            return
+        report = json.loads((folder / "r.json").read_text())
+        assert report["quality"]["components"] == 2
+        assert report["quality"]["volume_mm3"] == pytest.approx(2 * 4 / 3 * np.pi * 1000, rel=0.02)
+
+
+class TestDegenerate:
+    """FAULTS row 29."""
+
+    def test_no_points(self, folder: Path, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
+        refused(saved(np.zeros((0, 3)), tmp_path), folder, 6, capsys)
+        for name, text in (("c.xyz", "x y z\n"), ("c.ply", PLY.format(0))):
+            (tmp_path / name).write_text(text)
+            refused(str(tmp_path / name), folder, 6, capsys)
+
+    @pytest.mark.parametrize(
+        "points",
+        [
+            np.array([[1.0, 2, 3]]),
+            np.array([[1.0, 2, 3], [1, 2, 4]]),
+            np.array([[1.0, 2, 3], [1, 2, 4], [1, 3, 3]]),
+            np.full((500, 3), 5.0),
+            np.outer(np.arange(5.0), [1, 2, 3]),
+            np.outer(np.arange(200.0), [1, 2, 3]),
+            np.outer(np.random.default_rng(0).random(300), [1, 0, 0]),
+            np.column_stack([LATTICE, np.zeros(64)]),
+            np.column_stack([LATTICE @ [[0.8, 0.6], [-0.6, 0.8]], LATTICE @ [0.3, 0.4]]),
+            np.column_stack([np.random.default_rng(0).random((2000, 2)), np.full(2000, 0.1)]),
+        ],
+        ids=["one", "two", "three", "identical", "five in line", "line", "random line", "lattice", "tilted", "plane"],
+    )
+    def test_too_flat_for_a_fit_gives_the_shell_and_a_warning(
+        self, points: NDArray[np.float64], folder: Path, tmp_path: Path
+    ) -> None:
+        _, report = surfaced(saved(points, tmp_path), folder)
+        assert "plane" in " ".join(report["warnings"])
+        assert report["fit"]["iterations"] == 0
+        assert report["quality"]["sound"]
+        assert report["quality"]["components"] == 1
+        assert report["quality"]["points_to_surface_max_mm"] <= 2 * report["cubes"]["cell_mm"][0]
+
+    def test_repeats_change_nothing(self, folder: Path, tmp_path: Path) -> None:
+        points = torus(1500)
+        surfaced(saved(points, tmp_path), folder)
+        once = (folder / "m.ply").read_bytes()
+        surfaced(saved(np.concatenate([np.repeat(points[:1], 100_000, axis=0), points[::-1]]), tmp_path), folder)
+        assert once == (folder / "m.ply").read_bytes()
+
+
+class TestBadFiles:
+    """FAULTS row 30."""
+
+    @pytest.mark.parametrize(
+        ("name", "text", "word"),
+        [
+            ("nan.xyz", "0 0 0\n1 nan 1\n", "row 2"),
+            ("inf.csv", "x,y,z\n0,0,0\n0,0,0\n-inf,1,1\n", "row 4"),
+            ("text.xyz", "0 0 0\n1 one 1\n", "row 2"),
+            ("ragged.xyz", "0 0 0\n1 1 1\n1 1\n", "row 3"),
+            ("lying.ply", PLY.format(1000) + "0 0 0\n", "cut off"),
+            ("much.ply", PLY.replace("ascii", "binary_little_endian").format(10**12) + "0 0 0\n", "12000000000000"),
+        ],
+    )
+    def test_the_row_is_named(
+        self, name: str, text: str, word: str, folder: Path, tmp_path: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        (tmp_path / name).write_text(text)
+        assert word in refused(str(tmp_path / name), folder, 4, capsys)
+
+    def test_not_finite_in_an_array(self, folder: Path, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
+        points = sphere(100)
+        points[41, 1] = np.nan
+        assert re.search(r"row.* 4[12]\b", refused(saved(points, tmp_path), folder, 4, capsys))
+
+    def test_a_missing_file(self, folder: Path, capsys: CaptureFixture[str]) -> None:
+        assert "nowhere.ply" in refused("nowhere.ply", folder, 3, capsys)
+
+
+class TestLimits:
+    """FAULTS rows 32 and 33."""
+
+    @pytest.mark.parametrize("option", ["--cell", "--cell-mm"])
+    @pytest.mark.parametrize("edge", ["0", "-1", "nan", "inf"])
+    def test_impossible_cells(
+        self, option: str, edge: str, folder: Path, tmp_path: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        said = refused(saved(sphere(100), tmp_path), folder, 2, capsys, f"{option}={edge}")
+        assert "over 0" in said
+
+    @pytest.mark.parametrize("options", [("--step", "2"), ("--closing", "-1"), ("--target-faces", "3")])
+    def test_impossible_numbers_name_their_limit(
+        self, options: tuple[str, str], folder: Path, tmp_path: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        said = refused(saved(sphere(100), tmp_path), folder, 2, capsys, *options)
+        assert options[0] in said
+        assert "at " in said
+
+    @pytest.mark.parametrize("edge", [1e-5, 1e-9, 1e-300])
+    def test_cells_too_small_name_the_smallest(
+        self, edge: float, folder: Path, tmp_path: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        said = refused(saved(sphere(2000), tmp_path), folder, 7, capsys, "--cell", str(edge))
+        least = re.search(r"at least ([-+.e\d]+)\.", said)
+        assert least is not None, said
+        assert float(least[1]) > edge
+
+
+class TestOutputs:
+    """FAULTS rows 35 to 37."""
+
+    @pytest.fixture
+    def cloud(self, tmp_path: Path) -> str:
+        return saved(sphere(600), tmp_path)
+
+    def test_what_cannot_be_written_is_refused_before_any_work(
+        self, cloud: str, folder: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        for output, code in (("no/m.ply", 8), ("m.vtk", 2), ("m", 2), ("m.ply.gz", 2)):
+            assert main(["surface", "nowhere.npy", "-o", str(folder / output)]) == code
+            assert len(capsys.readouterr().err.splitlines()) == 1
+        assert main(["surface", cloud, "-o", cloud]) == 2
+        assert main(["surface", "nowhere.npy", "-o", str(folder / "m.ply"), "--report", "no/r.json"]) == 8
+        assert list(folder.iterdir()) == []
+
+    def test_the_output_may_not_be_the_input(
+        self, folder: Path, tmp_path: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        (tmp_path / "cloud.ply").write_text(PLY.format(1) + "0 0 0\n")
+        before = (tmp_path / "cloud.ply").read_bytes()
+        (folder / "link.ply").symlink_to(tmp_path / "cloud.ply")
+        assert main(["surface", str(tmp_path / "cloud.ply"), "-o", str(folder / "link.ply")]) == 2
+        assert "input" in capsys.readouterr().err
+        assert (tmp_path / "cloud.ply").read_bytes() == before
+
+    @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+    def test_a_folder_that_may_not_be_written_to(
+        self, cloud: str, folder: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        folder.chmod(0o500)
+        refused(cloud, folder, 8, capsys)
+
+    def test_a_full_disk_leaves_the_old_output(self, cloud: str, folder: Path) -> None:
+        (folder / "m.ply").write_text("old")
+        line = ["surface", cloud, "-o", str(folder / "m.ply"), "--quiet"]
+        done = subprocess.run(
+            [sys.executable, "-c", f"import sys, tomomesh.cli as c; sys.exit(c.main({line!r}))"],
+            capture_output=True, text=True, preexec_fn=_small_files, check=False,
+        )  # fmt: skip
+        assert done.returncode == 8, done.stderr
+        assert ERROR.match(done.stderr.strip())
+        assert [path.name for path in folder.iterdir()] == ["m.ply"]
+        assert (folder / "m.ply").read_text() == "old"
+
+    @pytest.mark.parametrize(
+        ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGKILL, -signal.SIGKILL)]
+    )
+    def test_signals_leave_the_old_output(self, number: int, code: int, cloud: str, folder: Path) -> None:
+        (folder / "m.ply").write_text("old")
+        ready = folder.parent / "ready"
+        program = (
+            "import sys, pathlib, signal, time, tomomesh.pipeline as p, tomomesh.cli as c\n"
+            "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background jobs ignore it
+            f"def wait(*a, **k):\n    pathlib.Path({str(ready)!r}).touch()\n    while True: time.sleep(0.01)\n"
+            "p.check_promise = wait\n"
+            f"sys.exit(c.main({['surface', cloud, '-o', str(folder / 'm.ply')]!r}))"
+        )
+        running = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.PIPE)
+        while not ready.exists():
+            assert running.poll() is None, running.communicate()
+            time.sleep(0.01)
+        running.send_signal(number)
+        _, said = running.communicate(timeout=60)
+        assert running.returncode == code
+        assert b"Traceback" not in said
+        assert [path.name for path in folder.iterdir()] == ["m.ply"]
+        assert (folder / "m.ply").read_text() == "old"
+
+
+def _small_files() -> None:
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
