@@ -32,13 +32,14 @@ def row(entry: Field[Any]) -> str:
     meta = entry.metadata
     switch = meta["kind"] is bool
     negated = switch and entry.default
-    options = [option_of(f"no_{entry.name}")] if negated else spellings(entry.name)
+    spelled = [option_of(f"no_{entry.name}")] if negated else spellings(entry.name)
     what = f"do not {meta['help']}" if negated else meta["help"]
     allowed = ", ".join(meta["choices"]) or f"{COUNTS[meta['length']]}{limits_of(entry)}"
     default, paper = _value(entry.default), _value(meta["paper"])
     if switch:
         allowed, default, paper = "switch", "off", "" if meta["paper"] is UNSET else "given"
-    return f"| {', '.join(f'`{option}`' for option in options)} | {what} | {meta['unit']} | {allowed} | {default} | {paper} |"
+    options = ", ".join(f"`{option}`" for option in spelled)
+    return f"| {options} | {what} | {meta['unit']} | {allowed} | {default} | {paper} |"
 
 
 def _value(value: Any) -> str:

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def refused(cloud: str, folder: Path, code: int, capsys: CaptureFixture[str], *o
     return said
 
 
-def surfaced(cloud: str, folder: Path, *options: str, suffix: str = ".ply") -> tuple[trimesh.Trimesh, dict]:
+def surfaced(cloud: str, folder: Path, *options: str, suffix: str = ".ply") -> tuple[trimesh.Trimesh, dict[str, Any]]:
     """Run ``surface``, which must give a closed mesh, and return it with its report."""
     mesh, report = folder / f"m{suffix}", folder / "r.json"
     assert main(["surface", cloud, "-o", str(mesh), "--report", str(report), "--quiet", *options]) == 0
@@ -173,11 +173,18 @@ class TestFarFromZero:
         assert re.search(r"\.ply.*--local-origin", capsys.readouterr().err)
         assert list(folder.iterdir()) == []
 
+    def test_a_long_corner_is_whole_in_the_text_of_an_stl(self, folder: Path, tmp_path: Path) -> None:
+        _, report = surfaced(saved(sphere(300) + 1e9 / 3, tmp_path), folder, "--local-origin", suffix=".stl")
+        words = (folder / "m.stl").read_bytes()[:80].decode().split()
+        assert words[0] == "tomomesh"
+        corner = [float(c) for c in words[-1].removeprefix("frame=local:").split(",")]
+        assert corner == report["points"]["origin"]
+
     @pytest.mark.parametrize("apart", [1e2, 1e6, 1e12])
     def test_two_far_spheres_are_two_spheres_or_too_far(
         self, apart: float, folder: Path, tmp_path: Path, capsys: CaptureFixture[str]
     ) -> None:
-        cloud = saved(np.concatenate([sphere(1000), sphere(1000) + [apart, 0, 0]]), tmp_path)
+        cloud = saved(np.concatenate([sphere(1000), sphere(1000) + np.array([apart, 0, 0])]), tmp_path)
         code = main(["surface", cloud, "-o", str(folder / "m.ply"), "--report", str(folder / "r.json"), "--quiet"])
         if code:
             assert code == 7
@@ -306,9 +313,7 @@ class TestOutputs:
         assert main(["surface", "nowhere.npy", "-o", str(folder / "m.ply"), "--report", "no/r.json"]) == 8
         assert list(folder.iterdir()) == []
 
-    def test_the_output_may_not_be_the_input(
-        self, folder: Path, tmp_path: Path, capsys: CaptureFixture[str]
-    ) -> None:
+    def test_the_output_may_not_be_the_input(self, folder: Path, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
         (tmp_path / "cloud.ply").write_text(PLY.format(1) + "0 0 0\n")
         before = (tmp_path / "cloud.ply").read_bytes()
         (folder / "link.ply").symlink_to(tmp_path / "cloud.ply")
@@ -317,9 +322,7 @@ class TestOutputs:
         assert (tmp_path / "cloud.ply").read_bytes() == before
 
     @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
-    def test_a_folder_that_may_not_be_written_to(
-        self, cloud: str, folder: Path, capsys: CaptureFixture[str]
-    ) -> None:
+    def test_a_folder_that_may_not_be_written_to(self, cloud: str, folder: Path, capsys: CaptureFixture[str]) -> None:
         folder.chmod(0o500)
         refused(cloud, folder, 8, capsys)
 

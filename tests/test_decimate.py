@@ -18,12 +18,13 @@ from tomomesh.decimation import decimate, faces_under
 from tomomesh.errors import GeometryError, UsageError
 from tomomesh.measure.report import compare
 from tomomesh.measure.topology import check_promise, topology
-from tomomesh.model.mesh import TriMesh
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+    from tomomesh.model.mesh import TriMesh
 
 pytest.importorskip("fast_simplification", reason="the extra decimate is not installed")
 
@@ -31,7 +32,7 @@ pytest.importorskip("fast_simplification", reason="the extra decimate is not ins
 @pytest.fixture(scope="module")
 def ring() -> TriMesh:
     """A torus of 10 around a tube of 4, with a sphere beside it."""
-    parts = np.concatenate([torus(4000), sphere(1500, 3.0) + [30, 0, 0]])
+    parts = np.concatenate([torus(4000), sphere(1500, 3.0) + np.array([30, 0, 0])])
     return reconstruct_points(parts).mesh
 
 

@@ -264,11 +264,19 @@ class Account:
         if made.edge > made.asked_edge:
             self.warn(f"voxels of {made.asked_edge:.4g} would not fit: they are {made.edge:.4g} wide")
 
-    def quality(self, mesh: TriMesh, points: PointSet, cavities: int, progress: Progress = silent) -> None:
+    def quality(
+        self,
+        mesh: TriMesh,
+        points: PointSet,
+        cavities: int,
+        progress: Progress = silent,
+        crossing: NDArray[np.bool_] | None = None,
+    ) -> None:
         """Measure the mesh, against its points too."""
         self._sections["quality"] = assess(
-            mesh, points=points.positions, cavities=cavities, threads=self._settings.run.threads, progress=progress
-        )
+            mesh, points=points.positions, cavities=cavities, crossing=crossing,
+            threads=self._settings.run.threads, progress=progress,
+        )  # fmt: skip
 
     def decimated(self, filled: NDArray[np.bool_] | None) -> None:
         """Count the filled faces of the coarser mesh."""

@@ -14,6 +14,7 @@ from .model.cubes import cells_of, keys_of
 from .model.mesh import QuadMesh, TriMesh
 from .surface.bridges import bridges
 from .surface.drape import Draped, Ring, drape
+from .surface.forecast import require_room, require_room_for_points
 from .surface.gaps import widest_gap
 from .surface.holding import SURE, hold
 from .surface.partition import cubes_over, is_flat
@@ -57,6 +58,8 @@ class CloudSurface:
         In the cloud's own frame.
     filled : (m,) bool array
         Faces that lie where there are no samples.
+    crossing : (m,) bool array
+        Faces that pass through others.
     draped : Draped or None
         The fit; None where the shell was only smoothed.
     """
@@ -68,6 +71,7 @@ class CloudSurface:
     smoothed: TriMesh
     mesh: TriMesh
     filled: NDArray[np.bool_]
+    crossing: NDArray[np.bool_]
     draped: Draped | None
 
 
@@ -76,11 +80,12 @@ def surface_of_cloud(positions: Floats, settings: Settings, account: Account, pr
     if len(positions) == 0:
         raise EmptyError("there are no points", expected="at least one")
     threads, origin = settings.run.threads, positions.min(axis=0)
+    require_room_for_points(len(positions))
     with account.timed("samples"):
         samples = settle_points(positions - origin, threads=threads, progress=progress)
     account.samples(len(positions), samples)
     with account.timed("cubes"):
-        shell = _hold(samples, settings, progress)
+        shell = _hold(len(positions), samples, settings, progress)
     held, cell = shell.held, shell.cell
     taken = held.walls.worth_keeping(largest=settings.cubes.largest)
     account.held(held, taken, cell, shell.cubes, len(shell.spanned.places))
@@ -92,17 +97,18 @@ def surface_of_cloud(positions: Floats, settings: Settings, account: Account, pr
         vertices = ring.smoothed(lattice, settings.cubes.smoothing)
     with account.timed("fit"):
         smoothed = TriMesh(vertices, _halves(walls.quads))
-        mesh, filled, draped = smoothed, np.zeros(len(smoothed.faces), bool), None
+        mesh, draped = smoothed, None
+        filled: NDArray[np.bool_] = np.zeros(len(smoothed.faces), np.bool_)
         if fitted:
             draped = drape(vertices, ring, samples, float(cell.min()), settings.fit, threads=threads, progress=progress)
             mesh = TriMesh(draped.vertices, draped.faces)
-            filled = draped.filled[draped.faces].any(axis=1)
+            filled = np.asarray(draped.filled[draped.faces].any(axis=1))
     with account.timed("untangle"):
-        mesh, taken_back = untangle(mesh, vertices, ring, lambda one: self_intersections(one, threads=threads))
+        mesh, taken_back, crossing = untangle(mesh, vertices, ring, lambda one: self_intersections(one, threads=threads))
     account.draped(draped, taken_back, filled)
     return CloudSurface(
         samples, held, origin, QuadMesh(lattice + origin, walls.quads.astype(np.int64), keys_of(walls.cells)),
-        smoothed.moved(vertices + origin), mesh.moved(mesh.vertices + origin), filled, draped,
+        smoothed.moved(vertices + origin), mesh.moved(mesh.vertices + origin), filled, crossing, draped,
     )  # fmt: skip
 
 
@@ -117,11 +123,12 @@ class _Shell:
     held: Held
 
 
-def _hold(samples: Samples, settings: Settings, progress: Progress) -> _Shell:
+def _hold(count: int, samples: Samples, settings: Settings, progress: Progress) -> _Shell:
     """Return the shell that holds with the least that is made up: short bridges, narrow closings, large cubes."""
     cubes, best = settings.cubes, None
     closings = TRIED if cubes.closing is None else ((cubes.closing,),)
     for tried, span, cell in product(closings, SPANS, _cell_edges(samples, settings)):
+        require_room(count, samples, cell)
         spanned = bridges(samples, float(cell.min()), span=span, threads=settings.run.threads, progress=progress)
         lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
         cells = cells_of(np.unique(keys))

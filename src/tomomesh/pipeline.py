@@ -225,7 +225,7 @@ def _surface_of_cloud(cloud: PointSet, settings: Settings, account: Account, pro
     found = surface_of_cloud(cloud.positions, settings, account, progress)
     with account.timed("quality"):
         check_promise(found.mesh, cavities=account.cavities)
-        account.quality(found.mesh, cloud, account.cavities, progress)
+        account.quality(found.mesh, cloud, account.cavities, progress, found.crossing)
     trace = NO_TRACE if found.draped is None else found.draped.trace
     return Surface(
         cloud, NO_CUBES, found.cuberille, found.smoothed, found.mesh, np.empty(0, np.int32), trace, {},

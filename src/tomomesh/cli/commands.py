@@ -214,7 +214,8 @@ def _write(chosen: Namespace, surface: Surface, settings: Settings, progress: Ba
     """Write the mesh, and whatever else was asked for."""
     stage_one = surface.segmentation
     frame = _frame(surface.report, settings)
-    io.write_mesh(surface.mesh, chosen.output, **frame, **_fields(surface, chosen.output))
+    at_vertices, on_faces = _fields(surface, chosen.output)
+    io.write_mesh(surface.mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces)
     if getattr(chosen, "points", None):
         io.write_points(surface.points, chosen.points, **frame)
     if stage_one is not None:
@@ -231,18 +232,17 @@ def _frame(report: dict[str, Any], settings: Settings) -> dict[str, str]:
     return {"unit": settings.run.units, "frame": f"local:{corner}" if settings.run.local_origin else "unknown"}
 
 
-def _fields(surface: Surface, output: str | Path) -> dict[str, dict[str, NDArray[Any]]]:
+def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
     """Return what the format keeps beside the mesh: what is known of the points, and which faces were filled."""
     from ..surface.attributes import carry
 
-    points, at_vertices, on_faces = surface.points, {}, {}
+    points = surface.points
     kept = {name: values for name, values in points.attributes.items() if io.keeps(output, name)}
-    if kept:
-        at_vertices = carry(replace(points, attributes=kept), surface.mesh.vertices)
-    if io.keeps(output, "filled", on_faces=True):
-        filled = surface.filled if surface.segmentation is None else surface.cap_faces
-        on_faces = {} if filled is None else {"filled": filled}
-    return {"vertex_fields": at_vertices, "face_fields": on_faces}
+    at_vertices = carry(replace(points, attributes=kept), surface.mesh.vertices)
+    if not io.keeps(output, "filled", on_faces=True):
+        return at_vertices, {}
+    filled = surface.filled if surface.segmentation is None else surface.cap_faces
+    return at_vertices, {} if filled is None else {"filled": filled}
 
 
 def _write_stage_one(chosen: Namespace, found: Segmentation) -> None:

@@ -31,9 +31,10 @@ SEVERAL = tuple(
     option for _, entry in parameters() if entry.metadata["length"] == (1, 3) for option in spellings(entry.name)
 )
 """Options that take one number or three."""
+MESH_ONLY = ("local_origin", "target_faces")
+"""Parameters of the run that matter to meshes alone."""
 SURFACE_ONLY = (
-    "cell_mm", "cell_factor", "closing", "contours", "largest", "allow_leaks", "surface", "smoothing", "local_origin",
-    "target_faces",
+    "cell_mm", "cell_factor", "closing", "contours", "largest", "allow_leaks", "surface", "smoothing", *MESH_ONLY,
 )  # fmt: skip
 """Parameters that do not matter to the points."""
 
@@ -86,7 +87,7 @@ def build_parser() -> argparse.ArgumentParser:
     network.add_argument("region", metavar="REGION", help="square, triangle, cube, or one picture (PNG or TIFF)")
     network.add_argument("-o", "--output", default="tomomesh-network", metavar="FOLDER", help="default: %(default)s")
     _add_outputs(network)
-    _add_settings(network, ("window", "network", "run"), without=("slices", "signal", "units", "local_origin", "target_faces"))
+    _add_settings(network, ("window", "network", "run"), without=("slices", "signal", "units", *MESH_ONLY))
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
     inspect.add_argument("study", metavar="STUDY", help=STUDY)

@@ -161,10 +161,8 @@ def _of_cubes(report: dict[str, Any]) -> str:
 def _of_points(report: dict[str, Any]) -> str:
     points, unit = report["points"], _unit(report)
     if "noise_mm" in points:
-        return (
-            f"{points['count']}, {points['strays'] or 'no'} stray(s) left out, {points['spacing_mm']:.4g} {unit} apart, "
-            f"noise {points['noise_mm']:.2g} {unit}"
-        )
+        apart = f"{points['spacing_mm']:.4g} {unit} apart, noise {points['noise_mm']:.2g} {unit}"
+        return f"{points['count']}, {points['strays'] or 'no'} stray(s) left out, {apart}"
     made = ""
     if points.get("on_bridges") or points.get("on_caps"):
         bridges = "bridged gaps" if "networks" in report else "added voxels"

@@ -40,7 +40,7 @@ def sector(axes: Floats, step: Floats) -> int:
     if v < 0.0:
         quadrant, u, v = quadrant + 3, -v, u
     quarter = np.int64(v > TANGENT * u) if v < u else 2 + np.int64(u < TANGENT * v)
-    return (4 * quadrant + quarter) % SECTORS
+    return int((4 * quadrant + quarter) % SECTORS)
 
 
 @kernel("b1(i8, i8)")

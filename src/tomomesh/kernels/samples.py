@@ -65,7 +65,7 @@ def gather(
     """
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for axis in range(3):
-        low[axis] = max(np.int64(np.floor((place[axis] - radius - frame[axis]) / frame[3])), 0)
+        low[axis] = np.int64(np.floor(max((place[axis] - radius - frame[axis]) / frame[3], 0.0)))
         high[axis] = np.int64(np.floor((place[axis] + radius - frame[axis]) / frame[3]))
     count = 0
     for bz in range(low[2] >> 3, (high[2] >> 3) + 1):

@@ -36,6 +36,7 @@ def assess(
     points: PointSet | Floats | None = None,
     against: TriMesh | None = None,
     cavities: int = 0,
+    crossing: NDArray[np.bool_] | None = None,
     threads: int = 0,
     progress: Progress = silent,
 ) -> dict[str, Any]:
@@ -51,6 +52,8 @@ def assess(
         A surface that it should equal.
     cavities : int
         Components that may face inward.
+    crossing : (m,) bool array, optional
+        The faces that pass through others, where they are known already.
     threads : int
         0 is one a core. The result does not depend on it.
     progress : callable
@@ -63,7 +66,8 @@ def assess(
     """
     found, table = _of_surface(mesh, cavities, threads, progress)
     tree = Tree.of_faces(mesh, threads=threads)
-    crossing = marked_in(tree, threads=threads, progress=_part(progress, 15, 50))
+    if crossing is None:
+        crossing = marked_in(tree, threads=threads, progress=_part(progress, 15, 50))
     found["self_intersections"] = int(crossing.sum())
     table.add_crossing(crossing)
     if points is not None:

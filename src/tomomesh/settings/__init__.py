@@ -155,7 +155,7 @@ class CubeSettings(Group):
     """Space partition, cuberille and low-pass filter (Fig. 8)."""
 
     cell_mm: tuple[float, ...] | None = param(
-        None, "edge of the cubes, one or one an axis (x y z), in a cloud's own unit; by default what the points ask for",
+        None, "edge of the cubes, one or one an axis (x y z), in a cloud's unit; by default what the points ask for",
         unit="mm", above=0, length=(1, 3),
     )  # fmt: skip
     cell_factor: float = param(1.0, "dilation factor on the edge of the cubes, for coarser models", above=0)

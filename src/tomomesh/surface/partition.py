@@ -38,7 +38,8 @@ def partition(positions: NDArray[np.float64], cell_mm: NDArray[np.float64]) -> C
 
     Raises
     ------
-    As `cubes_over`.
+    EmptyError, ResourceError
+        As `cubes_over`.
     """
     origin, keys = cubes_over(positions, cell_mm)
     order = np.lexsort((*positions.T, keys))

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import GeometryError
 from .drape import Ring
+from .search import Index
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,8 +30,12 @@ DENSE = 0.5
 """Distance of the places on the apron, cube edges."""
 CRUMB = 0.01
 """Share of the squares under which a piece of the walls is left out."""
+WIDE = 1.5
+"""Edge of the plots of samples that tell whether two pieces of the walls are sides of the same sheet, cube edges."""
 SAME = 0.5
-"""Share of a piece's samples over which another piece is its other side, or it is both sides itself."""
+"""Share of its plots that a piece has in common with its other side."""
+BOTH = 0.25
+"""Share of the plots that a piece sees from both sides where the sides are not apart."""
 HOLLOW = 0.01
 """Volume under a sheet, over the power 3/2 of its area, from which it has an outside."""
 
@@ -67,6 +72,14 @@ class Side:
     quads: NDArray[np.bool_]
     ring: SheetRing
 
+    @classmethod
+    def of(cls, ring, vertices, quads):
+        quads = quads & vertices[ring.quads].all(axis=1)
+        used = np.zeros(len(vertices), bool)
+        used[ring.quads[quads]] = True
+        number = np.cumsum(used, dtype=np.int32) - np.int32(1)
+        return cls(used, quads, SheetRing(number[ring.quads[quads]], int(used.sum()), ring.threads))
+
 
 def apron(borders: Borders, edge: float) -> tuple[Floats, NDArray[np.bool_]]:
     """Return places (a, 3) that carry a sheet on beyond its borders, and which are at the outer end."""
@@ -74,40 +87,32 @@ def apron(borders: Borders, edge: float) -> tuple[Floats, NDArray[np.bool_]]:
     return places, beyond >= TIP
 
 
-def one_side(vertices: Floats, ring: Ring, samples: Samples, borders: Borders, edge: float) -> Side:
-    """Keep one side of the two-walled shell of each sheet."""
+def one_side(vertices: Floats, ring: Ring, samples: Samples, borders: Borders, edge: float) -> Side | None:
+    """Keep one side of the two-walled shell of each sheet.
+
+    Returns
+    -------
+    Side or None
+        None where both sides of a sheet are one piece.
+    """
     places, tips = apron(borders, edge)
-    ground = np.concatenate([samples.positions, places])
-    facing = np.concatenate([samples.normals, np.repeat(borders.samples[:, 3:6], len(places) // max(len(borders.radii), 1), axis=0)])
-    _, near = cKDTree(ground).query(vertices)
-    tip = np.append(np.zeros(len(samples.positions), bool), tips)[near][ring.quads].any(axis=1)
-    normals = ring.normals(vertices)
-    seen = _Seen(near, (normals * facing[near]).sum(axis=1) > 0)
-    turned = seen.turned(ring.quads, facing[near])
-    close = np.isfinite(borders.depths(vertices, threads=ring.threads))[ring.quads].any(axis=1)
-    for cut in (tip, tip | turned & close, tip | turned):
-        pieces = _pieces(ring.quads[~cut], len(vertices))
-        kept = _kept(vertices, ring.quads[~cut], pieces, seen)
-        if kept is not None:
-            break
-    else:
-        raise GeometryError("both sides of the surface are one, as on a Moebius strip", found="x", expected="an orientable surface", hint="")
-    whole = np.isin(pieces[ring.quads], kept).all(axis=1) & (pieces[ring.quads] == pieces[ring.quads[:, :1]]).all(axis=1)
-    quads = whole & ~tip
-    used = np.zeros(len(vertices), bool)
-    used[ring.quads[quads]] = True
-    number = np.cumsum(used, dtype=np.int32) - np.int32(1)
-    return Side(used, quads, SheetRing(number[ring.quads[quads]], int(used.sum()), ring.threads))
+    _, near = cKDTree(np.concatenate([samples.positions, places])).query(vertices)
+    on_apron = near >= len(samples.positions)
+    cut = np.append(np.zeros(len(samples.positions), bool), tips)[near]
+    quads = ring.quads[~cut[ring.quads].any(axis=1)]
+    pieces = _pieces(quads, len(vertices))
+    own = np.flatnonzero((pieces >= 0) & ~on_apron)
+    facing = (ring.normals(vertices)[own] * samples.normals[near[own]]).sum(axis=1) > 0
+    kept = _kept(pieces[own], _plots(samples, WIDE * edge)[near[own]], facing, _outward(vertices, quads, pieces))
+    return None if kept is None else Side.of(ring, np.isin(pieces, kept) , ~cut[ring.quads].any(axis=1))
 
 
-@dataclass(frozen=True)
-class _Seen:
-    near: NDArray[np.int64]
-    front: NDArray[np.bool_]
-
-    def turned(self, quads, normals):
-        sides = self.front[quads] ^ ((normals[quads] * normals[quads[:, :1]]).sum(axis=2) < 0)
-        return sides.any(axis=1) & ~sides.all(axis=1)
+def _plots(samples: Samples, edge: float) -> NDArray[np.int64]:
+    """Return the number of the cube of an edge that holds each sample, (p,)."""
+    index = Index.of(samples.positions, edge)
+    plots = np.empty(len(index.order), np.int64)
+    plots[index.order] = np.repeat(np.arange(len(index.groups) - 1), np.diff(index.groups))
+    return plots
 
 
 def _pieces(quads: NDArray[np.int32], count: int) -> NDArray[np.int64]:
@@ -122,35 +127,32 @@ def _pieces(quads: NDArray[np.int32], count: int) -> NDArray[np.int64]:
     return np.where(size[label] >= max(CRUMB * len(quads), 1), rank[label], -1)
 
 
-def _kept(vertices: Floats, quads: NDArray[np.int32], pieces, seen):
+def _kept(pieces, plots, facing, outward):
     """Return the pieces that are kept; None where one is both sides of a sheet."""
-    total = int(pieces.max()) + 1
-    own = pieces >= 0
-    shape = (total, int(seen.near.max()) + 1)
-    sees = [sparse.coo_array((np.ones(int(w.sum())), (pieces[w], seen.near[w])), shape=shape).tocsr().astype(bool).astype(np.int64)
-        for w in (own & ~seen.front, own & seen.front)]
-    both = sees[0].multiply(sees[1]).sum(axis=1)
-    either = (sees[0] + sees[1]).astype(bool).astype(np.int64)
-    size = either.sum(axis=1)
-    print("both", both[:4], size[:4])
-    if (both > SAME * size).any():
+    shape = (len(outward), int(plots.max()) + 1)
+    behind, before = (
+        sparse.coo_array((np.ones(int(way.sum()), np.int64), (pieces[way], plots[way])), shape=shape).tocsr().sign()
+        for way in (~facing, facing)
+    )
+    over = (behind + before).sign()
+    size = over.sum(axis=1)
+    print("both",behind.multiply(before).sum(axis=1)[:4],size[:4])
+    if (behind.multiply(before).sum(axis=1) > BOTH * size).any():
         return None
-    shared = (either @ either.T).toarray()
-    outward = _outward(vertices, quads, pieces, total)
-    kept = []
-    for piece in sorted(range(total), key=lambda p: (not outward[p], p)):
+    shared, kept = (over @ over.T).toarray(), []
+    for piece in sorted(range(len(outward)), key=lambda p: (not outward[p], p)):
         if all(shared[piece, other] <= SAME * min(size[piece], size[other]) for other in kept):
             kept.append(piece)
     return kept
 
 
-def _outward(vertices, quads, pieces, total):
+def _outward(vertices, quads, pieces):
     """Tell which pieces face outward: away from what they enclose, or in the direction of the largest axis."""
     a, b, c, d = (vertices[corner] for corner in quads.T)
     areas, middle = 0.5 * np.cross(c - a, d - b), 0.25 * (a + b + c + d)
     piece = pieces[quads[:, 0]]
-    result = np.zeros(total, bool)
-    for n in range(total):
+    result = np.zeros(int(pieces.max()) + 1, bool)
+    for n in range(len(result)):
         area = areas[piece == n]
         size = np.sqrt((area**2).sum(axis=1)).sum()
         where = middle[piece == n]

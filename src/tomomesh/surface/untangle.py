@@ -24,7 +24,7 @@ BACK = 0.25
 
 def untangle(
     mesh: TriMesh, origin: NDArray[np.float64], ring: Ring, tangled: Callable[[TriMesh], NDArray[np.bool_]]
-) -> tuple[TriMesh, int]:
+) -> tuple[TriMesh, int, NDArray[np.bool_]]:
     """Smooth a mesh where it passes through itself, and take it back towards where it came from.
 
     Parameters
@@ -42,10 +42,12 @@ def untangle(
     mesh : TriMesh
     taken_back : int
         Vertices that do not lie where the fit had them.
+    left : (m,) bool array
+        Faces that pass through others all the same.
     """
     moved = np.zeros(len(mesh.vertices), bool)
+    marked = tangled(mesh)
     for count in range(ROUNDS):
-        marked = tangled(mesh)
         if not marked.any():
             break
         region = _around(mesh, marked, 1 + count // GENTLE)
@@ -54,7 +56,8 @@ def untangle(
         if count >= GENTLE:
             vertices += BACK * (origin - vertices)
         mesh = mesh.moved(np.where(region[:, None], vertices, mesh.vertices))
-    return mesh, int(moved.sum())
+        marked = tangled(mesh)
+    return mesh, int(moved.sum()), marked
 
 
 def _around(mesh: TriMesh, marked: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.boards import label_quads, list_faces, mark_surface
+from ..kernels.walls import label_quads, list_faces, mark_surface
 from ..model.cubes import cells_of, keys_of
 from ..model.mesh import QuadMesh
 from .blocks import EDGE, before
