@@ -124,7 +124,7 @@ class TestShell:
         within = np.argwhere(twin.within) - twin.pad
         assert sorted(map(tuple, shell.within.tolist())) == sorted(map(tuple, within.tolist()))
 
-    @pytest.mark.parametrize("missing", [0.0, 0.1, 0.4])
+    @pytest.mark.parametrize("missing", [0.0, 0.4, 0.7])
     def test_of_a_riddled_hollow_ball_in_another_is_that_of_a_whole_grid(self, missing: float) -> None:
         cells = np.concatenate([sphere_with_hole(0), sphere_with_hole(0, RADIUS // 2)])
         cells = cells[np.random.default_rng(1).random(len(cells)) >= missing] + RADIUS + 2

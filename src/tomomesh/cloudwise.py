@@ -15,10 +15,11 @@ from .model.mesh import QuadMesh, TriMesh
 from .surface.bridges import bridges
 from .surface.drape import Draped, Ring, drape
 from .surface.forecast import require_room, require_room_for_points
-from .surface.gaps import widest_gap
+from .surface.gaps import gaps
 from .surface.holding import SURE, hold
 from .surface.partition import cubes_over, is_flat
 from .surface.samples import Samples, settle_points
+from .surface.sheet import open_sheet
 from .surface.untangle import untangle
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ NOISE = (1.8, 1.3, 1.0)
 large ones fill thin parts."""
 SPANS = (5.0, 12.0)
 """Longest bridges that are tried, sampling distances."""
+WIDEST = 8.0
+"""Widest closing that is tried, sampling distances: large cubes are closed by fewer."""
 TRIED = ((0, 1, 2), (3, 4, 5, 6, 7, 8))
 """Closings that are tried before and after longer bridges, cubes."""
 
@@ -76,7 +79,7 @@ class CloudSurface:
 
 
 def surface_of_cloud(positions: Floats, settings: Settings, account: Account, progress: Progress) -> CloudSurface:
-    """Turn positions (n, 3) into a closed surface."""
+    """Turn positions (n, 3) into a closed surface, or into a sheet with borders where that is asked for."""
     if len(positions) == 0:
         raise EmptyError("there are no points", expected="at least one")
     threads, origin = settings.run.threads, positions.min(axis=0)
@@ -84,12 +87,14 @@ def surface_of_cloud(positions: Floats, settings: Settings, account: Account, pr
     with account.timed("samples"):
         samples = settle_points(positions - origin, threads=threads, progress=progress)
     account.samples(len(positions), samples)
+    if settings.cubes.open:
+        return _open_surface(samples, origin, settings, account, progress)
     with account.timed("cubes"):
         shell = _hold(len(positions), samples, settings, progress)
     held, cell = shell.held, shell.cell
     taken = held.walls.worth_keeping(largest=settings.cubes.largest)
     account.held(held, taken, cell, shell.cubes, len(shell.spanned.places))
-    fitted = held.holds or not _refused(samples, shell.spanned, origin, settings, account)
+    fitted = held.holds or not _refused(samples, origin, settings, account)
     walls = held.walls.only(taken)
     with account.timed("smooth"):
         ring = Ring(walls.quads, len(walls.corners), threads)
@@ -104,11 +109,32 @@ def surface_of_cloud(positions: Floats, settings: Settings, account: Account, pr
             mesh = TriMesh(draped.vertices, draped.faces)
             filled = np.asarray(draped.filled[draped.faces].any(axis=1))
     with account.timed("untangle"):
-        mesh, taken_back, crossing = untangle(mesh, vertices, ring, lambda one: self_intersections(one, threads=threads))
+        mesh, taken_back, crossing = untangle(
+            mesh, vertices, ring, lambda one: self_intersections(one, threads=threads)
+        )
     account.draped(draped, taken_back, filled)
     return CloudSurface(
         samples, held, origin, QuadMesh(lattice + origin, walls.quads.astype(np.int64), keys_of(walls.cells)),
         smoothed.moved(vertices + origin), mesh.moved(mesh.vertices + origin), filled, crossing, draped,
+    )  # fmt: skip
+
+
+def _open_surface(
+    samples: Samples, origin: Floats, settings: Settings, account: Account, progress: Progress
+) -> CloudSurface:
+    """Turn the samples of an open surface into a one-sided sheet."""
+    cell, threads = _cell_edges(samples, settings)[0], settings.run.threads
+    with account.timed("fit"):
+        spanned = bridges(samples, float(cell.min()), threads=threads, progress=progress)
+        made = open_sheet(
+            samples, spanned, cell, settings, lambda one: self_intersections(one, threads=threads), progress
+        )
+    account.held(made.held, np.ones(made.held.walls.count, bool), cell, made.cubes, len(spanned.places))
+    account.draped(made.draped, made.taken_back, made.filled)
+    return CloudSurface(
+        samples, made.held, origin, QuadMesh(made.lattice + origin, made.quads, keys_of(made.cells)),
+        made.smoothed.moved(made.smoothed.vertices + origin), made.mesh.moved(made.mesh.vertices + origin),
+        made.filled, made.crossing, made.draped,
     )  # fmt: skip
 
 
@@ -127,13 +153,14 @@ def _hold(count: int, samples: Samples, settings: Settings, progress: Progress) 
     """Return the shell that holds with the least that is made up: short bridges, narrow closings, large cubes."""
     cubes, best = settings.cubes, None
     closings = TRIED if cubes.closing is None else ((cubes.closing,),)
+    reach = WIDEST * float(np.median(samples.spacing))
     for tried, span, cell in product(closings, SPANS, _cell_edges(samples, settings)):
         require_room(count, samples, cell)
         spanned = bridges(samples, float(cell.min()), span=span, threads=settings.run.threads, progress=progress)
         lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
         cells = cells_of(np.unique(keys))
         held = hold(
-            cells, tried, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
+            cells, [k for k in tried if cubes.closing is not None or k * cell.min() <= reach], cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
         )  # fmt: skip
         if best is None or held.two_sided > best.held.two_sided:
             best = _Shell(cell, lowest, len(cells), spanned, held)
@@ -151,7 +178,7 @@ def _cell_edges(samples: Samples, settings: Settings) -> list[Floats]:
     return [np.broadcast_to(np.array(one) * settings.cubes.cell_factor, 3).copy() for one in asked]
 
 
-def _refused(samples: Samples, spanned: Bridges, origin: Floats, settings: Settings, account: Account) -> bool:
+def _refused(samples: Samples, origin: Floats, settings: Settings, account: Account) -> bool:
     """Refuse a shell that the outside leaks into, unless that was allowed or the points lie in a plane.
 
     What is let pass is not fitted: both walls would rest on the same samples, and the mesh would fall flat.
@@ -160,11 +187,12 @@ def _refused(samples: Samples, spanned: Bridges, origin: Floats, settings: Setti
     if flat or settings.cubes.allow_leaks:
         account.unfitted(flat=flat)
         return True
-    gap = widest_gap(samples, spanned.sectors)
-    where = f"a gap of {gap[0]:.4g} around {_place(gap[1] + origin)}" if gap else f"cell = {account.cell_mm:.4g}"
+    found = gaps(samples, account.cell_mm, threads=settings.run.threads)
+    where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]
     raise GeometryError(
-        "the outside leaks into the shell of cubes, so its surface would have two walls",
-        found=where,
+        ("the points look like an open surface: " if found else "")
+        + "the outside leaks into the shell of cubes, so its surface would have two walls",
+        found=f"{len(found)} border(s), the widest {where[0]}" if found else f"cell = {account.cell_mm:.4g}",
         expected="points all around the object, without gaps as wide as its holes",
         hint="--open for a sheet with borders, a larger --closing or --cell, or --allow-leaks",
     )

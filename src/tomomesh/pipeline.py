@@ -224,7 +224,7 @@ def reconstruct_points(
 def _surface_of_cloud(cloud: PointSet, settings: Settings, account: Account, progress: Progress) -> Surface:
     found = surface_of_cloud(cloud.positions, settings, account, progress)
     with account.timed("quality"):
-        check_promise(found.mesh, cavities=account.cavities)
+        check_promise(found.mesh, cavities=account.cavities, open_=settings.cubes.open)
         account.quality(found.mesh, cloud, account.cavities, progress, found.crossing)
     trace = NO_TRACE if found.draped is None else found.draped.trace
     return Surface(

@@ -16,6 +16,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
     quality, fit = report["quality"], report["fit"]
     unit = _unit(report)
     shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
+    shape = shape if quality["closed"] else "a manifold sheet"
     lines = [
         *_of_stage_one(report),
         f"points    {_of_points(report)}",
@@ -24,7 +25,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
         f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}, "
         f"{quality['self_intersections'] or 'no'} face(s) pass through others",
         f"          {quality['components']} component(s), genus {quality['genus']}, "
-        f"area {quality['area_mm2']:.6g} {unit}^2, volume {quality['volume_mm3']:.6g} {unit}^3{_of_rings(quality)}",
+        f"area {quality['area_mm2']:.6g} {unit}^2{_of_volume(quality, unit)}{_of_rings(quality)}",
         f"distance  points to surface: mean {quality['points_to_surface_mean_mm']:.3g}, "
         f"95 % {quality['points_to_surface_p95_mm']:.3g}, largest {quality['points_to_surface_max_mm']:.3g} {unit}",
     ]
@@ -182,6 +183,11 @@ def _unit(report: dict[str, Any]) -> str:
     """Name the unit of lengths; a cloud may not know its own."""
     unit = report["points"]["unit"]
     return "units" if unit == "unknown" else str(unit)
+
+
+def _of_volume(quality: dict[str, Any], unit: str) -> str:
+    volume = quality["volume_mm3"]
+    return f", {quality['boundary_loops']} border(s)" if volume is None else f", volume {volume:.6g} {unit}^3"
 
 
 def _of_rings(quality: dict[str, Any]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import warnings
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,7 +15,9 @@ from numba.core import config
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
-CACHE = Path(platformdirs.user_cache_dir("tomomesh")) / f"kernels-numba-{numba.__version__}"
+SOURCES = sha256(b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))).hexdigest()[:12]
+"""What the kernels are: Numba looks at a kernel's own file only, not at the kernels that it calls."""
+CACHE = Path(platformdirs.user_cache_dir("tomomesh")) / f"kernels-numba-{numba.__version__}-{SOURCES}"
 
 
 def kernel(signature: str) -> Callable[[Kernel], Kernel]:

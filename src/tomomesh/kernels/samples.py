@@ -26,6 +26,8 @@ SIGHT = 2.5
 """Standard deviations of a Gaussian weight that are looked at."""
 MOST = 1024
 """Neighbors that are looked at; more of them, in a cloud of repeated points, change nothing."""
+ENOUGH, TRIES, WIDER = 9, 3, 1.25
+"""Neighbors that a quadratic needs, how often it looks for them, and how much farther each time."""
 STEEP = 0.35
 """Slope over which a neighbor does not belong to the surface under a plane."""
 ALIKE = 0.5
@@ -306,28 +308,34 @@ def settle(
     for p in range(begin, end):
         h = width[p]
         tangents(planes[p, :3], axes)
-        count = gather(points, blocks, start, frame, points[p], SIGHT * h + abs(planes[p, 3]), found)
         used = 0
-        for n in range(count):
-            q = found[n]
-            if stray[q]:
-                continue
-            same = height = raw = u = v = 0.0
-            for axis in range(3):
-                normal = planes[p, axis]
-                moved = points[q, axis] + planes[q, 3] * planes[q, axis] - points[p, axis] - planes[p, 3] * normal
-                same += normal * planes[q, axis]
-                height += normal * moved
-                raw += normal * (points[q, axis] - points[p, axis])
-                u += axes[0, axis] * moved
-                v += axes[1, axis] * moved
-            flat = u * u + v * v
-            if abs(same) < ALIKE or abs(height) > 2 * planes[p, 4] + STEEP * np.sqrt(flat):
-                continue
-            rows[used, 0], rows[used, 1], rows[used, 2] = u / h, v / h, (raw - planes[p, 3]) / h
-            bent = 0.5 * (flat + height * height) / (h * h) + BEND * (1 - abs(same))
-            rows[used, 3] = points[q, 3] * np.exp(-bent)
-            used += 1
+        for _ in range(TRIES):
+            count = gather(points, blocks, start, frame, points[p], SIGHT * h + abs(planes[p, 3]), found)
+            used = 0
+            for n in range(count):
+                q = found[n]
+                if stray[q]:
+                    continue
+                same = height = raw = u = v = 0.0
+                for axis in range(3):
+                    normal = planes[p, axis]
+                    moved = points[q, axis] + planes[q, 3] * planes[q, axis] - points[p, axis] - planes[p, 3] * normal
+                    same += normal * planes[q, axis]
+                    height += normal * moved
+                    raw += normal * (points[q, axis] - points[p, axis])
+                    u += axes[0, axis] * moved
+                    v += axes[1, axis] * moved
+                flat = u * u + v * v
+                if abs(same) < ALIKE or abs(height) > 2 * planes[p, 4] + STEEP * np.sqrt(flat):
+                    continue
+                rows[used, 0], rows[used, 1], rows[used, 2] = u / h, v / h, (raw - planes[p, 3]) / h
+                bent = 0.5 * (flat + height * height) / (h * h) + BEND * (1 - abs(same))
+                rows[used, 3] = points[q, 3] * np.exp(-bent)
+                used += 1
+            if used >= ENOUGH:
+                break
+            h *= WIDER
+        h = h / WIDER if used < ENOUGH else h
         matrix[:] = 0.0
         right[:] = 0.0
         total = 0.0
@@ -358,9 +366,7 @@ def settle(
 
 
 @kernel("void(f8[::1], i8[::1], i8[::1], i8, f8, f8[::1])")
-def region_medians(
-    values: Floats, order: Integers, start: Integers, few: int, usual: float, medians: Floats
-) -> None:
+def region_medians(values: Floats, order: Integers, start: Integers, few: int, usual: float, medians: Floats) -> None:
     """Find the median of the values in each region.
 
     Parameters

@@ -28,7 +28,8 @@ STEEP = 0.5
 @kernel("f8(f8[::1], f8[::1])")
 def dot(a: Floats, b: Floats) -> float:
     """Return the scalar product of two vectors (3,)."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    product: float = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return product
 
 
 @kernel("void(f8[::1], f8[::1], f8[::1])")
@@ -120,7 +121,7 @@ def unfold(step: Floats, here: Floats, there: Floats, axes: Floats, room: Floats
         length = np.sqrt(dot(step, step))
         stretch = length / max(np.sqrt(flat[0] ** 2 + flat[1] ** 2), 1e-300)
         flat[0], flat[1] = flat[0] * stretch, flat[1] * stretch
-        return abs(height) <= STEEP * length
+        return bool(abs(height) <= STEEP * length)
     for axis in range(3):
         line[axis] /= sine
     cross(line, here, across)

@@ -166,14 +166,15 @@ class CubeSettings(Group):
     )  # fmt: skip
     contours: str = param(
         "auto",
-        "take points on parallel slices as contours, each with its inside, and close what lies between; none never does",
+        "take points on parallel slices as contours, and close what lies between their insides; none never does",
         choices=("auto", "none"),
     )
     largest: bool = param(False, "keep the largest surface alone")
     allow_leaks: bool = param(False, "write the surface even where the outside leaks into the shell")
+    open: bool = param(False, "write an open surface as a one-sided sheet with its borders")
     surface: str = param(
         "auto",
-        "the outer surfaces, or all, cavities too; auto is outer, and all without a network",
+        "the outer surfaces, or all, with what lies in cavities; auto is outer, and all without a network",
         choices=("auto", "outer", "all"),
     )
     smoothing: int = param(3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000)

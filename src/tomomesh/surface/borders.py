@@ -170,7 +170,7 @@ def _sorted_out(found: Borders, at: NDArray[np.int64], rough: Floats) -> Borders
     label = label.astype(np.int64)
     many = np.bincount(label[first], minlength=count) >= LEAST
     smooth = np.bincount(label[first], rough[own] > ROUGH, count) < 0.5 * np.bincount(label[first], minlength=count)
-    kept = many & smooth
+    kept = np.asarray(many & smooth)
     return found.only(kept[label], (np.cumsum(kept) - 1)[label])
 
 

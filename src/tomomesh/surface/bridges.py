@@ -45,7 +45,9 @@ class Bridges:
     sectors: NDArray[np.int64]
 
 
-def bridges(samples: Samples, edge: float, *, span: float = SPAN, threads: int = 0, progress: Progress = silent) -> Bridges:
+def bridges(
+    samples: Samples, edge: float, *, span: float = SPAN, threads: int = 0, progress: Progress = silent
+) -> Bridges:
     """Lay places on straight lines across the holes between samples.
 
     A line joins two samples that have no neighbors in its direction, and lies flat on the surface at both. So
@@ -83,7 +85,11 @@ def bridges(samples: Samples, edge: float, *, span: float = SPAN, threads: int =
     for stage, work in enumerate((look, lay)):
         done = stage * count
         in_blocks(
-            work, count, block=BLOCK, threads=threads, done=lambda n, d=done: progress("bridges", d + n, 2 * count)  # type: ignore[misc]
+            work,
+            count,
+            block=BLOCK,
+            threads=threads,
+            done=lambda n, d=done: progress("bridges", d + n, 2 * count),  # type: ignore[misc]
         )
     back = np.empty(count, np.int64)
     back[index.order] = sectors

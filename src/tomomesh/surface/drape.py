@@ -197,7 +197,9 @@ class _Ground:
         rows = np.ascontiguousarray(rows[index.order])
         near = np.empty(len(vertices), np.int32)
         cells = index.cells
-        in_blocks(lambda a, b: nearest_places(vertices, rows, *cells, near, a, b), len(vertices), block=BLOCK, threads=threads)
+        in_blocks(
+            lambda a, b: nearest_places(vertices, rows, *cells, near, a, b), len(vertices), block=BLOCK, threads=threads
+        )
         return cls(rows, index, near, threads)
 
     @property
@@ -259,5 +261,7 @@ def _nearest(rows: Floats, vertices: Floats, edge: float, threads: int) -> NDArr
     places, cells = vertices[index.order], index.cells
     near = np.empty(len(rows), np.int32)
     positions = np.ascontiguousarray(rows[:, :3])
-    in_blocks(lambda a, b: nearest_places(positions, places, *cells, near, a, b), len(rows), block=BLOCK, threads=threads)
+    in_blocks(
+        lambda a, b: nearest_places(positions, places, *cells, near, a, b), len(rows), block=BLOCK, threads=threads
+    )
     return np.where(near >= 0, index.order[near], -1)

@@ -212,7 +212,7 @@ def _merged(points: Floats, edge: float) -> Floats:
 def distinct(positions: Floats) -> Floats:
     """Return each position once, in the order of x, then y, then z."""
     placed = positions[np.lexsort(positions.T[::-1])]
-    return placed[np.append(True, (placed[1:] != placed[:-1]).any(axis=1))]
+    return np.asarray(placed[np.append(True, (placed[1:] != placed[:-1]).any(axis=1))])
 
 
 def _width(noise: Floats, spacing: Floats) -> Floats:

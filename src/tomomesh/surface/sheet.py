@@ -1,4 +1,9 @@
-"""One side of the two-walled shell of an open surface, and its cut along the borders of the samples."""
+"""An open surface as a sheet with borders: shell of cubes -> one of its two walls -> drape -> cut along the borders.
+
+The samples are carried on beyond their borders by an apron, and the cubes are dilated once: so the shell has no
+holes but those that are wide, and both walls reach over the borders. They come apart where the apron ends; the one
+that is kept is laid over the samples, and what lies beyond the borders is cut away.
+"""
 
 from __future__ import annotations
 
@@ -8,156 +13,195 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from ..errors import GeometryError
-from .drape import Ring
-from .search import Index
+from ..model.cubes import cells_of
+from ..model.mesh import TriMesh
+from .borders import borders
+from .drape import Draped, Ring, drape
+from .holding import Held
+from .neighbors import dilate
+from .partition import cubes_over
+from .shell import close_shell
+from .sides import Side, one_side
+from .trimming import rim, trimmed
+from .untangle import untangle
+from .walls import walls
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
+    from ..progress import Progress
+    from ..settings import Settings
     from .borders import Borders
+    from .bridges import Bridges
     from .samples import Samples
 
     Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
 
+CLOSINGS = (0, 1, 2)
+"""Closings that are tried until the two walls come apart, cubes."""
 APRON = 0.7
 """How far a sheet is carried on beyond its borders, in the radius of the disks there."""
 TIP = 0.8
-"""Share of the apron from which what lies there is cut away, so that the two walls come apart."""
+"""Share of the apron from which the walls are cut away."""
 DENSE = 0.5
 """Distance of the places on the apron, cube edges."""
-CRUMB = 0.01
-"""Share of the squares under which a piece of the walls is left out."""
-WIDE = 1.5
-"""Edge of the plots of samples that tell whether two pieces of the walls are sides of the same sheet, cube edges."""
-SAME = 0.5
-"""Share of its plots that a piece has in common with its other side."""
-BOTH = 0.25
-"""Share of the plots that a piece sees from both sides where the sides are not apart."""
-HOLLOW = 0.01
-"""Volume under a sheet, over the power 3/2 of its area, from which it has an outside."""
-
-
-class SheetRing(Ring):
-    """The neighbors of each vertex of a sheet: those on a border have neighbors along it alone."""
-
-    def __init__(self, quads: NDArray[np.int32], count: int, threads: int = 0) -> None:
-        self.quads, self.threads = quads, threads
-        sides = np.sort(quads[:, [0, 1, 1, 2, 2, 3, 3, 0]].reshape(-1, 2), axis=1)
-        edges, uses = np.unique(sides, axis=0, return_counts=True)
-        rim = np.zeros(count, bool)
-        rim[edges[uses == 1]] = True
-        inner = np.concatenate([edges, edges[:, ::-1]])
-        inner = inner[(np.tile(uses, 2) == 1) | ~rim[inner[:, 0]]]
-        inner = inner[np.lexsort(inner.T[::-1])]
-        self.start = np.concatenate([[0], np.cumsum(np.bincount(inner[:, 0], minlength=count))])
-        self.neighbors = np.ascontiguousarray(inner[:, 1], np.int32)
+OVER = 0.4
+"""How far a sheet reaches beyond its outermost samples, cube edges: half of that is where points thrown at random
+end before their surface does."""
+EVEN = 3
+"""Passes of the low-pass filter over the heights along whose zero the sheet is cut."""
+SNAP = (0.3, 0.1, 0.02)
+"""Share of an edge over which a vertex moves to the cut; the first that lets no face pass through another."""
 
 
 @dataclass(frozen=True)
-class Side:
-    """What is kept of the walls: one side of each sheet.
+class OpenSheet:
+    """A sheet with borders; positions are relative to where the samples' are.
 
     Attributes
     ----------
-    vertices : (n,) bool array
-    quads : (q,) bool array
-    ring : SheetRing
-        Of the kept squares, over the kept vertices.
+    held : Held
+        The shell and both its walls.
+    cubes : int
+        Cubes of the shell before it was closed.
+    lattice : (n, 3) float array
+        Vertices of the wall that is kept.
+    quads : (q, 4) int64 array
+        Its squares.
+    cells : (q, 3) int64 array
+        The cube behind each square.
+    smoothed : TriMesh
+        The wall after the low-pass filter.
+    mesh : TriMesh
+        The sheet: a consistently oriented 2-manifold with borders.
+    filled : (m,) bool array
+        Faces that lie where there are no samples.
+    crossing : (m,) bool array
+        Faces that pass through others.
+    loops : (l,) float array
+        Lengths of the borders, the longest first.
+    draped : Draped
+    taken_back : int
+        Vertices that do not lie where the fit had them.
     """
 
-    vertices: NDArray[np.bool_]
-    quads: NDArray[np.bool_]
-    ring: SheetRing
-
-    @classmethod
-    def of(cls, ring, vertices, quads):
-        quads = quads & vertices[ring.quads].all(axis=1)
-        used = np.zeros(len(vertices), bool)
-        used[ring.quads[quads]] = True
-        number = np.cumsum(used, dtype=np.int32) - np.int32(1)
-        return cls(used, quads, SheetRing(number[ring.quads[quads]], int(used.sum()), ring.threads))
-
-
-def apron(borders: Borders, edge: float) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return places (a, 3) that carry a sheet on beyond its borders, and which are at the outer end."""
-    places, beyond = borders.apron(APRON, DENSE * edge)
-    return places, beyond >= TIP
+    held: Held
+    cubes: int
+    lattice: Floats
+    quads: Integers
+    cells: Integers
+    smoothed: TriMesh
+    mesh: TriMesh
+    filled: NDArray[np.bool_]
+    crossing: NDArray[np.bool_]
+    loops: Floats
+    draped: Draped
+    taken_back: int
 
 
-def one_side(vertices: Floats, ring: Ring, samples: Samples, borders: Borders, edge: float) -> Side | None:
-    """Keep one side of the two-walled shell of each sheet.
+def open_sheet(
+    samples: Samples,
+    spanned: Bridges,
+    cell: Floats,
+    settings: Settings,
+    tangled: Callable[[TriMesh], NDArray[np.bool_]],
+    progress: Progress,
+) -> OpenSheet:
+    """Turn the samples of an open surface into a one-sided sheet.
+
+    Parameters
+    ----------
+    samples : Samples
+    spanned : Bridges
+        What spans the narrow holes between them.
+    cell : (3,) float array
+        Edge of the cubes along each axis.
+    settings : Settings
+    tangled : callable
+        Marks the faces (m,) of a mesh that pass through others.
+    progress : callable
 
     Returns
     -------
-    Side or None
-        None where both sides of a sheet are one piece.
+    OpenSheet
+        A hole stays open where a ball of five sampling distances fits through; narrower ones are closed. A surface
+        without borders becomes a closed mesh.
+
+    Raises
+    ------
+    GeometryError
+        Where both sides of the surface are one.
     """
-    places, tips = apron(borders, edge)
-    _, near = cKDTree(np.concatenate([samples.positions, places])).query(vertices)
-    on_apron = near >= len(samples.positions)
-    cut = np.append(np.zeros(len(samples.positions), bool), tips)[near]
-    quads = ring.quads[~cut[ring.quads].any(axis=1)]
-    pieces = _pieces(quads, len(vertices))
-    own = np.flatnonzero((pieces >= 0) & ~on_apron)
-    facing = (ring.normals(vertices)[own] * samples.normals[near[own]]).sum(axis=1) > 0
-    kept = _kept(pieces[own], _plots(samples, WIDE * edge)[near[own]], facing, _outward(vertices, quads, pieces))
-    return None if kept is None else Side.of(ring, np.isin(pieces, kept) , ~cut[ring.quads].any(axis=1))
+    threads, edge = settings.run.threads, float(cell.min())
+    found, samples = borders(samples, edge, threads=threads)
+    wall = _wall(samples, spanned, found, cell, settings)
+    ring = wall.side.ring
+    draped = drape(wall.start, ring, samples, edge, settings.fit, threads=threads, progress=progress)
+    mesh, taken_back, _ = untangle(TriMesh(draped.vertices, draped.faces), wall.start, ring, tangled)
+    height = np.minimum(found.depths(mesh.vertices, threads=threads) + OVER * edge, 2 * edge)
+    even: Floats = ring.smoothed(np.repeat(height[:, None], 3, axis=1), EVEN)[:, 0]
+    for near in SNAP:
+        sheet, source = trimmed(mesh, even, near)
+        crossing = tangled(sheet)
+        if not crossing.any():
+            break
+    filled = np.asarray(draped.filled[mesh.faces].any(axis=1))[source]
+    quads, smoothed = ring.quads.astype(np.int64), TriMesh(wall.smoothed, mesh.faces)
+    return OpenSheet(
+        wall.held, wall.cubes, wall.lattice, quads, wall.cells, smoothed, sheet, filled, crossing, _loops(sheet),
+        draped, taken_back,
+    )  # fmt: skip
 
 
-def _plots(samples: Samples, edge: float) -> NDArray[np.int64]:
-    """Return the number of the cube of an edge that holds each sample, (p,)."""
-    index = Index.of(samples.positions, edge)
-    plots = np.empty(len(index.order), np.int64)
-    plots[index.order] = np.repeat(np.arange(len(index.groups) - 1), np.diff(index.groups))
-    return plots
+@dataclass(frozen=True)
+class _Wall:
+    """One wall of a shell: vertices (n, 3) on the lattice, smoothed, and where the fit starts; cubes of squares."""
+
+    held: Held
+    cubes: int
+    lattice: Floats
+    smoothed: Floats
+    start: Floats
+    cells: Integers
+    side: Side
 
 
-def _pieces(quads: NDArray[np.int32], count: int) -> NDArray[np.int64]:
-    """Return the connected piece of each vertex, (n,), -1 where it has no square, the largest first."""
-    pairs = quads[:, [0, 1, 1, 2, 2, 3]].reshape(-1, 2)
-    links = sparse.coo_array((np.ones(len(pairs), bool), pairs.T), shape=(count, count))
-    _, label = connected_components(links, directed=False)
-    size = np.bincount(label[quads[:, 0]], minlength=label.max() + 1)
-    order = np.argsort(-size, kind="stable")
-    rank = np.empty(len(order), np.int64)
-    rank[order] = np.arange(len(order))
-    return np.where(size[label] >= max(CRUMB * len(quads), 1), rank[label], -1)
-
-
-def _kept(pieces, plots, facing, outward):
-    """Return the pieces that are kept; None where one is both sides of a sheet."""
-    shape = (len(outward), int(plots.max()) + 1)
-    behind, before = (
-        sparse.coo_array((np.ones(int(way.sum()), np.int64), (pieces[way], plots[way])), shape=shape).tocsr().sign()
-        for way in (~facing, facing)
+def _wall(samples: Samples, spanned: Bridges, found: Borders, cell: Floats, settings: Settings) -> _Wall:
+    """Return one of the two walls around the sheet, from the narrowest closing that keeps them apart."""
+    edge = float(cell.min())
+    apron, share = found.apron(APRON, DENSE * edge)
+    lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places, apron]), cell)
+    cells = cells_of(dilate(np.unique(keys), 1))
+    for closing in CLOSINGS:
+        shell = close_shell(cells, closing, threads=settings.run.threads)
+        both = walls(shell)
+        ring = Ring(both.quads, len(both.corners), settings.run.threads)
+        lattice = lowest + both.corners * cell
+        smoothed = ring.smoothed(lattice, settings.cubes.smoothing)
+        start = smoothed - edge * ring.normals(smoothed)
+        side = one_side(start, ring, samples, apron, share >= TIP, edge, largest=settings.cubes.largest)
+        if side is not None:
+            kept, held = side.vertices, Held(shell, both, both.least_two_sided)
+            return _Wall(held, len(cells), lattice[kept], smoothed[kept], start[kept], both.cells[side.quads], side)
+    raise GeometryError(
+        "the two sides of the surface do not come apart: it has one side only, as a Moebius strip, or its borders "
+        "are lost in the noise",
+        found=f"cell = {edge:.4g}, {found.count} border(s)",
+        expected="a surface with two sides",
+        hint="a larger --cell",
     )
-    over = (behind + before).sign()
-    size = over.sum(axis=1)
-    print("both",behind.multiply(before).sum(axis=1)[:4],size[:4])
-    if (behind.multiply(before).sum(axis=1) > BOTH * size).any():
-        return None
-    shared, kept = (over @ over.T).toarray(), []
-    for piece in sorted(range(len(outward)), key=lambda p: (not outward[p], p)):
-        if all(shared[piece, other] <= SAME * min(size[piece], size[other]) for other in kept):
-            kept.append(piece)
-    return kept
 
 
-def _outward(vertices, quads, pieces):
-    """Tell which pieces face outward: away from what they enclose, or in the direction of the largest axis."""
-    a, b, c, d = (vertices[corner] for corner in quads.T)
-    areas, middle = 0.5 * np.cross(c - a, d - b), 0.25 * (a + b + c + d)
-    piece = pieces[quads[:, 0]]
-    result = np.zeros(int(pieces.max()) + 1, bool)
-    for n in range(len(result)):
-        area = areas[piece == n]
-        size = np.sqrt((area**2).sum(axis=1)).sum()
-        where = middle[piece == n]
-        volume = ((where - where.mean(axis=0)) * area).sum() / 3
-        whole = area.sum(axis=0)
-        axis = np.argmax(np.abs(whole))
-        result[n] = volume > 0 if abs(volume) > HOLLOW * size**1.5 else whole[axis] > 0
-    return result
+def _loops(mesh: TriMesh) -> Floats:
+    """Return the lengths of the borders of a mesh, the longest first."""
+    edges = rim(mesh.faces)
+    links = sparse.coo_array((np.ones(len(edges), bool), edges.T), shape=(len(mesh.vertices),) * 2)
+    _, label = connected_components(links, directed=False)
+    lengths = np.sqrt(((mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]]) ** 2).sum(axis=1))
+    _, loop = np.unique(label[edges[:, 0]], return_inverse=True)
+    return np.asarray(-np.sort(-np.bincount(loop, lengths)))

@@ -1,10 +1,12 @@
-"""Cut a mesh along the line where a function of its vertices is zero."""
+"""Cut a mesh along the line where a height over its vertices is zero."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from ..model.mesh import TriMesh
 
@@ -12,88 +14,103 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
 
-NEAR = 0.3
-"""Share of an edge from its end within which that end moves to the line, rather than the edge being cut."""
+CRUMB = 0.002
+"""Share of the faces under which a piece that was cut off is left out."""
 
 
-def trimmed(mesh: TriMesh, height: Floats) -> tuple[TriMesh, NDArray[np.int64]]:
+def trimmed(mesh: TriMesh, height: Floats, near: float) -> tuple[TriMesh, Integers]:
     """Keep what lies above zero.
 
     Parameters
     ----------
     mesh : TriMesh
+        A 2-manifold, with borders or without.
     height : (n,) float array
         Finite.
+    near : float
+        Share of an edge from its end within which that end moves to the line, so that no sliver is cut off.
 
     Returns
     -------
     mesh : TriMesh
+        A 2-manifold with borders.
     source : (m,) int64 array
         The face that each face was part of.
     """
-    vertices, sign = _snapped(mesh, height)
-    vertices, faces, source = _clipped(vertices, mesh.faces, sign, height)
-    faces, source = _without_pinches(faces, source, len(vertices))
-    used = np.zeros(len(vertices), bool)
+    vertices, side = _snapped(mesh, height, near)
+    vertices, faces, source = _cut(vertices, mesh.faces, side, height)
+    faces, source = _manifold(faces, source, len(vertices))
+    kept = _large(faces, len(vertices))
+    faces, source, used = faces[kept], source[kept], np.zeros(len(vertices), bool)
     used[faces] = True
     return TriMesh(vertices[used], (np.cumsum(used) - 1)[faces]), source
 
 
-def _snapped(mesh: TriMesh, height: Floats) -> tuple[Floats, NDArray[np.int8]]:
-    """Move the vertices that are close to the line onto it; return on which side the others are."""
-    sign = np.where(height < 0, -1, 1).astype(np.int8)
-    crossing = mesh.edges[sign[mesh.edges].sum(axis=1) == 0]
-    ends = np.concatenate([crossing, crossing[:, ::-1]])
-    share = height[ends[:, 0]] / (height[ends[:, 0]] - height[ends[:, 1]])
-    step = share[:, None] * (mesh.vertices[ends[:, 1]] - mesh.vertices[ends[:, 0]])
-    order = np.lexsort((ends[:, 1], (step**2).sum(axis=1)))
-    order = order[share[order] < NEAR]
-    moved, first = np.unique(ends[order, 0], return_index=True)
+def rim(faces: Integers) -> Integers:
+    """Return the edges of one face, smaller vertex first, (b, 2)."""
+    sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges, uses = np.unique(sides, axis=0, return_counts=True)
+    return np.asarray(edges[uses == 1])
+
+
+def _snapped(mesh: TriMesh, height: Floats, near: float) -> tuple[Floats, NDArray[np.int8]]:
+    """Move vertices that are close to the line onto it; return on which side each is: above 1, on it 0, below -1."""
+    side = np.where(height < 0, -1, 1).astype(np.int8)
+    across = mesh.edges[side[mesh.edges].sum(axis=1) == 0]
+    start, end = np.concatenate([across, across[:, ::-1]]).T
+    share = height[start] / (height[start] - height[end])
+    step = share[:, None] * (mesh.vertices[end] - mesh.vertices[start])
+    order = np.lexsort((end, (step**2).sum(axis=1)))
+    order = order[share[order] < near]
+    moved, first = np.unique(start[order], return_index=True)
     vertices = mesh.vertices.copy()
     vertices[moved] += step[order[first]]
-    sign[moved] = 0
-    return vertices, sign
+    side[moved] = 0
+    return vertices, side
 
 
-def _clipped(vertices, faces, sign, height):
-    """Cut the edges that still cross the line, and leave out what lies below it."""
-    signs = sign[faces]
-    source = np.flatnonzero((signs > 0).any(axis=1))
-    # turn each face so that its corner above (or, of two above, the one followed by the other) comes first
-    above = signs[source] > 0
-    first = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (np.argmin(above, axis=1) + 1) % 3)
-    turned = faces[source[:, None], (first[:, None] + np.arange(3)) % 3]
-    a, b, c = turned.T
-    sa, sb, sc = sign[turned].T
-    cut = {}
-    edges = np.concatenate([np.stack(pair, axis=1)[where] for pair, where in (
-        ((a, b), sb < 0), ((a, c), sc < 0), ((b, c), (sb > 0) & (sc < 0)))])
-    keys = np.sort(edges, axis=1)
-    each, number = np.unique(keys, axis=0, return_inverse=True)
-    number = number.ravel() + len(vertices)
+def _cut(
+    vertices: Floats, faces: Integers, side: NDArray[np.int8], height: Floats
+) -> tuple[Floats, Integers, Integers]:
+    """Put a vertex where an edge still crosses the line, and leave out what lies below.
+
+    Faces are turned so that a comes first, the corner above or the first of two: then (a, ab, ac) remains where only
+    a is above, (a, b, bc) and (a, bc, ac) where c alone is below.
+    """
+    source = np.flatnonzero((side[faces] > 0).any(axis=1))
+    above = side[faces[source]] > 0
+    first = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (above.argmin(axis=1) + 1) % 3)
+    a, b, c = faces[source[:, None], (first[:, None] + np.arange(3)) % 3].T
+    two = (side[b] > 0) & (side[c] < 0)
+    wanted = (a, b, side[b] < 0), (a, c, side[c] < 0), (b, c, two)
+    ends = np.concatenate([np.sort(np.stack([u[where], v[where]], axis=1), axis=1) for u, v, where in wanted])
+    each, number = np.unique(ends, axis=0, return_inverse=True)
     u, v = each.T
-    t = (height[u] / (height[u] - height[v]))[:, None]
-    new = vertices[u] + t * (vertices[v] - vertices[u])
-    n1, n2 = int((sb < 0).sum()), int((sc < 0).sum())
+    share = height[u] / (height[u] - height[v])
+    placed = np.concatenate([vertices, vertices[u] + share[:, None] * (vertices[v] - vertices[u])])
+    pieces = np.split(number.ravel() + len(vertices), np.cumsum([int(where.sum()) for *_, where in wanted])[:-1])
     ab, ac, bc = b.copy(), c.copy(), c.copy()
-    ab[sb < 0] = number[:n1]
-    ac[sc < 0] = number[n1:n1 + n2]
-    two = (sb > 0) & (sc < 0)
-    bc[two] = number[n1 + n2:]
-    # one above: (a, ab, ac); two above and one below: (a, b, bc), (a, bc, ac); none below: as it is
+    ab[side[b] < 0], ac[side[c] < 0], bc[two] = pieces
     one = np.stack([a, ab, np.where(two, bc, ac)], axis=1)
-    rest = np.stack([a, bc, ac], axis=1)[two]
-    return np.concatenate([vertices, new]), np.concatenate([one, rest]), np.concatenate([source, source[two]])
+    return placed, np.concatenate([one, np.stack([a, bc, ac], axis=1)[two]]), np.append(source, source[two])
 
 
-def _without_pinches(faces, source, count):
+def _manifold(faces: Integers, source: Integers, count: int) -> tuple[Integers, Integers]:
     """Leave out the faces around vertices where two fans meet."""
     while True:
-        half = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-        keys, uses = np.unique(np.sort(half, axis=1), axis=0, return_counts=True)
-        pinched = np.bincount(keys[uses == 1].ravel(), minlength=count) > 2
+        pinched = np.bincount(rim(faces).ravel(), minlength=count) > 2
         kept = ~pinched[faces].any(axis=1)
         if kept.all():
             return faces, source
         faces, source = faces[kept], source[kept]
+
+
+def _large(faces: Integers, count: int) -> NDArray[np.bool_]:
+    """Tell which faces (m,) belong to no crumb."""
+    pairs = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    links = sparse.coo_array((np.ones(len(pairs), bool), pairs.T), shape=(count, count))
+    _, label = connected_components(links, directed=False)
+    piece = label[faces[:, 0]]
+    return np.asarray(np.bincount(piece)[piece] >= CRUMB * len(faces))
