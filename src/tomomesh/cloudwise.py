@@ -159,8 +159,9 @@ def _hold(count: int, samples: Samples, settings: Settings, progress: Progress) 
         spanned = bridges(samples, float(cell.min()), span=span, threads=settings.run.threads, progress=progress)
         lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
         cells = cells_of(np.unique(keys))
+        steps = [k for k in tried if cubes.closing is not None or k * cell.min() <= reach]
         held = hold(
-            cells, [k for k in tried if cubes.closing is not None or k * cell.min() <= reach], cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
+            cells, steps, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
         )  # fmt: skip
         if best is None or held.two_sided > best.held.two_sided:
             best = _Shell(cell, lowest, len(cells), spanned, held)

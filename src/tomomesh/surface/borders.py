@@ -178,6 +178,6 @@ def _levelled(samples: Samples, found: Borders, normals: Floats) -> Samples:
     """Give the samples near a border other normals, (p, 3)."""
     if not found.count:
         return samples
-    away, _ = cKDTree(found.middles).query(samples.positions)
+    away = np.asarray(cKDTree(found.middles).query(samples.positions)[0])
     near = away < NEAR * float(np.median(found.radii))
     return replace(samples, normals=np.where(near[:, None], normals, samples.normals))

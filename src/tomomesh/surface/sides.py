@@ -95,7 +95,7 @@ def one_side(
         None where the two sides of a sheet are one piece.
     """
     count = len(samples.positions)
-    _, near = cKDTree(np.concatenate([samples.positions, apron])).query(vertices)
+    near = np.asarray(cKDTree(np.concatenate([samples.positions, apron])).query(vertices)[1])
     cut = np.append(np.zeros(count, bool), tips)[near]
     quads = np.asarray(~cut[ring.quads].any(axis=1))
     pieces = _pieces(ring.quads[quads], len(vertices))
