@@ -40,7 +40,7 @@ NOISE = (1.8, 1.3, 1.0)
 large ones fill thin parts."""
 SPANS = (5.0, 12.0)
 """Longest bridges that are tried, sampling distances."""
-WIDEST = 8.0
+WIDEST = 6.0
 """Widest closing that is tried, sampling distances: large cubes are closed by fewer."""
 TRIED = ((0, 1, 2), (3, 4, 5, 6, 7, 8))
 """Closings that are tried before and after longer bridges, cubes."""

@@ -55,6 +55,8 @@ OVER = 0.4
 end before their surface does."""
 EVEN = 3
 """Passes of the low-pass filter over the heights along whose zero the sheet is cut."""
+SHIFT = 0.9
+"""Share of a height by which that filter may change it: none changes its sign, or narrow strips would be cut through."""
 SNAP = (0.3, 0.1, 0.02)
 """Share of an edge over which a vertex moves to the cut; the first that lets no face pass through another."""
 
@@ -144,7 +146,9 @@ def open_sheet(
     draped = drape(wall.start, ring, samples, edge, settings.fit, threads=threads, progress=progress)
     mesh, taken_back, _ = untangle(TriMesh(draped.vertices, draped.faces), wall.start, ring, tangled)
     height = np.minimum(found.depths(mesh.vertices, threads=threads) + OVER * edge, 2 * edge)
-    even: Floats = ring.smoothed(np.repeat(height[:, None], 3, axis=1), EVEN)[:, 0]
+    even = ring.smoothed(np.repeat(height[:, None], 3, axis=1), EVEN)[:, 0]
+    most = SHIFT * np.abs(height)
+    even = height + np.clip(even - height, -most, most)
     for near in SNAP:
         sheet, source = trimmed(mesh, even, near)
         crossing = tangled(sheet)

@@ -82,6 +82,7 @@ def _cut(
     source = np.flatnonzero((side[faces] > 0).any(axis=1))
     above = side[faces[source]] > 0
     first = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (above.argmin(axis=1) + 1) % 3)
+    first[(side[faces[source]] >= 0).all(axis=1)] = 0
     a, b, c = faces[source[:, None], (first[:, None] + np.arange(3)) % 3].T
     two = (side[b] > 0) & (side[c] < 0)
     wanted = (a, b, side[b] < 0), (a, c, side[c] < 0), (b, c, two)
