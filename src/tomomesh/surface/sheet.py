@@ -56,7 +56,7 @@ end before their surface does."""
 EVEN = 3
 """Passes of the low-pass filter over the heights along whose zero the sheet is cut."""
 SHIFT = 0.9
-"""Share of a height by which that filter may change it: none changes its sign, or narrow strips would be cut through."""
+"""Share of a height by which that filter may change it: none changes its sign, or narrow strips would be cut."""
 SNAP = (0.3, 0.1, 0.02)
 """Share of an edge over which a vertex moves to the cut; the first that lets no face pass through another."""
 
