@@ -39,8 +39,14 @@ def trimmed(mesh: TriMesh, height: Floats, near: float) -> tuple[TriMesh, Intege
     source : (m,) int64 array
         The face that each face was part of.
     """
-    vertices, side = _snapped(mesh, height, near)
-    vertices, faces, source = _cut(vertices, mesh.faces, side, height)
+    free = np.ones(len(height), bool)
+    while True:
+        vertices, side = _snapped(mesh, height, near, free)
+        vertices, faces, source = _cut(vertices, mesh.faces, side, height)
+        pinched = _pinched(faces, len(vertices))[: len(height)] & (side == 0)
+        if not pinched.any():
+            break
+        free &= ~pinched
     faces, source = _manifold(faces, source, len(vertices))
     kept = _large(faces, len(vertices))
     faces, source, used = faces[kept], source[kept], np.zeros(len(vertices), bool)
@@ -55,15 +61,15 @@ def rim(faces: Integers) -> Integers:
     return np.asarray(edges[uses == 1])
 
 
-def _snapped(mesh: TriMesh, height: Floats, near: float) -> tuple[Floats, NDArray[np.int8]]:
-    """Move vertices that are close to the line onto it; return on which side each is: above 1, on it 0, below -1."""
+def _snapped(mesh: TriMesh, height: Floats, near: float, free: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.int8]]:
+    """Move free vertices close to the line onto it; return on which side each is: above 1, on it 0, below -1."""
     side = np.where(height < 0, -1, 1).astype(np.int8)
     across = mesh.edges[side[mesh.edges].sum(axis=1) == 0]
     start, end = np.concatenate([across, across[:, ::-1]]).T
     share = height[start] / (height[start] - height[end])
     step = share[:, None] * (mesh.vertices[end] - mesh.vertices[start])
     order = np.lexsort((end, (step**2).sum(axis=1)))
-    order = order[share[order] < near]
+    order = order[(share[order] < near) & free[start[order]]]
     moved, first = np.unique(start[order], return_index=True)
     vertices = mesh.vertices.copy()
     vertices[moved] += step[order[first]]
@@ -100,12 +106,15 @@ def _cut(
 
 def _manifold(faces: Integers, source: Integers, count: int) -> tuple[Integers, Integers]:
     """Leave out the faces around vertices where two fans meet."""
-    while True:
-        pinched = np.bincount(rim(faces).ravel(), minlength=count) > 2
+    while (pinched := _pinched(faces, count)).any():
         kept = ~pinched[faces].any(axis=1)
-        if kept.all():
-            return faces, source
         faces, source = faces[kept], source[kept]
+    return faces, source
+
+
+def _pinched(faces: Integers, count: int) -> NDArray[np.bool_]:
+    """Tell at which vertices, (n,), two fans of faces meet."""
+    return np.asarray(np.bincount(rim(faces).ravel(), minlength=count) > 2)
 
 
 def _large(faces: Integers, count: int) -> NDArray[np.bool_]:
