@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from ..errors import GeometryError
 from ..model.cubes import cells_of
@@ -24,7 +22,7 @@ from .neighbors import dilate
 from .partition import cubes_over
 from .shell import close_shell
 from .sides import Side, one_side
-from .trimming import rim, trimmed
+from .trimming import trimmed
 from .untangle import untangle
 from .walls import walls
 
@@ -85,8 +83,6 @@ class OpenSheet:
         Faces that lie where there are no samples.
     crossing : (m,) bool array
         Faces that pass through others.
-    loops : (l,) float array
-        Lengths of the borders, the longest first.
     draped : Draped
     taken_back : int
         Vertices that do not lie where the fit had them.
@@ -101,7 +97,6 @@ class OpenSheet:
     mesh: TriMesh
     filled: NDArray[np.bool_]
     crossing: NDArray[np.bool_]
-    loops: Floats
     draped: Draped
     taken_back: int
 
@@ -157,7 +152,7 @@ def open_sheet(
     filled = np.asarray(draped.filled[mesh.faces].any(axis=1))[source]
     quads, smoothed = ring.quads.astype(np.int64), TriMesh(wall.smoothed, mesh.faces)
     return OpenSheet(
-        wall.held, wall.cubes, wall.lattice, quads, wall.cells, smoothed, sheet, filled, crossing, _loops(sheet),
+        wall.held, wall.cubes, wall.lattice, quads, wall.cells, smoothed, sheet, filled, crossing,
         draped, taken_back,
     )  # fmt: skip
 
@@ -199,13 +194,3 @@ def _wall(samples: Samples, spanned: Bridges, found: Borders, cell: Floats, sett
         expected="a surface with two sides",
         hint="a larger --cell",
     )
-
-
-def _loops(mesh: TriMesh) -> Floats:
-    """Return the lengths of the borders of a mesh, the longest first."""
-    edges = rim(mesh.faces)
-    links = sparse.coo_array((np.ones(len(edges), bool), edges.T), shape=(len(mesh.vertices),) * 2)
-    _, label = connected_components(links, directed=False)
-    lengths = np.sqrt(((mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]]) ** 2).sum(axis=1))
-    _, loop = np.unique(label[edges[:, 0]], return_inverse=True)
-    return np.asarray(-np.sort(-np.bincount(loop, lengths)))
