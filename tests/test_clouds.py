@@ -80,6 +80,16 @@ class TestCleanClouds:
         error = [np.abs(off_torus(reconstruct_points(on_torus(n)).mesh.vertices)).mean() for n in (4_000, 16_000)]
         assert np.log2(error[0] / error[1]) > 1.5  # four times the points are half the spacing
 
+    def test_a_large_straight_cloud_gets_larger_cubes(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        cells = []
+        for many in (32_000, 10_000):
+            monkeypatch.setattr("tomomesh.cloudwise.MANY", many)
+            surface = reconstruct_points(on_torus(32_000))
+            assert_sound(surface, genus=1)
+            cells.append(surface.report["cubes"]["cell_mm"][0] / surface.report["points"]["spacing_mm"])
+        assert cells[0] == pytest.approx(0.95, rel=0.01)
+        assert 1.3 < cells[1] < 1.51
+
     def test_edges_of_a_box_are_sharp_within_a_sampling_distance(self) -> None:
         surface = reconstruct_points(on_box(20_000))
         assert_sound(surface)

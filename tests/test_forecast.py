@@ -23,7 +23,7 @@ GIB = 2**30
 def even(count: int, spacing: float) -> Samples:
     """Samples of which only the spacing matters."""
     none = np.zeros((count, 3))
-    return Samples(none, none, np.full(count, spacing), np.zeros(count), np.zeros(count), 0)
+    return Samples(none, none, np.full(count, spacing), np.zeros(count), np.zeros(count), 0, 1.0)
 
 
 def system(root: Path, files: dict[str, str]) -> Path:

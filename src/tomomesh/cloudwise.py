@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import EmptyError, GeometryError
-from .measure.intersections import self_intersections
+from .measure.intersections import Crossings
+from .model.columns import any_of, box
 from .model.cubes import cells_of, keys_of
 from .model.mesh import QuadMesh, TriMesh
 from .surface.bridges import bridges
@@ -33,8 +34,12 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-FINE = 0.95
-"""Edge of the cubes over the sampling distance."""
+FINE, COARSE = 0.95, 1.5
+"""Least and greatest edge of the cubes over the sampling distance, but for noise."""
+BENT = 0.08
+"""Bend of the samples from which the finest cubes are taken; for less, the sagitta of an edge stays as it is there."""
+MANY = 250_000
+"""Samples up to which the finest cubes are taken in any case: the mesh then has a million faces."""
 NOISE = (1.8, 1.3, 1.0)
 """Edges of the cubes over the noise of the points, tried one after the other: small cubes show noise as handles,
 large ones fill thin parts."""
@@ -82,7 +87,7 @@ def surface_of_cloud(positions: Floats, settings: Settings, account: Account, pr
     """Turn positions (n, 3) into a closed surface, or into a sheet with borders where that is asked for."""
     if len(positions) == 0:
         raise EmptyError("there are no points", expected="at least one")
-    threads, origin = settings.run.threads, positions.min(axis=0)
+    threads, (origin, _) = settings.run.threads, box(positions)
     require_room_for_points(len(positions))
     with account.timed("samples"):
         samples = settle_points(positions - origin, threads=threads, progress=progress)
@@ -107,11 +112,9 @@ def surface_of_cloud(positions: Floats, settings: Settings, account: Account, pr
         if fitted:
             draped = drape(vertices, ring, samples, float(cell.min()), settings.fit, threads=threads, progress=progress)
             mesh = TriMesh(draped.vertices, draped.faces)
-            filled = np.asarray(draped.filled[draped.faces].any(axis=1))
+            filled = any_of(draped.filled[draped.faces])
     with account.timed("untangle"):
-        mesh, taken_back, crossing = untangle(
-            mesh, vertices, ring, lambda one: self_intersections(one, threads=threads)
-        )
+        mesh, taken_back, crossing = untangle(mesh, vertices, ring, Crossings(threads))
     account.draped(draped, taken_back, filled)
     return CloudSurface(
         samples, held, origin, QuadMesh(lattice + origin, walls.quads.astype(np.int64), keys_of(walls.cells)),
@@ -126,9 +129,7 @@ def _open_surface(
     cell, threads = _cell_edges(samples, settings)[0], settings.run.threads
     with account.timed("fit"):
         spanned = bridges(samples, float(cell.min()), threads=threads, progress=progress)
-        made = open_sheet(
-            samples, spanned, cell, settings, lambda one: self_intersections(one, threads=threads), progress
-        )
+        made = open_sheet(samples, spanned, cell, settings, Crossings(threads), progress)
     account.held(made.held, np.ones(made.held.walls.count, bool), cell, made.cubes, len(spanned.places))
     account.draped(made.draped, made.taken_back, made.filled)
     return CloudSurface(
@@ -174,7 +175,9 @@ def _hold(count: int, samples: Samples, settings: Settings, progress: Progress) 
 def _cell_edges(samples: Samples, settings: Settings) -> list[Floats]:
     """Return the edges of the cubes along each axis: the sampling distance, or what the noise needs, or as asked."""
     spacing, noise = float(np.median(samples.spacing)), float(np.median(samples.noise))
-    own = dict.fromkeys(max(FINE * spacing, factor * noise) for factor in NOISE)
+    most = min(COARSE, FINE * max(1.0, np.sqrt(len(samples.positions) / MANY)))
+    fine = float(np.clip(FINE * np.sqrt(BENT / max(samples.bend, 1e-300)), FINE, most))
+    own = dict.fromkeys(max(fine * spacing, factor * noise) for factor in NOISE)
     asked = [settings.cubes.cell_mm] if settings.cubes.cell_mm else [(edge,) for edge in own]
     return [np.broadcast_to(np.array(one) * settings.cubes.cell_factor, 3).copy() for one in asked]
 

@@ -19,6 +19,8 @@ SIGHT = 2.5
 """Standard deviations of a Gaussian weight that are looked at."""
 MOST = 1024
 """Samples that are looked at."""
+LONGER = 1.25
+"""How many times as far is looked where samples are far, most."""
 FACING = 0.2
 """Cosine of the angle between a sample's normal and the mesh's under which the sample belongs to another side."""
 
@@ -137,39 +139,100 @@ def find_foot(
     return True
 
 
-@kernel("void(f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8[:,::1], i8, i8)")
-def find_feet(
+@kernel("void(f8[:,::1], f8[:,::1], i4[::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8[:,::1], f8[:,::1], i8, i8)")
+def first_feet(
     places: Floats,
     normals: Floats,
-    reach: Floats,
+    nearest: NDArray[np.int32],
     samples: Floats,
     blocks: Integers,
     start: NDArray[np.int32],
     frame: Floats,
     feet: Floats,
+    anchors: Floats,
     begin: int,
     end: int,
 ) -> None:
-    """Find the foot of each place (see `find_foot`).
+    """Take the plane of the sample nearest to each place for its first foot.
+
+    Where that sample faces elsewhere, as the other side of a thin part does, the foot is sought (see `find_foot`).
 
     Parameters
     ----------
     places, normals : (n, 3) float arrays
-    reach : (n,) float array
-        How far each place looks; 0 where it has no sample.
+    nearest : (n,) int32 array
+        The sample nearest to each place, -1 where there is none.
     samples, blocks, start, frame : arrays
     feet : (n, 4) float array
-        Result: height and unit normal; zeros where there is no sample.
+        Result: height over the surface at the anchor, and unit normal; zeros where there is no sample.
+    anchors : (n, 3) float array
+        Result: where the height was measured.
     begin, end : int
         Places to work on.
     """
     found, weights = np.empty(MOST, np.int64), np.empty(MOST)
     for v in range(begin, end):
-        sees = reach[v] > 0.0 and find_foot(
-            samples, blocks, start, frame, places[v], normals[v], reach[v], feet[v], found, weights
-        )
-        if not sees:
+        p = nearest[v]
+        feet[v], anchors[v] = 0.0, places[v]
+        if p < 0:
+            continue
+        facing = squared = 0.0
+        for axis in range(3):
+            facing += normals[v, axis] * samples[p, 3 + axis]
+            squared += (places[v, axis] - samples[p, axis]) ** 2
+        if facing >= FACING:
+            feet[v, 1:], anchors[v] = samples[p, 3:6], samples[p, :3]
+            continue
+        reach = SIGHT * samples[p, 6] + np.sqrt(squared)
+        if not find_foot(samples, blocks, start, frame, places[v], normals[v], reach, feet[v], found, weights):
             feet[v] = 0.0
+
+
+@kernel("void(f8[:,::1], i4[::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8, f8[:,::1], f8[:,::1], i8, i8)")
+def renew_feet(
+    places: Floats,
+    nearest: NDArray[np.int32],
+    samples: Floats,
+    blocks: Integers,
+    start: NDArray[np.int32],
+    frame: Floats,
+    stale: float,
+    feet: Floats,
+    anchors: Floats,
+    begin: int,
+    end: int,
+) -> None:
+    """Seek the feet of those places anew that have moved some way from where theirs were sought.
+
+    Parameters
+    ----------
+    places : (n, 3) float array
+    nearest : (n,) int32 array
+        A sample near each place, which tells how far to look; -1 where there is none.
+    samples, blocks, start, frame : arrays
+    stale : float
+        The way.
+    feet, anchors : (n, 4) and (n, 3) float arrays
+        Changed in place; a place without a foot gets none.
+    begin, end : int
+        Places to work on.
+    """
+    found, weights, foot = np.empty(MOST, np.int64), np.empty(MOST), np.empty(4)
+    for v in range(begin, end):
+        moved = drawn = away = 0.0
+        for axis in range(3):
+            moved += (places[v, axis] - anchors[v, axis]) ** 2
+            drawn += feet[v, 1 + axis] ** 2
+        if moved <= stale * stale or drawn == 0.0 or nearest[v] < 0:
+            continue
+        for axis in range(3):
+            away += (places[v, axis] - samples[nearest[v], axis]) ** 2
+        reach = SIGHT * samples[nearest[v], 6]
+        reach = min(max(1.01 * np.sqrt(away), reach), LONGER * reach)
+        if find_foot(samples, blocks, start, frame, places[v], feet[v, 1:], reach, foot, found, weights):
+            feet[v], anchors[v] = foot, places[v]
+        else:
+            feet[v], anchors[v] = 0.0, places[v]
 
 
 @kernel("void(i4[:,::1], i8[::1], i4[::1])")
@@ -242,15 +305,65 @@ def quad_normals(vertices: Floats, quads: NDArray[np.int32], normals: Floats) ->
             normals[v, axis] /= max(length, 1e-300)
 
 
-@kernel("void(f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8[:,:,::1], f8[::1], i8, i8)")
+@kernel("void(f8[:,::1], f8[:,::1], i4[:,::1], f8, f8[:,::1], i4[:,::1], f8[:,::1])")
+def split_quads(
+    vertices: Floats,
+    normals: Floats,
+    quads: NDArray[np.int32],
+    share: float,
+    rise: Floats,
+    faces: NDArray[np.int32],
+    raised: Floats,
+) -> None:
+    """Split squares by the diagonals nearer to the surface, and raise their corners by a share of the sagitta.
+
+    A chord d between places with normals m and n lies (n - m) d / 8 below the middle of the arc.
+
+    Parameters
+    ----------
+    vertices, normals : (n, 3) float arrays
+    quads : (q, 4) int32 array
+    share : float
+    rise : (n, 2) float array
+        Zeros; room for sum and number of the sagittas at each vertex.
+    faces : (2q, 3) int32 array
+        Result.
+    raised : (n, 3) float array
+        Result: where the vertices then are.
+    """
+    sagitta = np.empty(2)
+    for q in range(len(quads)):
+        for one in range(2):
+            a, c = quads[q, one], quads[q, one + 2]
+            sagitta[one] = 0.0
+            for axis in range(3):
+                sagitta[one] += (normals[c, axis] - normals[a, axis]) * (vertices[c, axis] - vertices[a, axis]) / 8
+        turn = int(abs(sagitta[1]) < abs(sagitta[0]))
+        for corner in range(4):
+            rise[quads[q, corner], 0] += 0.5 * (sagitta[0] + sagitta[1])
+            rise[quads[q, corner], 1] += 1.0
+        for half in range(2):
+            faces[2 * q + half, 0] = quads[q, turn]
+            faces[2 * q + half, 1] = quads[q, (turn + half + 1) % 4]
+            faces[2 * q + half, 2] = quads[q, (turn + half + 2) % 4]
+    for v in range(len(vertices)):
+        for axis in range(3):
+            raised[v, axis] = vertices[v, axis] + share * rise[v, 0] / max(rise[v, 1], 1.0) * normals[v, axis]
+
+
+@kernel(
+    "void(f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8[:,::1], f8[::1], i8, i8)"
+)
 def advance(
-    state: NDArray[np.float64],
+    places: Floats,
+    velocities: Floats,
+    origins: Floats,
     feet: Floats,
     anchors: Floats,
     start: Integers,
     neighbors: NDArray[np.int32],
     rates: Floats,
-    result: NDArray[np.float64],
+    result: Floats,
     sums: Floats,
     begin: int,
     end: int,
@@ -263,8 +376,8 @@ def advance(
 
     Parameters
     ----------
-    state : (n, 3, 3) float array
-        Position and velocity of each vertex, and where it came from.
+    places, velocities, origins : (n, 3) float arrays
+        Position and velocity of each vertex, and where it came from; the velocities are changed in place.
     feet : (n, 4) float array
         Height over the surface at the anchor, and its unit normal there; zeros where there is no foot.
     anchors : (n, 3) float array
@@ -274,8 +387,8 @@ def advance(
     rates : (5,) float array
         Time step, damping over critical damping, longest step that a vertex may take, stiffness of the spring to
         where it came from over that of all others, and the speed from which a vertex counts as moving.
-    result : (n, 3, 3) float array
-        The state after the step.
+    result : (n, 3) float array
+        The positions after the step.
     sums : (8,) float array
         Result over these vertices: largest speed, largest acceleration; the sums of kinetic energy, potential
         energy and height; how many were slowed, have no foot, and still move.
@@ -292,17 +405,17 @@ def advance(
         total[:] = 0.0
         for n in range(start[v], start[v + 1]):
             for axis in range(3):
-                total[axis] += state[neighbors[n], 0, axis]
+                total[axis] += places[neighbors[n], axis]
         for axis in range(3):
-            pull[axis] = (total[axis] / count + hold * state[v, 2, axis]) / (1 + hold) - state[v, 0, axis]
-            along += feet[v, 1 + axis] * (state[v, 0, axis] - anchors[v, axis])
+            pull[axis] = (total[axis] / count + hold * origins[v, axis]) / (1 + hold) - places[v, axis]
+            along += feet[v, 1 + axis] * (places[v, axis] - anchors[v, axis])
             tension += feet[v, 1 + axis] * pull[axis]
             drawn += feet[v, 1 + axis] ** 2
         for axis in range(3):
             pull[axis] -= tension * feet[v, 1 + axis]
             sums[3] += 0.5 * pull[axis] ** 2
-            pull[axis] -= along * feet[v, 1 + axis] + 2 * damping * state[v, 1, axis]
-            speed += state[v, 1, axis] ** 2
+            pull[axis] -= along * feet[v, 1 + axis] + 2 * damping * velocities[v, axis]
+            speed += velocities[v, axis] ** 2
             change += pull[axis] ** 2
         slow = min(1.0, limit / max(h * np.sqrt(speed), 1e-300))
         sums[0] = max(sums[0], slow * np.sqrt(speed))
@@ -314,7 +427,6 @@ def advance(
         sums[6] += drawn == 0.0
         sums[7] += max(speed, change) > rates[4] ** 2
         for axis in range(3):
-            velocity = slow * state[v, 1, axis]
-            result[v, 0, axis] = state[v, 0, axis] + h * velocity
-            result[v, 1, axis] = velocity + h * pull[axis]
-            result[v, 2, axis] = state[v, 2, axis]
+            velocity = slow * velocities[v, axis]
+            result[v, axis] = places[v, axis] + h * velocity
+            velocities[v, axis] = velocity + h * pull[axis]

@@ -183,11 +183,12 @@ def push_later(stack: NDArray[np.int64], leaf: int) -> int:
     return count
 
 
-@kernel("i8(f8[:,::1], i4[:,::1], f8[:,::1], b1[::1], i8[:,::1], i8, i8)")
+@kernel("i8(f8[:,::1], i4[:,::1], f8[:,::1], b1[::1], b1[::1], i8[:,::1], i8, i8)")
 def mark_intersections(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int32],
     boxes: Rows,
+    asked: NDArray[np.bool_],
     marked: NDArray[np.bool_],
     pairs: NDArray[np.int64],
     start: int,
@@ -202,6 +203,8 @@ def mark_intersections(
         In the order of the tree.
     boxes : (4 P, 3) float array
         The tree. See `tomomesh.kernels.bvh`.
+    asked : (2 P,) bool array
+        Nodes that hold faces which are to be compared; two nodes without any are not.
     marked : (m,) bool array
         False on entry. Result: whether a face crosses another.
     pairs : (p, 2) int64 array
@@ -228,7 +231,8 @@ def mark_intersections(
         while waiting > 0:
             waiting -= 1
             node = stack[waiting]
-            if not boxes_meet(boxes, leaf_box, boxes, 2 * node):
+            wanted = asked[leaves + leaf] or asked[node]
+            if not (wanted and boxes_meet(boxes, leaf_box, boxes, 2 * node)):
                 continue
             if node < leaves:
                 stack[waiting], stack[waiting + 1] = 2 * node, 2 * node + 1

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import os
+import threading
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from functools import cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+_working = threading.local()
+"""Knows the threads of a pool: what they share out themselves they do alone, or all would wait for each other."""
 
 
 def in_blocks(
@@ -33,7 +38,7 @@ def in_blocks(
     """
     starts = range(0, total, max(block, 1))
     workers = min(threads or os.cpu_count() or 1, len(starts))
-    if workers <= 1:
+    if workers <= 1 or getattr(_working, "here", False):
         for start in starts:
             work(start, min(start + block, total))
             done(min(start + block, total))
@@ -49,10 +54,9 @@ def _in_pool(
     workers: int,
     done: Callable[[int], None],
 ) -> None:
-    pool = ThreadPoolExecutor(workers)
+    waiting = {_pool(workers).submit(work, start, min(start + block, total)) for start in starts}
+    finished = 0
     try:
-        waiting = {pool.submit(work, start, min(start + block, total)) for start in starts}
-        finished = 0
         while waiting:
             ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
             for future in ready:
@@ -60,4 +64,14 @@ def _in_pool(
             finished = min(finished + len(ready) * block, total)
             done(finished)
     finally:
-        pool.shutdown(cancel_futures=True)
+        wait([future for future in waiting if not future.cancel()])
+
+
+@cache
+def _pool(workers: int) -> ThreadPoolExecutor:
+    """Return threads that are kept: the mesh takes many short steps."""
+    return ThreadPoolExecutor(workers, initializer=_working.__setattr__, initargs=("here", True))
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..kernels.intersections import mark_intersections
 from ..kernels.threads import in_blocks
+from ..model.columns import any_of
 from ..progress import Progress, silent
 from .tree import Tree
 
@@ -54,13 +55,39 @@ def self_intersections(mesh: TriMesh, *, threads: int = 0, progress: Progress = 
     return marked_in(Tree.of_faces(mesh, threads=threads), threads=threads, progress=progress)
 
 
-def marked_in(tree: Tree, *, threads: int = 0, progress: Progress = silent) -> NDArray[np.bool_]:
-    """Mark the faces of a tree that pass through others; see `self_intersections`."""
+class Crossings:
+    """Mark the faces that pass through others (see `self_intersections`), again and again as vertices move."""
+
+    def __init__(self, threads: int = 0) -> None:
+        self._threads = threads
+        self._tree: Tree | None = None
+
+    def __call__(self, mesh: TriMesh, moved: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+        """Mark the faces (m,) of a mesh.
+
+        Parameters
+        ----------
+        mesh : TriMesh
+        moved : (n,) bool array, optional
+            The vertices that have moved since the last call, all marked ones among them, where nothing else changed.
+        """
+        if self._tree is None or moved is None:
+            self._tree = Tree.of_faces(mesh, threads=self._threads)
+            return marked_in(self._tree, threads=self._threads)
+        self._tree = self._tree.moved(mesh.vertices, threads=self._threads)
+        return marked_in(self._tree, any_of(moved[mesh.faces]), threads=self._threads)
+
+
+def marked_in(
+    tree: Tree, asked: NDArray[np.bool_] | None = None, *, threads: int = 0, progress: Progress = silent
+) -> NDArray[np.bool_]:
+    """Mark the faces of a tree that pass through others, or through the faces (m,) that are asked for."""
     found, marked = np.zeros((2, len(tree.order)), np.bool_)
     no_pairs = np.empty((0, 2), np.int64)
+    nodes = np.ones(2 * tree.leaves, np.bool_) if asked is None else tree.nodes_with(asked)
 
     def mark(start: int, stop: int) -> None:
-        mark_intersections(tree.vertices, tree.simplices, tree.boxes, found, no_pairs, start, stop)
+        mark_intersections(tree.vertices, tree.simplices, tree.boxes, nodes, found, no_pairs, start, stop)
 
     def done(count: int) -> None:
         progress("intersections", count, tree.leaves)
@@ -77,6 +104,7 @@ def intersecting_pairs(mesh: TriMesh) -> NDArray[np.int64]:
     tree, count, pairs = Tree.of_faces(mesh), ROOM, np.empty((0, 2), np.int64)
     while count > len(pairs):
         pairs, marked = np.empty((count, 2), np.int64), np.zeros(len(tree.order), np.bool_)
-        count = mark_intersections(tree.vertices, tree.simplices, tree.boxes, marked, pairs, 0, tree.leaves)
+        nodes = np.ones(2 * tree.leaves, np.bool_)
+        count = mark_intersections(tree.vertices, tree.simplices, tree.boxes, nodes, marked, pairs, 0, tree.leaves)
     found = np.sort(tree.order[pairs[:count]].astype(np.int64), axis=1)
     return found[np.lexsort(found.T[::-1])]

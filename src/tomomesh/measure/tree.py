@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,16 +64,22 @@ class Tree:
         vertices = np.ascontiguousarray(vertices, np.float64)
         order = _along_curve(vertices, simplices, threads)
         simplices = simplices.take(order, axis=0)
-        leaves = 1 << max(len(simplices) // LEAF, 1).bit_length() - 1
-        boxes = np.empty((4 * leaves, 3))
-        in_blocks(
-            lambda start, stop: enclose_leaves(vertices, simplices, boxes, start, stop),
-            leaves,
-            block=BLOCK // LEAF,
-            threads=threads,
-        )
-        enclose_nodes(boxes)
-        return cls(vertices, simplices, order, boxes)
+        return cls(vertices, simplices, order, _boxes(vertices, simplices, threads))
+
+    def moved(self, vertices: Floats, *, threads: int = 0) -> Tree:
+        """Return the tree of the same simplices where their vertices have moved a little."""
+        return replace(self, vertices=vertices, boxes=_boxes(vertices, self.simplices, threads))
+
+    def nodes_with(self, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Tell which nodes (2 P,) hold any of some simplices (m,)."""
+        nodes = np.zeros(2 * self.leaves, np.bool_)
+        first = np.arange(self.leaves) * len(self.order) // self.leaves
+        nodes[self.leaves :] = np.logical_or.reduceat(some[self.order], first)
+        level = self.leaves
+        while level > 1:
+            nodes[level // 2 : level] = nodes[level : 2 * level].reshape(-1, 2).any(axis=1)
+            level //= 2
+        return nodes
 
     @property
     def leaves(self) -> int:
@@ -119,6 +125,20 @@ class Tree:
         )
         distance[order], number[order] = np.sqrt(squared), self.order[nearest]
         return distance, number
+
+
+def _boxes(vertices: Floats, simplices: Ints, threads: int) -> Floats:
+    """Return the boxes around the nodes over simplices in the order of the curve."""
+    leaves = 1 << max(len(simplices) // LEAF, 1).bit_length() - 1
+    boxes = np.empty((4 * leaves, 3))
+    in_blocks(
+        lambda start, stop: enclose_leaves(vertices, simplices, boxes, start, stop),
+        leaves,
+        block=BLOCK // LEAF,
+        threads=threads,
+    )
+    enclose_nodes(boxes)
+    return boxes
 
 
 def _along_curve(vertices: Floats, simplices: Ints, threads: int) -> Ints:

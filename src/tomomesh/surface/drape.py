@@ -11,13 +11,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.feet import advance, average, find_feet, list_neighbors, nearest_places, quad_normals
+from ..kernels.feet import (
+    SIGHT,
+    advance,
+    average,
+    first_feet,
+    list_neighbors,
+    nearest_places,
+    quad_normals,
+    renew_feet,
+    split_quads,
+)
 from ..kernels.threads import in_blocks
+from ..model.columns import any_of
 from ..model.trace import Trace
 from ..progress import Progress, silent
 from .search import Index
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from ..settings import FitSettings
@@ -25,17 +38,17 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-BLOCK = 8_192
-"""Vertices worked on in one call: below 100 ms."""
+BLOCK = 4_096
+"""Vertices worked on in one call: below 50 ms, and even shares for several threads."""
 NARROW = 0.68
 """Width of the weights of exact samples, sampling distances."""
 SHARE = 1 / 3
 """Width of the weights over the width with which a sample was settled."""
-SIGHT = 2.5
-"""Standard deviations of the weights that are looked at."""
 STALE = 0.15
 """Way, in cube edges, after which a vertex seeks its foot anew."""
-SEEKING = (2, 4, 7, 10)
+EXACT = 0.05
+"""The same in the end: a plane tells the height of a surface a way w off within w^2 / 2 over its radius."""
+SEEKING = (3, 6, 10)
 """Steps before which feet are sought anew, and vertices are held where they then are; later, feet at every tenth."""
 HOLD = 0.5
 """Stiffness of the spring that holds a vertex where it was, over that of its other springs."""
@@ -125,40 +138,54 @@ def drape(
     Draped
     """
     ground = _Ground.under(vertices, ring, samples, threads)
-    feet = ground.feet(vertices, ring.normals(vertices), ground.first_reach(vertices))
-    anchors = vertices
-    state = np.stack([vertices, np.zeros_like(vertices), vertices], axis=1)
+    feet, anchors = ground.first_feet(vertices, ring.normals(vertices))
+    places, velocities, origins = vertices, np.zeros_like(vertices), vertices
     history: list[Floats] = []
     while len(history) < settings.max_steps and not _rests(history, len(vertices)):
         if history and (len(history) in SEEKING or len(history) % 10 == 0):
-            feet, anchors = ground.renewed(state[:, 0], feet, anchors, STALE * edge)
+            ground.renew(places, STALE * edge, feet, anchors)
             if len(history) in SEEKING:
-                state[:, 2] = state[:, 0]
-        state, sums = _step(state, feet, anchors, ring, edge, settings, threads)
+                origins = places
+        places, sums = _step((places, velocities, origins), feet, anchors, ring, edge, settings, threads)
         history.append(sums)
         progress("fit", len(history), settings.max_steps)
     steps = max(len(history), 1)
     progress("fit", steps, steps)
-    placed = np.ascontiguousarray(state[:, 0])
-    feet = ground.feet(placed, ground.towards(feet, ring.normals(placed)), ground.reach)
-    placed = placed - feet[:, :1] * feet[:, 1:]
-    filled = (feet[:, 1:] == 0).all(axis=1)
-    placed, faces = _split(placed, np.where(filled[:, None], ring.normals(placed), feet[:, 1:]), ring)
-    return Draped(placed, faces, filled, _trace(history, edge, len(vertices)))
+    normals = ring.normals(places)
+    lost = _footless(feet) & (ground.nearest >= 0)
+    feet[lost, 1:], anchors[lost] = normals[lost], np.inf
+    ground.renew(places, EXACT * edge, feet, anchors)
+    height = feet[:, 0] + np.einsum("ij,ij->i", feet[:, 1:], places - anchors)
+    places = places - height[:, None] * feet[:, 1:]
+    filled = _footless(feet)
+    normals = np.where(filled[:, None], normals, feet[:, 1:])
+    places, faces = _split(places, normals, ring)
+    return Draped(places, faces, filled, _trace(history, edge, len(vertices)))
+
+
+def _footless(feet: Floats) -> NDArray[np.bool_]:
+    """Tell which vertices have no foot."""
+    return ~any_of(feet[:, 1:] != 0)
 
 
 def _step(
-    state: Floats, feet: Floats, anchors: Floats, ring: Ring, edge: float, settings: FitSettings, threads: int
+    state: tuple[Floats, Floats, Floats],
+    feet: Floats,
+    anchors: Floats,
+    ring: Ring,
+    edge: float,
+    settings: FitSettings,
+    threads: int,
 ) -> tuple[Floats, Floats]:
-    """Take one step of all vertices; return the new state and what `advance` sums up."""
-    result = np.empty_like(state)
+    """Take one step of all vertices; return where they then are and what `advance` sums up."""
+    result = np.empty_like(state[0])
     rates = np.array([settings.step, settings.damping, edge, HOLD, settings.tolerance * edge])
-    sums = np.zeros((-(-len(state) // BLOCK), 8))
+    sums = np.zeros((-(-len(result) // BLOCK), 8))
 
     def work(begin: int, end: int) -> None:
-        advance(state, feet, anchors, ring.start, ring.neighbors, rates, result, sums[begin // BLOCK], begin, end)
+        advance(*state, feet, anchors, ring.start, ring.neighbors, rates, result, sums[begin // BLOCK], begin, end)
 
-    in_blocks(work, len(state), block=BLOCK, threads=threads)
+    in_blocks(work, len(result), block=BLOCK, threads=threads)
     return result, np.concatenate([sums[:, :2].max(axis=0), sums[:, 2:].sum(axis=0)])
 
 
@@ -190,69 +217,38 @@ class _Ground:
         index = Index.of(samples.positions, SIGHT * float(np.median(width)))
         rows = rows[index.order]
         vertex = _nearest(rows, vertices, index.frame[3], threads)
-        facing = (ring.normals(vertices)[vertex] * rows[:, 3:6]).sum(axis=1)
+        facing = np.einsum("ij,ij->i", ring.normals(vertices)[vertex], rows[:, 3:6])
         rows[:, 3:6] *= np.where(facing < 0, -1.0, 1.0)[:, None]
-        rows = rows[vertex >= 0] if (vertex < 0).any() else rows
-        index = Index.of(rows[:, :3], index.frame[3])
-        rows = np.ascontiguousarray(rows[index.order])
+        if (vertex < 0).any():
+            rows = rows[vertex >= 0]
+            index = Index.of(rows[:, :3], index.frame[3])
+            rows = np.ascontiguousarray(rows[index.order])
         near = np.empty(len(vertices), np.int32)
-        cells = index.cells
-        in_blocks(
-            lambda a, b: nearest_places(vertices, rows, *cells, near, a, b), len(vertices), block=BLOCK, threads=threads
-        )
-        return cls(rows, index, near, threads)
+        ground = cls(rows, index, near, threads)
+        ground.run(lambda a, b: nearest_places(vertices, rows, *index.cells, near, a, b))
+        return ground
 
-    @property
-    def reach(self) -> Floats:
-        """How far each vertex looks, (n,); 0 where it has no sample near."""
-        return np.where(self.nearest >= 0, SIGHT * self.samples[self.nearest, 6], 0.0)
-
-    def first_reach(self, places: Floats) -> Floats:
-        """How far each place looks before the mesh has moved: to the nearest sample and on, (n,)."""
-        away = np.sqrt(((self.samples[self.nearest, :3] - places) ** 2).sum(axis=1))
-        return np.where(self.nearest >= 0, self.reach + away, 0.0)
-
-    def feet(self, places: Floats, normals: Floats, reach: Floats) -> Floats:
-        """Return height and normal of the surface below places, (n, 4)."""
-        feet = np.empty((len(places), 4))
-        cells = self.index.cells
-
-        def work(begin: int, end: int) -> None:
-            find_feet(places, normals, reach, self.samples, *cells, feet, begin, end)
-
-        in_blocks(work, len(places), block=BLOCK, threads=self.threads)
-        return feet
-
-    def renewed(self, places: Floats, feet: Floats, anchors: Floats, stale: float) -> tuple[Floats, Floats]:
-        """Seek the feet of those vertices anew that have moved some way from where theirs were sought."""
-        moved = np.flatnonzero(((places - anchors) ** 2).sum(axis=1) > stale**2)
-        moved = moved[(feet[moved, 1:] != 0).any(axis=1)]
-        found = self.feet(np.ascontiguousarray(places[moved]), np.ascontiguousarray(feet[moved, 1:]), self.reach[moved])
-        feet, anchors = feet.copy(), anchors.copy()
-        feet[moved], anchors[moved] = found, places[moved]
+    def first_feet(self, places: Floats, normals: Floats) -> tuple[Floats, Floats]:
+        """Return height and normal of the surface under each place (n, 4), and where it was measured (n, 3)."""
+        feet, anchors, cells = np.empty((len(places), 4)), np.empty_like(places), self.index.cells
+        self.run(lambda a, b: first_feet(places, normals, self.nearest, self.samples, *cells, feet, anchors, a, b))
         return feet, anchors
 
-    def towards(self, feet: Floats, normals: Floats) -> Floats:
-        """Return the normals of the feet, and the mesh's own where there is none."""
-        seen = (feet[:, 1:] != 0).any(axis=1, keepdims=True)
-        return np.ascontiguousarray(np.where(seen, feet[:, 1:], normals))
+    def renew(self, places: Floats, stale: float, feet: Floats, anchors: Floats) -> None:
+        """Seek the feet of those vertices anew that have moved some way from where theirs were sought."""
+        cells = self.index.cells
+        self.run(lambda a, b: renew_feet(places, self.nearest, self.samples, *cells, stale, feet, anchors, a, b))
+
+    def run(self, work: Callable[[int, int], None]) -> None:
+        """Do something with all vertices, range by range."""
+        in_blocks(work, len(self.nearest), block=BLOCK, threads=self.threads)
 
 
 def _split(vertices: Floats, normals: Floats, ring: Ring) -> tuple[Floats, NDArray[np.int64]]:
-    """Split the squares by the diagonals nearer to the surface, and raise their corners by a part of the sagitta.
-
-    A chord d between places with normals m and n lies (n - m) d / 8 below the middle of the arc.
-    """
-    first, second = (
-        ((normals[two] - normals[one]) * (vertices[two] - vertices[one])).sum(axis=1) / 8
-        for one, two in (ring.quads.T[[0, 2]], ring.quads.T[[1, 3]])
-    )
-    turned = (np.abs(second) < np.abs(first)).astype(np.int64)
-    mean = np.bincount(ring.quads.ravel(), np.repeat(0.5 * (first + second), 4), len(vertices))
-    rise = SAGITTA * mean / np.diff(ring.start)
-    a, b, c, d = (ring.quads[np.arange(len(turned)), (turned + n) % 4] for n in range(4))
-    faces = np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3).astype(np.int64)
-    return vertices + rise[:, None] * normals, faces
+    """Split the squares by the diagonals nearer to the surface, and raise their corners by a part of the sagitta."""
+    faces, raised = np.empty((2 * len(ring.quads), 3), np.int32), np.empty_like(vertices)
+    split_quads(vertices, normals, ring.quads, SAGITTA, np.zeros((len(vertices), 2)), faces, raised)
+    return raised, faces.astype(np.int64)
 
 
 def _nearest(rows: Floats, vertices: Floats, edge: float, threads: int) -> NDArray[np.int64]:

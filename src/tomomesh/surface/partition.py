@@ -5,18 +5,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..errors import EmptyError, ResourceError
+from ..kernels.sweep import neighbor_distances
+from ..kernels.threads import in_blocks
+from ..model.columns import box
 from ..model.cubes import MARGIN, SIDE, CubeGrid, keys_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-ASKED = 10_000
+ASKED = 5_000
 """Points whose neighbors are sought to find the sampling distance of all."""
-
+BLOCK = 250
+"""Of them, those worked on in one call."""
 
 FLAT = 1e-6
 """Thickness of points, over a length that is given, under which they count as flat."""
@@ -67,8 +70,8 @@ def cubes_over(
     """
     if len(positions) == 0:
         raise EmptyError("there are no points", expected="at least one")
-    low = positions.min(axis=0)
-    widest = (positions.max(axis=0) - low).max()
+    low, high = box(positions)
+    widest = (high - low).max()
     if (widest / cell_mm).max() > SIDE - 2 * MARGIN - 2:
         raise ResourceError(
             "the cubes are too small for the extent of the points",
@@ -87,7 +90,7 @@ def is_flat(positions: NDArray[np.float64], length: float) -> bool:
     return bool(variance[-1] <= (FLAT * length) ** 2)
 
 
-def sampling_distance(positions: NDArray[np.float64], *, neighbors: int = 6) -> float:
+def sampling_distance(positions: NDArray[np.float64], *, neighbors: int = 6, threads: int = 0) -> float:
     """Estimate the distance of neighboring samples of a surface, from their positions alone.
 
     If points lie s apart, so that each owns s^2 of the surface, the k-th neighbor is about s sqrt(k / pi)
@@ -97,7 +100,7 @@ def sampling_distance(positions: NDArray[np.float64], *, neighbors: int = 6) -> 
     ----------
     positions : (n, 3) float array
         Each once.
-    neighbors : int
+    neighbors, threads : int
 
     Returns
     -------
@@ -107,6 +110,14 @@ def sampling_distance(positions: NDArray[np.float64], *, neighbors: int = 6) -> 
     k = min(neighbors, len(positions) - 1)
     if k < 1:
         return 1.0
-    tree = cKDTree(positions, balanced_tree=False, compact_nodes=False)
-    distance, _ = tree.query(positions[:: -(-len(positions) // ASKED)], k=[k + 1])
+    low, high = box(positions)
+    axis, stride = int(np.argmax(high - low)), -(-len(positions) // ASKED)
+    along = positions[np.argsort(positions[:, axis], kind="stable")]
+    distance = np.empty(len(range(0, len(along), stride)))
+    in_blocks(
+        lambda begin, end: neighbor_distances(along, axis, k, stride, distance, begin, end),
+        len(distance),
+        block=BLOCK,
+        threads=threads,
+    )
     return float(np.median(distance) * np.sqrt(np.pi / k))

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..kernels.samples import fit_planes, local_spacing, region_medians, settle
 from ..kernels.threads import in_blocks
+from ..model.columns import any_of
 from ..progress import Progress, silent
 from .partition import sampling_distance
 from .search import Index
@@ -58,6 +59,8 @@ LOOSE = 0.3
 """Least distance of the neighbors from the quadratic under a point, sampling distances, from which it is a stray."""
 SPARSE = 8.0
 """Spacing over that of the whole cloud from which a point is a stray, whatever its region is like."""
+STRAIGHTER = 0.9
+"""Share of the points around which the surface bends less than it is said to."""
 OFF = 5.0
 """Distance from the surface under a point, over the region's, from which it is a stray."""
 
@@ -80,6 +83,8 @@ class Samples:
         Standard deviation of the weights with which each was settled.
     strays : int
         Points left out.
+    bend : float
+        How far the points around a point lie off a plane, over how far they lie apart, at the `STRAIGHTER` of them.
     """
 
     positions: Floats
@@ -88,6 +93,7 @@ class Samples:
     noise: Floats
     width: Floats
     strays: int
+    bend: float
 
 
 def settle_points(positions: Floats, *, threads: int = 0, progress: Progress = silent) -> Samples:
@@ -113,10 +119,10 @@ def settle_points(positions: Floats, *, threads: int = 0, progress: Progress = s
     is all but the fit to the points.
     """
     points = distinct(positions)
-    apart = sampling_distance(points)
+    apart = sampling_distance(points, threads=threads)
     if len(points) < LEAST_POINTS:
         level = np.full(len(points), apart)
-        return Samples(points, np.zeros_like(points), level, 0 * level, level, 0)
+        return Samples(points, np.zeros_like(points), level, 0 * level, level, 0, 1.0)
     cloud = _Cloud.of(np.column_stack([points, np.ones(len(points))]), apart, threads, progress)
     spacing, stray = cloud.spacing()
     planes, noise, width = cloud.planes(spacing)
@@ -133,7 +139,8 @@ def settle_points(positions: Floats, *, threads: int = 0, progress: Progress = s
     stray |= settled[:, 6] > np.maximum(OFF * noise, LOOSE * spacing)
     kept = np.flatnonzero(~stray)
     strays = int(len(points) - cloud.points[kept, 3].sum())
-    return Samples(settled[kept, :3], settled[kept, 3:6], spacing[kept], noise[kept], width[kept], strays)
+    bend = float(np.quantile(planes[kept, 4] / spacing[kept], STRAIGHTER)) if len(kept) else 1.0
+    return Samples(settled[kept, :3], settled[kept, 3:6], spacing[kept], noise[kept], width[kept], strays, bend)
 
 
 @dataclass(frozen=True)
@@ -211,8 +218,13 @@ def _merged(points: Floats, edge: float) -> Floats:
 
 def distinct(positions: Floats) -> Floats:
     """Return each position once, in the order of x, then y, then z."""
-    placed = positions[np.lexsort(positions.T[::-1])]
-    return np.asarray(placed[np.append(True, (placed[1:] != placed[:-1]).any(axis=1))])
+    order = np.argsort(positions[:, 0], kind="stable")
+    along = positions[order, 0]
+    again = along[1:] == along[:-1]
+    tied = np.flatnonzero(np.append(again, False) | np.append(False, again))
+    order[tied] = order[tied][np.lexsort(positions[order[tied]].T[::-1])]
+    placed = positions[order]
+    return np.asarray(placed[np.append(True, any_of(placed[1:] != placed[:-1]))])
 
 
 def _width(noise: Floats, spacing: Floats) -> Floats:

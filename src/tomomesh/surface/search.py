@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import ResourceError
 from ..kernels.samples import BITS
+from ..model.columns import box
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,7 +51,8 @@ class Index:
         ResourceError
             Where the points reach farther than cubes can be numbered.
         """
-        origin, widest = positions.min(axis=0), float(np.ptp(positions, axis=0).max())
+        origin, highest = box(positions)
+        widest = float((highest - origin).max())
         most = EDGE << BITS
         if widest / edge >= most:
             raise ResourceError(

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import GeometryError
+from ..model.columns import any_of
 from ..model.cubes import cells_of
 from ..model.mesh import TriMesh
 from .borders import borders
@@ -27,8 +28,6 @@ from .untangle import untangle
 from .walls import walls
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from ..progress import Progress
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
     from .borders import Borders
     from .bridges import Bridges
     from .samples import Samples
+    from .untangle import Tangled
 
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
@@ -106,7 +106,7 @@ def open_sheet(
     spanned: Bridges,
     cell: Floats,
     settings: Settings,
-    tangled: Callable[[TriMesh], NDArray[np.bool_]],
+    tangled: Tangled,
     progress: Progress,
 ) -> OpenSheet:
     """Turn the samples of an open surface into a one-sided sheet.
@@ -149,7 +149,7 @@ def open_sheet(
         crossing = tangled(sheet)
         if not crossing.any():
             break
-    filled = np.asarray(draped.filled[mesh.faces].any(axis=1))[source]
+    filled = any_of(draped.filled[mesh.faces])[source]
     quads, smoothed = ring.quads.astype(np.int64), TriMesh(wall.smoothed, mesh.faces)
     return OpenSheet(
         wall.held, wall.cubes, wall.lattice, quads, wall.cells, smoothed, sheet, filled, crossing,

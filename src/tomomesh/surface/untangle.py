@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..model.columns import any_of
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -13,6 +15,8 @@ if TYPE_CHECKING:
 
     from ..model.mesh import TriMesh
     from .drape import Ring
+
+    Tangled = Callable[..., NDArray[np.bool_]]
 
 ROUNDS = 24
 """Rounds after which what still passes through itself is left, and reported."""
@@ -23,7 +27,7 @@ BACK = 0.25
 
 
 def untangle(
-    mesh: TriMesh, origin: NDArray[np.float64], ring: Ring, tangled: Callable[[TriMesh], NDArray[np.bool_]]
+    mesh: TriMesh, origin: NDArray[np.float64], ring: Ring, tangled: Tangled
 ) -> tuple[TriMesh, int, NDArray[np.bool_]]:
     """Smooth a mesh where it passes through itself, and take it back towards where it came from.
 
@@ -35,7 +39,7 @@ def untangle(
     ring : Ring
         The neighbors of its vertices.
     tangled : callable
-        Marks the faces (m,) of a mesh that pass through others.
+        Marks the faces (m,) of a mesh that pass through others; told which vertices have moved since it last did.
 
     Returns
     -------
@@ -56,7 +60,7 @@ def untangle(
         if count >= GENTLE:
             vertices += BACK * (origin - vertices)
         mesh = mesh.moved(np.where(region[:, None], vertices, mesh.vertices))
-        marked = tangled(mesh)
+        marked = tangled(mesh, region)
     return mesh, int(moved.sum()), marked
 
 
@@ -65,5 +69,5 @@ def _around(mesh: TriMesh, marked: NDArray[np.bool_], steps: int) -> NDArray[np.
     region = np.zeros(len(mesh.vertices), bool)
     region[mesh.faces[marked]] = True
     for _ in range(steps):
-        region[mesh.faces[region[mesh.faces].any(axis=1)]] = True
+        region[mesh.faces[any_of(region[mesh.faces])]] = True
     return region
