@@ -164,9 +164,9 @@ def _hold(count: int, samples: Samples, settings: Settings, progress: Progress) 
         held = hold(
             cells, steps, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
         )  # fmt: skip
-        if best is None or held.two_sided > best.held.two_sided:
+        if best is None or held.two_sided >= SURE or held.is_better_than(best.held):
             best = _Shell(cell, lowest, len(cells), spanned, held)
-        if best.held.two_sided >= SURE:
+        if held.two_sided >= SURE:
             break
     assert best is not None
     return best

@@ -50,6 +50,12 @@ class Held:
         """Whether the outside stays out."""
         return self.two_sided >= HELD
 
+    def is_better_than(self, other: Held) -> bool:
+        """Tell which is nearer to the object: where both hold, the one of fewer handles, for noise makes handles."""
+        if self.holds and other.holds and self.walls.handles != other.walls.handles:
+            return self.walls.handles < other.walls.handles
+        return self.two_sided > other.two_sided
+
 
 def hold(
     cells: NDArray[np.int64],
@@ -75,7 +81,7 @@ def hold(
     Returns
     -------
     Held
-        The first that surely holds, else the one that holds best; closed by `LEAKING` where none holds at all.
+        The first that surely holds, else the best that holds; closed by `LEAKING` where none holds at all.
     """
     tried = list(closings)
     best: Held | None = None
@@ -86,8 +92,8 @@ def hold(
             continue
         found = walls(shell)
         held = Held(shell, found, found.least_two_sided)
-        best = held if best is None or held.two_sided > best.two_sided else best
-        if best.two_sided >= SURE:
+        best = held if best is None or held.two_sided >= SURE or held.is_better_than(best) else best
+        if held.two_sided >= SURE:
             break
     progress("closing", len(tried), len(tried))
     if best is None:

@@ -98,6 +98,11 @@ class Walls:
         return np.asarray(np.bincount(self.face_labels, self.witness, self.count) / np.maximum(occupied, 1))
 
     @property
+    def handles(self) -> int:
+        """Handles of all surfaces together: every edge has two faces of four sides, so V - E + F is V - F."""
+        return self.count - (len(self.corners) - len(self.quads)) // 2
+
+    @property
     def debris(self) -> NDArray[np.bool_]:
         """Which surfaces are crumbs: small, and around nothing, (count,)."""
         crumbs = (self.sizes < CRUMB * self.sizes.sum()) & (self.two_sided == 0)
