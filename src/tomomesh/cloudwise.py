@@ -18,6 +18,7 @@ from .surface.drape import Draped, Ring, drape
 from .surface.forecast import require_room, require_room_for_points
 from .surface.gaps import gaps
 from .surface.holding import SURE, hold
+from .surface.neighbors import once_each
 from .surface.partition import cubes_over, is_flat
 from .surface.samples import Samples, settle_points
 from .surface.sheet import open_sheet
@@ -159,7 +160,7 @@ def _hold(count: int, samples: Samples, settings: Settings, progress: Progress) 
         require_room(count, samples, cell)
         spanned = bridges(samples, float(cell.min()), span=span, threads=settings.run.threads, progress=progress)
         lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
-        cells = cells_of(np.unique(keys))
+        cells = cells_of(once_each(keys))
         steps = [k for k in tried if cubes.closing is not None or k * cell.min() <= reach]
         held = hold(
             cells, steps, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress

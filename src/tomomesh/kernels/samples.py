@@ -365,8 +365,17 @@ def settle(
             settled[p, 3 + axis] = (planes[p, axis] - tilt) / length
 
 
-@kernel("void(f8[::1], i8[::1], i8[::1], i8, f8, f8[::1])")
-def region_medians(values: Floats, order: Integers, start: Integers, few: int, usual: float, medians: Floats) -> None:
+@kernel("void(f8[::1], i8[::1], i8[::1], i8, f8, f8[::1], i8, i8)")
+def region_medians(
+    values: Floats,
+    order: Integers,
+    start: Integers,
+    few: int,
+    usual: float,
+    medians: Floats,
+    begin: int,
+    end: int,
+) -> None:
     """Find the median of the values in each region.
 
     Parameters
@@ -380,8 +389,10 @@ def region_medians(values: Floats, order: Integers, start: Integers, few: int, u
         What such a region is given.
     medians : (p,) float array
         Result: the median of the region of each point.
+    begin, end : int
+        Regions to work on.
     """
-    for q in range(len(start) - 1):
+    for q in range(begin, end):
         mine = order[start[q] : start[q + 1]]
         median = usual
         if len(mine) >= few:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import threading
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from collections import deque
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
+from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -54,17 +56,35 @@ def _in_pool(
     workers: int,
     done: Callable[[int], None],
 ) -> None:
-    waiting = {_pool(workers).submit(work, start, min(start + block, total)) for start in starts}
-    finished = 0
+    waiting, told = deque(starts), SimpleQueue[BaseException | None]()
+
+    def work_on() -> None:
+        while start := _next(waiting):
+            try:
+                work(start[0], min(start[0] + block, total))
+            except BaseException as failure:
+                told.put(failure)  # the calling thread raises it
+                return
+            told.put(None)
+
+    at_work = [_pool(workers).submit(work_on) for _ in range(workers)]
     try:
-        while waiting:
-            ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-            for future in ready:
-                future.result()
-            finished = min(finished + len(ready) * block, total)
-            done(finished)
+        for finished in range(1, len(starts) + 1):
+            failure = told.get()
+            if failure is not None:
+                raise failure
+            done(min(finished * block, total))
     finally:
-        wait([future for future in waiting if not future.cancel()])
+        waiting.clear()
+        wait(at_work)
+
+
+def _next(waiting: deque[int]) -> tuple[int, ...]:
+    """Take the next block; none is left for a thread that comes too late."""
+    try:
+        return (waiting.popleft(),)
+    except IndexError:
+        return ()
 
 
 @cache

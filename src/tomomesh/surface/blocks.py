@@ -12,7 +12,7 @@ from ..kernels.boards import grow_along, list_cubes
 from ..kernels.cells import label_components
 from ..kernels.threads import in_blocks
 from ..model.cubes import SIDE, cells_of, keys_of
-from .neighbors import FACE_COLUMNS, dilate, neighbor_table
+from .neighbors import FACE_COLUMNS, dilate, neighbor_table, once_each
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -56,7 +56,7 @@ class Blocks:
     @classmethod
     def around(cls, cells: NDArray[np.int64], margin: int, *, threads: int = 0) -> Blocks:
         """Take every block within some cubes of the given cells (x, y, z), (c, 3)."""
-        keys = np.unique(keys_of(cells // EDGE))
+        keys = once_each(keys_of(cells // EDGE))
         for _ in range(-(-margin // EDGE)):
             keys = dilate(_few_enough(keys), 1)
         wide = dilate(_few_enough(keys), 1)

@@ -31,6 +31,8 @@ SIGHT = 2.25
 """Radius, in sampling distances, within which neighbors are counted: about 16 of them."""
 REGION = 12
 """Edge of the cubes over which spacing and noise are taken as even, sampling distances."""
+REGIONS = 64
+"""Of these cubes, those worked on in one call."""
 FEW = 8
 """Points under which a region has no say of its own."""
 LEAST, MOST = 0.7, 3.4
@@ -157,7 +159,7 @@ class _Cloud:
     def of(cls, points: Floats, apart: float, threads: int, progress: Progress) -> _Cloud:
         index = Index.of(points[:, :3], SIGHT * apart)
         points = np.ascontiguousarray(points[index.order])
-        return cls(points, index, _Regions.of(points[:, :3], REGION * apart), threads, progress)
+        return cls(points, index, _Regions.of(points[:, :3], REGION * apart, threads), threads, progress)
 
     def spacing(self) -> tuple[Floats, NDArray[np.bool_]]:
         """Return how far apart the points lie around each, and which are too far from all others."""
@@ -237,13 +239,20 @@ class _Regions:
     """Cubes over which something is taken as even: large, so that edges and thin spots of a surface do not count."""
 
     index: Index
+    threads: int
 
     @classmethod
-    def of(cls, points: Floats, edge: float) -> _Regions:
-        return cls(Index.of(points, edge))
+    def of(cls, points: Floats, edge: float, threads: int) -> _Regions:
+        return cls(Index.of(points, edge), threads)
 
     def median(self, values: Floats) -> Floats:
         """Return the median of the region of each point, (p,); that of all points where a region has few."""
-        medians, values = np.empty(len(values)), np.ascontiguousarray(values)
-        region_medians(values, self.index.order, self.index.groups, FEW, float(np.median(values)), medians)
+        medians, values, usual = np.empty(len(values)), np.ascontiguousarray(values), float(np.median(values))
+        order, groups = self.index.order, self.index.groups
+        in_blocks(
+            lambda begin, end: region_medians(values, order, groups, FEW, usual, medians, begin, end),
+            len(groups) - 1,
+            block=REGIONS,
+            threads=self.threads,
+        )
         return medians

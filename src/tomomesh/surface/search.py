@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ResourceError
+from ..kernels.bvh import order_keys
 from ..kernels.samples import BITS
 from ..model.columns import box
 
@@ -64,16 +65,24 @@ class Index:
         x, y, z = ((positions - origin) / edge).astype(np.int64).T
         local = ((z % EDGE) * EDGE + y % EDGE) * EDGE + x % EDGE
         keys = ((((z // EDGE << BITS) | y // EDGE) << BITS) | x // EDGE) * EDGE**3 + local
-        order = np.argsort(keys, kind="stable")
+        order = np.empty(len(keys), np.int32)
+        order_keys(keys, order)
         keys = keys[order]
         groups = np.append(np.flatnonzero(np.append(True, keys[1:] != keys[:-1])), len(keys))
         cubes = keys[groups[:-1]]
-        blocks, block = np.unique(cubes // EDGE**3, return_inverse=True)
+        blocks, block = _numbered(cubes // EDGE**3)
         count = np.zeros(len(blocks) * EDGE**3 + 1, np.int32)
         count[block * EDGE**3 + cubes % EDGE**3 + 1] = np.diff(groups)
-        return cls(order, groups, blocks, np.cumsum(count, dtype=np.int32), np.append(origin, edge))
+        start = np.cumsum(count, dtype=np.int32)
+        return cls(order.astype(np.int64), groups, blocks, start, np.append(origin, edge))
 
     @property
     def cells(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
         """What kernels take: blocks, start and frame."""
         return self.blocks, self.start, self.frame
+
+
+def _numbered(rising: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return each of some rising numbers once, and which of these each is."""
+    new = np.append(True, rising[1:] != rising[:-1])
+    return rising[new], np.cumsum(new) - 1
