@@ -13,7 +13,7 @@ from tomomesh import Settings, phantom, reconstruct, write_mesh
 
 if TYPE_CHECKING:
     from tomomesh.phantom import Phantom
-    from tomomesh.pipeline import Surface
+    from tomomesh.results import Surface
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tomomesh import Volume
-    from tomomesh.pipeline import Surface
+    from tomomesh.results import Surface
 
 
 def main() -> None:

@@ -5,32 +5,57 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
+from tomomesh import SOM, phantom, window
 from tomomesh.cli import main
+from tomomesh.model.lattice import lattice
+from tomomesh.show.film import film_slice
+from tomomesh.show.plane import Plane
 
 IMAGES = Path(__file__).parent / "images"
-BOX = (900, 660)
+BOX, PAGE = (900, 660), (1000, 1300)
+FILMED = 10
+"""Slice of the head on which a network is filmed."""
 
 
 def draw() -> None:
-    """Run the demo and the paper's triangle, and keep their pictures in a small form."""
+    """Run the demo and networks on test regions, and keep their pictures in a small form."""
     IMAGES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
-        demo, triangle = f"{folder}/demo", f"{folder}/triangle"
+        demo, triangle, square = (f"{folder}/{name}" for name in ("demo", "triangle", "square"))
         main(["demo", "-o", demo, "--quiet"])
-        main(["network", "triangle", "--paper", "--neurons", "50", "-o", triangle, "--quiet"])
-        figures = sorted([*Path(demo, "figures").glob("*.png"), *Path(triangle).glob("*.png")])
+        main(["network", "square", "--network", "hexagonal", "--neurons", "100", "-o", square, "--quiet"])
+        main(["network", "triangle", "--paper", "--neurons", "50", "--film", "-o", triangle, "--quiet"])
+        figures = [path for source in (square, f"{demo}/figures", triangle) for path in Path(source).glob("*.png")]
         pictures = {path.stem: Image.open(path).convert("RGB") for path in figures}
-    for name, picture in pictures.items():
-        keep(picture, name)
+        (IMAGES / "02-film.gif").write_bytes(Path(triangle, "02-film.gif").read_bytes())
+    for name, picture in sorted(pictures.items()):
+        if not name.startswith("06-slices") or name == "06-slices-1":
+            keep(picture, name, box=PAGE if name == "06-slices-1" else BOX)
+    (IMAGES / "06-film.gif").write_bytes(filmed())
     keep(overview(pictures), "phantom")
 
 
-def keep(picture: Image.Image, name: str) -> None:
+def filmed() -> bytes:
+    """Train a ring on a slice of the head from a random start, looking on."""
+    head = phantom()
+    mask = window(head.volume, lower=head.lower, upper=head.upper)[FILMED]
+    spacing_mm = head.volume.spacing_mm[:2]
+    pixels = np.argwhere(mask)[:, ::-1] * spacing_mm
+    codebooks = [pixels[np.random.default_rng(0).integers(len(pixels), size=58)]]
+    ring = SOM(58, topology="ring", start=codebooks[0], epochs=12, pixel_area=spacing_mm[0] * spacing_mm[1])
+    ring.set_params(callback=lambda codebook, epoch: codebooks.append(codebook)).fit(pixels)
+    notes = [f"ring of 58 neurons, {epoch} of 12 epochs" for epoch in range(13)]
+    places = [codebook / spacing_mm for codebook in codebooks]
+    return film_slice(mask, places, lattice("ring", 58), Plane(spacing_mm), notes=notes)
+
+
+def keep(picture: Image.Image, name: str, *, box: tuple[int, int] = BOX) -> None:
     """Write a picture with few pixels, and five bits a color."""
     small = picture.copy()
-    small.thumbnail(BOX, Image.Resampling.LANCZOS)
+    small.thumbnail(box, Image.Resampling.LANCZOS)
     small.point([min(round(level / 8) * 8, 255) for level in range(256)] * 3).save(
         IMAGES / f"{name}.png", optimize=True
     )

@@ -7,14 +7,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tomomesh.cli.options import spellings
-from tomomesh.settings import UNSET, limits_of, option_of, parameters
+from tomomesh.settings import LAYERS, MANY, UNSET, limits_of, option_of, parameters
 
 if TYPE_CHECKING:
     from dataclasses import Field
 
 PAGE = Path(__file__).parent / "command-line.md"
 HEAD = ["| option | what | unit | allowed | default | `--paper` |", "|---|---|---|---|---|---|"]
-COUNTS = {(): "", (1, 3): "one or three: ", (2,): "two: ", (3,): "three: "}
+COUNTS = {
+    (): "",
+    (1, 3): "one or three: ",
+    (2,): "two: ",
+    (3,): "three: ",
+    MANY: "any number, with commas between: ",
+    LAYERS: "one, or one a layer with commas between: ",
+}
 
 
 def write() -> None:

@@ -13,7 +13,7 @@ from tomomesh.errors import GeometryError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tomomesh.pipeline import Surface
+    from tomomesh.results import Surface
 
     Floats = NDArray[np.float64]
 

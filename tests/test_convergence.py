@@ -10,12 +10,14 @@ import pytest
 from conftest import COMPILED, sphere, torus
 from tomomesh.measure.report import area_samples
 from tomomesh.measure.topology import topology
-from tomomesh.pipeline import Surface, reconstruct_points
+from tomomesh.pipeline import reconstruct_points
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
+
+    from tomomesh.results import Surface
 
     Floats = NDArray[np.float64]
 

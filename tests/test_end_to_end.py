@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tomomesh.phantom import Phantom
-    from tomomesh.pipeline import Surface
+    from tomomesh.results import Surface
 
 
 @pytest.fixture(scope="module")
@@ -278,8 +278,10 @@ class TestRealStudies:
         assert mesh.is_watertight
         assert mesh.is_winding_consistent
         assert 1.0e6 < mesh.volume < 5.0e6
-        assert found.report["cubes"]["holds"]
-        assert 0.8 < found.report["quality"]["volume_over_rings"] < 1.25
+        advised = any("--contours components" in warning for warning in found.report["warnings"])
+        assert advised == (options.get("lower") == 140)  # scalp and brain in one window are more than one ring
+        assert advised or found.report["cubes"]["holds"]
+        assert advised or 0.8 < found.report["quality"]["volume_over_rings"] < 1.25
 
     def test_a_vendors_slab_of_four_slices_is_closed(self) -> None:
         found = reconstruct(tomomesh.read_volume(shared("dicom2nifti/siemens/anatomical/001")))

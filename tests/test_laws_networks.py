@@ -12,12 +12,12 @@ from scipy.optimize import linprog
 
 from conftest import law, seeds, size
 from tomomesh.errors import EmptyError
-from tomomesh.model.lattice import lattice
+from tomomesh.model.lattice import TOPOLOGIES, lattice
 from tomomesh.segment.region import train_region
 from tomomesh.segment.shapes import SHAPES, shape
 from tomomesh.segment.som import match, start_positions, train
 from tomomesh.segment.study import regions, train_study
-from tomomesh.settings import NetworkSettings
+from tomomesh.settings import FALLS, NetworkSettings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,9 +26,11 @@ PRESENTATIONS = size(2000, 200)
 
 kinds = st.builds(
     NetworkSettings,
-    network=st.sampled_from(["chain", "ring", "grid"]),
+    network=st.sampled_from(TOPOLOGIES),
     training=st.sampled_from(["online", "batch"]),
     neighborhood=st.sampled_from(["bubble", "gaussian"]),
+    alpha_fall=st.sampled_from(FALLS),
+    radius_fall=st.sampled_from(FALLS),
     start=st.just("random"),
     neurons=st.integers(3, 20),
     iterations=st.just(PRESENTATIONS),
@@ -54,11 +56,11 @@ def in_hull(point: NDArray[np.float64], hull: NDArray[np.float64]) -> bool:
 
 class TestHull:
     @law(60)
-    @given(seed=seeds, kind=kinds, d=st.sampled_from([2, 3]))
+    @given(seed=seeds, kind=kinds, d=st.sampled_from([1, 2, 3, 10]))
     def test_the_codebook_stays_inside_the_hull_of_its_inputs(self, seed: int, kind: NetworkSettings, d: int) -> None:
         rng = np.random.default_rng(seed)
         inputs = rng.normal(size=(60, d)) * 10
-        codebook, _ = train(inputs, lattice(kind.network, kind.neurons), kind, rng)
+        codebook, _ = train(inputs, lattice(kind.network, kind.neuron_count), kind, rng)
         slack = 1e-9
         assert (codebook >= inputs.min(axis=0) - slack).all()
         assert (codebook <= inputs.max(axis=0) + slack).all()
@@ -70,11 +72,11 @@ class TestHull:
     @given(seed=seeds, kind=kinds)
     def test_equal_inputs_draw_every_neuron_onto_them(self, seed: int, kind: NetworkSettings) -> None:
         inputs = np.full((30, 3), 7.25)
-        codebook, kept = train(inputs, lattice(kind.network, kind.neurons), kind, np.random.default_rng(seed))
+        codebook, kept = train(inputs, lattice(kind.network, kind.neuron_count), kind, np.random.default_rng(seed))
         np.testing.assert_allclose(codebook, 7.25, rtol=1e-12)
         assert kept.all()
 
-    @pytest.mark.parametrize("name", ["chain", "ring", "grid"])
+    @pytest.mark.parametrize("name", TOPOLOGIES)
     def test_an_ellipse_start_has_the_center_of_its_inputs(self, name: str) -> None:
         inputs = np.random.default_rng(0).normal(size=(500, 2)) * [9, 2] + [100, -50]
         start = start_positions(inputs, lattice(name, 24), "ellipse", np.random.default_rng(0))
@@ -168,7 +170,7 @@ class TestStudy:
 
 class TestRegion:
     @pytest.mark.parametrize("name", SHAPES)
-    @pytest.mark.parametrize("network", ["chain", "ring", "grid"])
+    @pytest.mark.parametrize("network", TOPOLOGIES)
     @pytest.mark.parametrize("training", ["online", "batch"])
     def test_fills_the_paper_s_shapes(self, name: str, network: str, training: str) -> None:
         kind = NetworkSettings(
@@ -183,11 +185,18 @@ class TestRegion:
         trained = train_region(inputs, kind, seed=1)
         again = train_region(inputs, kind, seed=1)
         assert trained.codebook.tobytes() == again.codebook.tobytes()
+        assert trained.measures["seed"] == 1
         assert (trained.codebook >= 0).all()
         assert (trained.codebook <= 1).all()
         _, squared = match(np.ascontiguousarray(trained.codebook.T), np.ascontiguousarray(inputs.T))
         assert trained.measures["quantization_error"] == pytest.approx(np.sqrt(squared).mean())
         assert trained.measures["quantization_error"] < 0.4
+
+    def test_says_so_where_the_learning_rate_falls_faster_than_the_radius(self) -> None:
+        inputs = shape("square")[0][::40]
+        kind = NetworkSettings(training="online", neurons=8, iterations=50, alpha_power=4.0, radius_power=2.0)
+        assert "faster than the radius" in train_region(inputs, kind).measures["warnings"][0]
+        assert not train_region(inputs, NetworkSettings(neurons=8)).measures["warnings"]
 
     def test_wants_an_input_for_every_neuron(self) -> None:
         with pytest.raises(EmptyError, match="5 inputs"):

@@ -13,10 +13,12 @@ from conftest import law, seeds, size, sphere, torus
 from tomomesh.errors import EmptyError, GeometryError, TomomeshError
 from tomomesh.measure.topology import topology
 from tomomesh.model.volume import Volume
-from tomomesh.pipeline import Surface, reconstruct, reconstruct_points
+from tomomesh.pipeline import reconstruct, reconstruct_points
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from tomomesh.results import Surface
 
     Floats = NDArray[np.float64]
 

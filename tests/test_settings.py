@@ -76,7 +76,7 @@ class TestLimits:
     def test_refuse_too_many_values(self, name: str) -> None:
         inside = PARAMETERS[name].default
         one = inside[0] if isinstance(inside, tuple) else 1 if inside is None else inside
-        assert_refused(name, (one,) * 4)
+        assert_refused(name, (one,) * (1 + max(3, *PARAMETERS[name].metadata["length"], 0)))
 
     @pytest.mark.parametrize("name", CHOICES)
     @pytest.mark.parametrize("value", ["nonsense", "", 1, ["auto"]])
@@ -131,7 +131,7 @@ class TestForPaper:
             False,
             0.0,
         )
-        assert (network.neurons, network.iterations) == (58, 10_000)
+        assert (network.neuron_count, network.iterations) == (58, 10_000)
         assert (paper.fit.springs, paper.fit.limit, network.bridge) == ("triangles", "shorten", 0.0)
 
     def test_differs_from_the_defaults_only_where_the_table_says(self) -> None:

@@ -59,9 +59,9 @@ def grid() -> TriMesh:
 def flattened(step: tuple[float, ...], here: tuple[float, ...], there: tuple[float, ...]) -> tuple[bool, Floats]:
     """Lay a neighbor into the plane of a sample; return whether it belongs there, and where it comes to lie."""
     axes, room, flat = np.empty((2, 3)), np.empty((2, 3)), np.empty(2)
-    vectors = [np.array(vector, np.float64) for vector in (step, here, there)]
-    tangents(vectors[1], axes)
-    same = unfold(*vectors, axes, room, flat)
+    way, normal, other = (np.array(vector, np.float64) for vector in (step, here, there))
+    tangents(normal, axes)
+    same = unfold(way, normal, other, axes, room, flat)
     return bool(same), flat @ axes
 
 
@@ -96,7 +96,7 @@ class TestBorders:
         walk = np.linspace(0, 1, 50)
         frame = np.concatenate([np.column_stack([walk, 0 * walk + n]) for n in (0, 1)])
         frame = np.concatenate([frame, frame[:, ::-1]])
-        assert cKDTree(found.samples[:, :2]).query(frame)[0].max() < 4 * apart
+        assert np.max(cKDTree(found.samples[:, :2]).query(frame)[0]) < 4 * apart
 
     def test_are_none_on_a_closed_surface(self) -> None:
         x = np.random.default_rng(1).normal(size=(size(4_000, 600), 3))
@@ -160,7 +160,7 @@ def rim_distance(mesh: trimesh.Trimesh, other: trimesh.Trimesh) -> float:
     walk = np.linspace(0, 1, 30)[:, None, None]
     ends = [one.vertices[rim(one.faces)] for one in (mesh, other)]
     places, others = (((1 - walk) * end[:, 0] + walk * end[:, 1]).reshape(-1, 3) for end in ends)
-    return float(cKDTree(others).query(places)[0].mean())
+    return float(np.mean(cKDTree(others).query(places)[0]))
 
 
 def open_box() -> trimesh.Trimesh:

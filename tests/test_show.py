@@ -346,7 +346,7 @@ class TestGallery:
             )
         )
         assert list(drawn) == [
-            "03-relief", "04-window", "05-regions", "06-network", "07-points",
+            "03-relief", "04-window", "05-regions", "06-network", "06-slices-1", "07-points",
             "08-surfaces", "09-wireframe", "10-shaded", "11-fit",
         ]  # fmt: skip
         assert all(map(is_drawn, drawn.values()))

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import shortest_path
 
 from conftest import law, seeds, size
-from tomomesh.errors import UsageError
+from tomomesh.kernels import batch as batch_kernels
 from tomomesh.kernels import som as kernels
-from tomomesh.model.lattice import Lattice, lattice
+from tomomesh.kernels.neighborhoods import BUBBLE, GAUSSIAN, LATERAL, weigh
+from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
+from tomomesh.segment import wide
 from tomomesh.segment.som import match
 
 if TYPE_CHECKING:
@@ -22,31 +23,43 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-TOPOLOGIES = ["chain", "ring", "grid"]
+Train = Callable[..., int]
+
 topologies = st.sampled_from(TOPOLOGIES)
 
 
-def online(codebook: Floats, shown: Floats, graph: Lattice, alpha: Floats, radius: Floats, gaussian: bool) -> Floats:
+def follows(shape: int, hops: int, radius: float) -> float:
+    """Return the neighborhood as it is described."""
+    if shape == GAUSSIAN:
+        return float(np.exp(-0.5 * (hops / radius) ** 2)) if hops <= 6 * radius else 0.0
+    if hops <= radius:
+        return 1.0
+    if shape == BUBBLE or hops > 9 * radius:
+        return 0.0
+    return -0.03 if hops <= 3 * radius else 0.0015
+
+
+def online(codebook: Floats, shown: Floats, graph: Lattice, alpha: Floats, radius: Floats, shape: int) -> Floats:
     """Present inputs one by one: eq. 1 and 2 as they are printed, for (u, d) neurons."""
     m = codebook.copy()
     for x, rate, reach in zip(shown, alpha, radius, strict=True):
         c = int(np.argmin([np.linalg.norm(x - neuron) for neuron in m]))
         for i in range(len(m)):
-            hops = graph.hops[c, i]
-            h = np.exp(-0.5 * (hops / reach) ** 2) if gaussian else float(hops <= reach)
-            m[i] += rate * h * (x - m[i])
+            m[i] += rate * follows(shape, int(graph.hops[c, i]), reach) * (x - m[i])
+        if shape == LATERAL:
+            m = np.clip(m, shown.min(axis=0), shown.max(axis=0))
     return m
 
 
-def batch(codebook: Floats, inputs: Floats, hops: NDArray[np.int32], weights: Floats) -> Floats:
+def batch(codebook: Floats, inputs: Floats, amounts: Floats, hops: NDArray[np.int32], weights: Floats) -> Floats:
     """Move every neuron to the weighted mean of the inputs, for (u, d) neurons and (n, d) inputs."""
     m = codebook.copy()
     for by_hop in weights:
         distance = np.linalg.norm(inputs[:, None] - m, axis=2)
-        h = by_hop[hops[:, distance.argmin(axis=1)]]
+        h = by_hop[hops[:, distance.argmin(axis=1)]] * amounts
         reached = h.sum(axis=1)
         mean = (h @ inputs) / np.where(reached > 0, reached, 1)[:, None]
-        m = np.where(reached[:, None] > 0, mean, m)
+        m = np.where(reached[:, None] > 0, np.clip(mean, inputs.min(axis=0), inputs.max(axis=0)), m)
     return m
 
 
@@ -57,79 +70,88 @@ def made(seed: int, name: str, d: int, n: int) -> tuple[Lattice, Floats, Floats,
     return graph, rng.normal(size=(len(graph), d)) * 5, rng.normal(size=(n, d)) * 5, rng
 
 
+def box_of(inputs: Floats) -> Floats:
+    return np.stack([inputs.min(axis=0), inputs.max(axis=0)])
+
+
+shapes = st.sampled_from([BUBBLE, GAUSSIAN, LATERAL])
+
+
+class TestNeighborhood:
+    @law(60)
+    @given(shape=shapes, radius=st.floats(0.01, 30), scale=st.floats(0.01, 1), most=st.integers(0, 60))
+    def test_is_its_description(self, shape: int, radius: float, scale: float, most: int) -> None:
+        weight = np.full(most + 1, np.nan)
+        reach = weigh(weight, radius, scale, shape)
+        wanted = [scale * follows(shape, hops, radius) for hops in range(most + 1)]
+        np.testing.assert_allclose(weight[: reach + 1], wanted[: reach + 1], rtol=1e-9)
+        assert not any(wanted[reach + 1 :])
+
+
 class TestOnline:
-    @law(40)
-    @given(seed=seeds, name=topologies, d=st.integers(2, 3), gaussian=st.booleans())
-    def test_is_the_definition(self, seed: int, name: str, d: int, gaussian: bool) -> None:
+    @law(60)
+    @given(seed=seeds, name=topologies, d=st.integers(2, 4), shape=shapes)
+    def test_is_the_definition(self, seed: int, name: str, d: int, shape: int) -> None:
         graph, start, shown, rng = made(seed, name, d, 60)
         alpha, radius = rng.uniform(0, 0.1, 60), rng.uniform(0.5, len(graph) / 2, 60)
-        codebook = start.T.copy(order="C")
-        kernels.train_online(codebook, shown, graph.hops, graph.nearest_first, graph.within, alpha, radius, gaussian)
-        wanted = online(start, shown, graph, alpha, radius, gaussian)
-        np.testing.assert_allclose(codebook.T, wanted, rtol=0, atol=1e-6 if gaussian else 1e-12)
+        codebook, order = start.T.copy(order="C"), (graph.hops, graph.nearest_first, graph.within)
+        kernels.train_online(codebook, shown, *order, alpha, radius, shape, box_of(shown))
+        wanted = online(start, shown, graph, alpha, radius, shape)
+        np.testing.assert_allclose(codebook.T, wanted, rtol=0, atol=1e-10)
 
-    @pytest.mark.parametrize("gaussian", [False, True])
-    def test_the_lowest_of_equal_neurons_wins(self, gaussian: bool) -> None:
+    @pytest.mark.parametrize("shape", [BUBBLE, GAUSSIAN, LATERAL])
+    def test_the_lowest_of_equal_neurons_wins(self, shape: int) -> None:
         graph, codebook = lattice("chain", 4), np.array([[3.0, 1.0, -1.0, 1.0], [0.0, 0.0, 0.0, 0.0]])
-        narrow = np.array([0.01])
-        order = (graph.hops, graph.nearest_first, graph.within)
-        kernels.train_online(codebook, np.zeros((1, 2)), *order, np.ones(1), narrow, gaussian)
+        narrow, order = np.array([0.01]), (graph.hops, graph.nearest_first, graph.within)
+        box = np.array([[-9.0, -9.0], [9.0, 9.0]])
+        kernels.train_online(codebook, np.zeros((1, 2)), *order, np.ones(1), narrow, shape, box)
         np.testing.assert_array_equal(codebook[0], [3.0, 0.0, -1.0, 1.0])
 
 
 class TestBatch:
     @law(60)
-    @given(seed=seeds, name=topologies, d=st.integers(2, 3), sigma=st.floats(0.3, 6))
-    def test_is_the_definition(self, seed: int, name: str, d: int, sigma: float) -> None:
-        graph, start, inputs, _ = made(seed, name, d, 100)
-        fall = sigma * np.array([[1.0], [0.7], [0.4]])
-        weights = np.exp(-0.5 * (np.arange(graph.hops.max() + 1) / fall) ** 2)
-        codebook = start.T.copy(order="C")
-        kernels.train_batch(codebook, np.ascontiguousarray(inputs.T), graph.hops, weights)
-        np.testing.assert_allclose(codebook.T, batch(start, inputs, graph.hops, weights), rtol=0, atol=1e-9)
+    @given(
+        seed=seeds, name=topologies, d=st.integers(2, 4), sigma=st.floats(0.3, 6), inhibition=st.sampled_from([0, 0.03])
+    )
+    @pytest.mark.parametrize("run", [batch_kernels.train_batch, wide.train_batch])
+    def test_is_the_definition(self, run: Train, seed: int, name: str, d: int, sigma: float, inhibition: float) -> None:
+        graph, start, inputs, rng = made(seed, name, d, 100)
+        fall, amounts = sigma * np.array([[1.0], [0.7], [0.4]]), rng.uniform(0, 2, 100)
+        weights = np.exp(-0.5 * (np.arange(graph.hops.max() + 1) / fall) ** 2) - inhibition
+        codebook, history = start.T.copy(order="C"), np.empty((3, 2))
+        by_axis = np.ascontiguousarray(inputs.T)
+        assert run(codebook, by_axis, amounts, graph.hops, weights, box_of(inputs), -1.0, 0, history) == 3
+        wanted = [start] + [batch(start, inputs, amounts, graph.hops, weights[: n + 1]) for n in range(3)]
+        np.testing.assert_allclose(codebook.T, wanted[-1], rtol=0, atol=1e-9)
+        for epoch in range(3):
+            nearest = np.linalg.norm(inputs[:, None] - wanted[epoch], axis=2).min(axis=1)
+            assert history[epoch, 0] == pytest.approx(np.average(nearest, weights=amounts), rel=1e-4)
+            moved = np.linalg.norm(wanted[epoch + 1] - wanted[epoch], axis=1).max()
+            assert history[epoch, 1] == pytest.approx(moved, rel=1e-6, abs=1e-9)
 
-    def test_a_neuron_that_nothing_reaches_stays(self) -> None:
-        codebook = np.array([[0.0, 10.0, 20.0], [0.0, 0.0, 0.0]])
-        weights = np.array([[1.0, 0.0, 0.0]])
-        kernels.train_batch(codebook, np.array([[1.0, 3.0], [0.0, 0.0]]), lattice("chain", 3).hops, weights)
+    @pytest.mark.parametrize("run", [batch_kernels.train_batch, wide.train_batch])
+    def test_a_neuron_that_nothing_reaches_stays_and_one_at_rest_ends_it(self, run: Train) -> None:
+        codebook, history = np.array([[0.0, 10.0, 20.0], [0.0, 0.0, 0.0]]), np.empty((9, 2))
+        weights, inputs = np.repeat([[1.0, 0.0, 0.0]], 9, axis=0), np.array([[1.0, 3.0], [0.0, 0.0]])
+        box, hops = box_of(inputs.T), lattice("chain", 3).hops
+        assert run(codebook, inputs, np.ones(2), hops, weights, box, 0.0, 0, history) == 2
         np.testing.assert_array_equal(codebook[0], [2.0, 10.0, 20.0])
+        assert run(codebook, inputs, np.ones(2), hops, weights, box, 0.0, 5, history) == 6
 
 
 class TestMatch:
     @law(60)
-    @given(seed=seeds, d=st.integers(2, 4), n=st.sampled_from([1, 511, 512, 513, 1300]), whole=st.booleans())
+    @given(
+        seed=seeds, d=st.sampled_from([2, 3, 4, 20]), n=st.sampled_from([1, 511, 512, 513, 2100]), whole=st.booleans()
+    )
     def test_is_the_nearest_and_of_equals_the_lowest(self, seed: int, d: int, n: int, whole: bool) -> None:
-        rng, n = np.random.default_rng(seed), min(n, size(1300, 513))
+        rng, n = np.random.default_rng(seed), min(n, size(2100, 513))
         codebook, inputs = rng.normal(size=(9, d)) * 3, rng.normal(size=(n, d)) * 3
         if whole:  # many exact ties
             codebook, inputs = np.round(codebook), np.round(inputs)
         winners, squared = match(np.ascontiguousarray(codebook.T), np.ascontiguousarray(inputs.T))
         wanted = ((inputs[:, None] - codebook) ** 2).sum(axis=2)
-        np.testing.assert_allclose(squared, wanted.min(axis=1), rtol=1e-5, atol=1e-5)
-        np.testing.assert_allclose(wanted[np.arange(n), winners], wanted.min(axis=1), rtol=1e-5, atol=1e-5)
-        if whole:
+        np.testing.assert_allclose(squared, wanted.min(axis=1), rtol=1e-4, atol=1e-4)
+        np.testing.assert_allclose(wanted[np.arange(n), winners], wanted.min(axis=1), rtol=1e-4, atol=1e-4)
+        if whole and d < 9:
             np.testing.assert_array_equal(winners, wanted.argmin(axis=1))
-
-
-class TestLattice:
-    @pytest.mark.parametrize("name", TOPOLOGIES)
-    @pytest.mark.parametrize("neurons", [3, 4, 7, 12, 58, 80, 97])
-    def test_hops_are_the_shortest_paths_along_the_edges(self, name: str, neurons: int) -> None:
-        graph = lattice(name, neurons)
-        links = coo_array((np.ones(len(graph.edges)), tuple(graph.edges.T)), shape=(neurons, neurons))
-        paths = shortest_path(links.tocsr(), directed=False, unweighted=True)
-        np.testing.assert_array_equal(graph.hops, paths)
-
-    @pytest.mark.parametrize("name", TOPOLOGIES)
-    @pytest.mark.parametrize("neurons", [3, 12, 97])
-    def test_has_its_neurons_and_each_edge_once(self, name: str, neurons: int) -> None:
-        graph = lattice(name, neurons)
-        assert len(graph) == np.prod(graph.shape) == neurons
-        assert len({frozenset(edge) for edge in graph.edges.tolist()}) == len(graph.edges)
-
-    def test_a_grid_is_as_square_as_it_can_be(self) -> None:
-        assert sorted(lattice("grid", 60).shape) == [6, 10]
-
-    def test_refuses_what_there_is_not(self) -> None:
-        with pytest.raises(UsageError, match="chain"):
-            lattice("moebius", 5)

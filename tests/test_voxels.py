@@ -28,7 +28,7 @@ from tomomesh.measure.topology import check_promise, topology
 from tomomesh.model.mesh import TriMesh
 from tomomesh.model.points import CAP, NEURON
 from tomomesh.model.volume import Grid, Volume
-from tomomesh.pipeline import Surface, reconstruct, segment
+from tomomesh.pipeline import reconstruct, segment
 from tomomesh.segment.window import window
 from tomomesh.settings import FitSettings
 from tomomesh.surface import nets
@@ -39,6 +39,8 @@ from tomomesh.surface.voxels import Boundary, VoxelSurface, boundary, voxel_surf
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from tomomesh.results import Surface
 
     Floats = NDArray[np.float64]
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 _HOMES = {
+    "SOM": "segment.estimator",
     "PointSet": "model.points",
     "Settings": "settings",
     "TomomeshError": "errors",
@@ -28,6 +29,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "SOM",
     "PointSet",
     "Settings",
     "TomomeshError",
@@ -55,6 +57,7 @@ if TYPE_CHECKING:
     from .model.volume import Volume
     from .phantom import phantom
     from .pipeline import reconstruct, reconstruct_points, segment
+    from .segment.estimator import SOM
     from .segment.window import window
     from .settings import Settings
 

@@ -5,27 +5,31 @@ from __future__ import annotations
 import platform
 import time
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .measure.report import assess, compare
+from .measure.rings import assess_contours
 from .model.points import BRIDGE, CAP, NEURON
 from .progress import Progress, silent
+from .segment.schedules import schedule_warning
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
+    from .model.contours import Contours
     from .model.mesh import TriMesh
-    from .model.networks import Networks
+    from .model.networks import Networks, SpaceNetwork
     from .model.points import PointSet
     from .model.trace import Trace
     from .model.volume import Volume
     from .segment.sample import Sampling
+    from .segment.window import Limit
     from .settings import Settings
     from .surface.contours import ContourSurface
     from .surface.drape import Draped
@@ -34,11 +38,13 @@ if TYPE_CHECKING:
     from .surface.voxels import Boundary, VoxelSurface
 
 SECTIONS = (
-    "study", "window", "networks", "points", "cubes", "surface", "fit", "quality", "truth", "timings",
+    "study", "window", "networks", "rings", "points", "cubes", "surface", "fit", "quality", "truth", "timings",
     "settings", "versions", "warnings",
 )  # fmt: skip
-ORDER = (*SECTIONS[: SECTIONS.index("surface")], "voxels", *SECTIONS[SECTIONS.index("surface") :])
-"""The same, and what stands in place of networks and cubes where there are none."""
+ORDER = (*SECTIONS[: SECTIONS.index("surface")], "stack", "voxels", "space", *SECTIONS[SECTIONS.index("surface") :])
+"""The same, and what stands in place of cubes: the stack of contours, the voxels, and the network in space."""
+LEFT_OUT = 0.01
+"""Share of the window in small pieces over which a network in space is warned of."""
 DRAWN = 0.9
 """Share of the vertices that must have a point near them, else a result is warned of."""
 PLAUSIBLE = 0.15
@@ -47,6 +53,8 @@ STRAYS = 0.05
 """Share of strays among the points over which a result is warned of."""
 WIDE = 3
 """Closing over which a result is warned of, cubes."""
+CROWDED = 0.25
+"""Share of the slices with several components side by side over which one network a slice is warned of."""
 FILLED = 0.05
 """Share of filled faces over which a result is warned of."""
 PACKAGES = ("tomomesh", "numpy", "scipy", "numba")
@@ -60,6 +68,8 @@ class Account:
         self._sections: dict[str, dict[str, Any]] = {}
         self._timings: dict[str, float] = {}
         self._warnings: list[str] = []
+        self._measure: Callable[[], dict[str, Any]] | None = None
+        self._rings_mm3 = 0.0
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -91,15 +101,17 @@ class Account:
             "notes": list(volume.notes),
         }
 
-    def window(self, mask: NDArray[np.bool_], lower: float, upper: float) -> None:
-        """Note what the window kept."""
+    def window(self, mask: NDArray[np.bool_], lower: Limit, upper: Limit, layers: int = 1) -> None:
+        """Note what the window kept, and the limits of its layers."""
         asked = self._settings.window
         given = asked.lower is not None or asked.upper is not None
         edges = [np.take(mask, end, axis=axis).any() for axis in range(3) for end in (0, -1)]
         self._sections["window"] = {
-            "lower": None if np.isinf(lower) else lower,
-            "upper": None if np.isinf(upper) else upper,
-            "chosen_by": "preset" if asked.preset else "given" if given else "otsu",
+            "lower": _limits(lower),
+            "upper": _limits(upper),
+            "layers": layers,
+            "joined_by": asked.layers if layers > 1 else None,
+            "chosen_by": "labels" if asked.select else "preset" if asked.preset else "given" if given else "otsu",
             "voxels": int(mask.sum()),
             "share": float(mask.mean()),
             "touches_border": bool(any(edges)),
@@ -109,21 +121,104 @@ class Account:
 
     def networks(self, networks: Networks, mask: NDArray[np.bool_]) -> None:
         """Note what was trained, and which slices could not be."""
-        without = np.setdiff1d(np.arange(len(mask)), networks.slices)
+        if warning := schedule_warning(self._settings.network):
+            self.warn(warning)
+        signal = "boundary" if networks.outlined else "region"
+        self._networks(
+            networks.slices,
+            mask,
+            networks.lattice.name,
+            len(networks.lattice),
+            signal,
+            networks.pixels,
+            networks.strays,
+        )
+        self._lines(networks.lines, closed=networks.lattice.name == "ring")
+
+    def contours(self, contours: Contours, mask: NDArray[np.bool_]) -> None:
+        """Note the contours that were trained, and which slices have none."""
+        each = contours.contours
+        seen = {"boundary" if one.outlined else "region" for one in each}
+        pixels, strays = (np.array([getattr(one, name) for one in each]) for name in ("pixels", "strays"))
+        neurons = self._settings.network.neuron_count
+        self._networks(contours.slices, mask, "ring", neurons, seen.pop() if len(seen) == 1 else "both", pixels, strays)
+        self._lines(contours)
+        crossings = self._sections["rings"]["crossings"]
+        if crossings:
+            self.warn(f"contours of a slice cross each other {crossings} time(s): more --neurons keep them apart")
+
+    def crowded(self, slices: int, trained: int) -> None:
+        """Warn of one network where many slices hold several components side by side."""
+        if slices > CROWDED * trained:
+            self.warn(
+                f"{slices} slices hold several components side by side: --contours components has a ring for each"
+            )
+
+    def _lines(self, contours: Contours, *, closed: bool = True) -> None:
+        if len(contours):
+            self._sections["rings"] = assess_contours(contours, self._pixel_mm, closed=closed)
+
+    @property
+    def _pixel_mm(self) -> tuple[float, float]:
+        study = self._sections["study"]
+        return study["column_spacing_mm"], study["row_spacing_mm"]
+
+    def _networks(
+        self, slices: NDArray[np.int32], mask: NDArray[np.bool_], topology: str, neurons: int, signal: str,
+        pixels: NDArray[np.int64], strays: NDArray[np.int64],
+    ) -> None:  # fmt: skip
+        without = np.setdiff1d(np.arange(len(mask)), slices)
         self._sections["networks"] = {
-            "topology": networks.lattice.name,
-            "neurons": len(networks.lattice),
-            "trained": len(networks.slices),
-            "signal": "boundary" if networks.outlined else "region",
-            "pixels": int(networks.pixels.sum()),
-            "strays": int(networks.strays.sum()),
+            "topology": topology,
+            "neurons": neurons,
+            "trained": len(slices),
+            "signal": signal,
+            "pixels": int(pixels.sum()),
+            "strays": int(strays.sum()),
             "slices_without": without.tolist(),
         }
-        inside = (without > networks.slices[0]) & (without < networks.slices[-1])
+        inside = (without > slices[0]) & (without < slices[-1])
         missed = without[inside | mask[without].any(axis=(1, 2))]
         if len(missed):
             named = ", ".join(map(str, missed[:8])) + (", ..." if len(missed) > 8 else "")
             self.warn(f"{len(missed)} slice(s) without pixels enough for a network: {named}")
+
+    def space(self, network: SpaceNetwork, pieces: int, dropped: int) -> None:
+        """Note the one network in space, and what of the window it does not stand for."""
+        self._sections["networks"] = {
+            "topology": network.lattice.name,
+            "neurons": len(network.lattice),
+            "trained": 1,
+            "signal": "boundary" if network.outlined else "region",
+            "pixels": network.inputs,
+            "strays": network.strays,
+            "slices_without": [],
+        }
+        self._sections["space"] = {"pieces": pieces, "dropped_voxels": dropped}
+        voxels = self._sections["window"]["voxels"]
+        if pieces > 1:
+            self.warn(f"the window is in {pieces} pieces, and one network spans them all")
+        if dropped > LEFT_OUT * voxels:
+            self.warn(f"{dropped} of {voxels} voxels of the window lie in small pieces, and were left out")
+
+    def faces(self, network: TriMesh, squares: int, untangled: int) -> None:
+        """Note the faces of a network in space, and the finer squares that they were divided into."""
+        self._sections["space"] |= {"faces": len(network.faces), "untangled": untangled}
+        self._sections["surface"] = {
+            "found": 1,
+            "cavities": 0,
+            "taken": 1,
+            "debris": 0,
+            "square_faces": squares,
+            "enclosed_cubes": 0,
+        }
+
+    def rested(self, trace: Trace, vertices: int, taken_back: int, filled: NDArray[np.bool_]) -> None:
+        """Note how a network's own faces came to rest, and where there was nothing to rest on."""
+        self.fit(trace, vertices, 0)
+        self._sections["fit"] |= {"taken_back": taken_back, "filled_faces": int(filled.sum())}
+        if not len(trace.speed):
+            self._sections["fit"]["converged"] = True
 
     def points(self, points: PointSet, spacing: float, bridged: int = 0) -> None:
         """Note how many points there are and how far apart."""
@@ -249,9 +344,9 @@ class Account:
         elif rest.steps and not rest.converged:
             self.warn(f"the mesh had not come to rest after {rest.steps} steps")
 
-    def contours(self, made: ContourSurface, distance: float) -> None:
+    def stack(self, made: ContourSurface, distance: float) -> None:
         """Note the slices of a stack of contours, and the voxels between them."""
-        self._sections["contours"] = {
+        self._sections["stack"] = {
             "slices": made.slices,
             "contours": made.contours,
             "open": made.open,
@@ -272,9 +367,9 @@ class Account:
         progress: Progress = silent,
         crossing: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Measure the mesh, against its points too."""
-        self._sections["quality"] = assess(
-            mesh, points=points.positions, cavities=cavities, crossing=crossing,
+        """Have the mesh measured, against its points too, once the report is asked for."""
+        self._measure = partial(
+            assess, mesh, points=points.positions, cavities=cavities, crossing=crossing,
             threads=self._settings.run.threads, progress=progress,
         )  # fmt: skip
 
@@ -283,14 +378,9 @@ class Account:
         if filled is not None:
             self._sections["fit"]["filled_faces"] = int(filled.sum())
 
-    def rings(self, sampling: Sampling) -> None:
-        """Compare the volume of the mesh with the areas of the rings times the distance of their slices."""
-        if sampling.volume_mm3 > 0:
-            quality = self._sections["quality"]
-            quality["rings_volume_mm3"] = sampling.volume_mm3
-            quality["volume_over_rings"] = quality["volume_mm3"] / sampling.volume_mm3
-            if abs(quality["volume_over_rings"] - 1) > PLAUSIBLE:
-                self.warn(f"the mesh encloses {quality['volume_over_rings']:.0%} of the volume of its rings")
+    def volume(self, sampling: Sampling) -> None:
+        """Have the volume of the mesh compared with the areas of the rings times the distance of their slices."""
+        self._rings_mm3 = sampling.volume_mm3
 
     def truth(self, mesh: TriMesh, caps: NDArray[np.bool_], truth: TriMesh) -> None:
         """Measure the distance to the exact surface, both ways; the caps are no part of it."""
@@ -298,19 +388,36 @@ class Account:
             self._sections["truth"] = compare(mesh, truth, leave_out=caps)
 
     def report(self) -> dict[str, Any]:
-        """Return the report, its sections in their documented order."""
+        """Return the report, its sections in their documented order; measures the mesh the first time."""
+        self._measured()
         sections: dict[str, Any] = self._sections | {
             "timings": self._timings | {"total_s": sum(self._timings.values())},
             "settings": self._settings.to_dict(),
             "versions": dict(versions()),
-            "warnings": [*self._warnings, *self._of_crossings()],
+            "warnings": list(self._warnings),
         }
         return {name: sections[name] for name in ORDER if name in sections}
 
-    def _of_crossings(self) -> list[str]:
-        """Say that faces of the mesh that was measured last pass through others."""
-        crossing = self._sections.get("quality", {}).get("self_intersections", 0)
-        return [f"{crossing} faces pass through others"] if crossing else []
+    def _measured(self) -> None:
+        """Measure the mesh, where there is one that has not been."""
+        if self._measure is None:
+            return
+        with self.timed("quality"):
+            quality = self._sections["quality"] = self._measure()
+        self._measure = None
+        if self._rings_mm3 > 0:
+            quality["rings_volume_mm3"] = self._rings_mm3
+            quality["volume_over_rings"] = quality["volume_mm3"] / self._rings_mm3
+            if abs(quality["volume_over_rings"] - 1) > PLAUSIBLE:
+                self.warn(f"the mesh encloses {quality['volume_over_rings']:.0%} of the volume of its rings")
+        if quality["self_intersections"]:
+            self.warn(f"{quality['self_intersections']} faces pass through others")
+
+
+def _limits(limit: Limit) -> float | list[float | None] | None:
+    """Return a limit, or one a layer, with None where there is none; one that all layers share once."""
+    found = [None if np.isinf(one) else float(one) for one in np.ravel(limit)]
+    return found if len(set(found)) > 1 else found[0]
 
 
 @cache

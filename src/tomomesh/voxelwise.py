@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from .measure.topology import check_promise
-from .model.cubes import CubeGrid
-from .model.lattice import Lattice
-from .model.networks import Networks
-from .model.trace import Trace
+from .results import NOTHING
 from .segment.sample import Sampling
 from .segment.window import choose_window, window
 from .surface.voxels import boundary, voxel_surface
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from .account import Account
@@ -24,31 +20,19 @@ if TYPE_CHECKING:
     from .settings import Settings
     from .surface.voxels import Boundary, VoxelSurface
 
-NOTHING = np.empty(0)
-NO_NETWORKS = Networks(
-    Lattice("none", np.empty((0, 2), np.int64), np.empty((0, 0), np.int32), (0,)),
-    NOTHING.astype(np.int32),
-    np.empty((0, 0, 2)),
-    np.empty((0, 0), np.bool_),
-    outlined=False,
-    pixels=NOTHING.astype(np.int64),
-    strays=NOTHING.astype(np.int64),
-)
-NO_CUBES = CubeGrid(NOTHING.astype(np.int64), np.zeros(3), np.ones(3), NOTHING.astype(np.int64), np.zeros(1, np.int64))
-NO_TRACE = Trace(
-    NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING.astype(np.int64), NOTHING.astype(np.int64), converged=False
-)
-
 
 def find_boundary(volume: Volume, settings: Settings, account: Account) -> tuple[NDArray[np.bool_], Boundary]:
     """Return the window of a study (K, J, I) and its boundary."""
+    layers = settings.window.layers
     with account.timed("window"):
         lower, upper = choose_window(volume, settings.window)
-        mask = window(volume, lower=lower, upper=upper)
-    account.window(mask, lower, upper)
+        mask = window(volume, lower=lower, upper=upper, layers=layers)
+    account.window(mask, lower, upper, volume.layers)
     surface = "outer" if settings.cubes.surface == "outer" else "all"
     with account.timed("points"):
-        found = boundary(volume, mask, lower=lower, upper=upper, surface=surface, threads=settings.run.threads)
+        found = boundary(
+            volume, mask, lower=lower, upper=upper, layers=layers, surface=surface, threads=settings.run.threads
+        )
     account.points(found.points, max(volume.spacing_mm), found.added)
     return mask, found
 

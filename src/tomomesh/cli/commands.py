@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.volume import Volume
-    from ..pipeline import Segmentation, Surface
+    from ..results import Segmentation, Surface
 
 
 def run(chosen: Namespace) -> None:
@@ -63,24 +63,24 @@ def _demo(chosen: Namespace) -> None:
 
 def _reconstruct(chosen: Namespace) -> None:
     settings = settings_of(chosen)
-    _check_outputs(chosen, io.MESH_WRITERS, chosen.study)
+    _check_outputs(chosen, io.MESH_WRITERS, *_sources(chosen, settings))
     from ..pipeline import reconstruct
 
     with Bars(quiet=chosen.quiet) as progress:
-        volume = _read(chosen.study, settings, progress)
-        surface = reconstruct(volume, settings, progress=progress)
+        volume, labels = _read(chosen, settings, progress)
+        surface = reconstruct(volume, settings, labels=labels, progress=progress)
         _write(chosen, surface, settings, progress)
     _tell(chosen, surface.report, summary.of_surface(surface.report, chosen.output))
 
 
 def _segment(chosen: Namespace) -> None:
     settings = settings_of(chosen)
-    _check_outputs(chosen, io.POINT_WRITERS, chosen.study)
+    _check_outputs(chosen, io.POINT_WRITERS, *_sources(chosen, settings))
     from ..pipeline import segment
 
     with Bars(quiet=chosen.quiet) as progress:
-        volume = _read(chosen.study, settings, progress)
-        found = segment(volume, settings, progress=progress)
+        volume, labels = _read(chosen, settings, progress)
+        found = segment(volume, settings, labels=labels, progress=progress)
         io.write_points(found.points, chosen.output, **_frame(found.report, settings))
         _write_stage_one(chosen, found)
         _write_documents(chosen, found.report, settings)
@@ -109,7 +109,7 @@ def _network(chosen: Namespace) -> None:
     from ..segment.region import train_region
     from ..segment.shapes import SHAPES, shape
     from ..show import save
-    from ..show.topologies import draw_adapted, draw_update_regions
+    from .pictures import film_of_network, pictures_of_network
 
     given = chosen.region in SHAPES
     if not given and not Path(chosen.region).exists():
@@ -119,24 +119,31 @@ def _network(chosen: Namespace) -> None:
     trained = train_region(inputs, settings.network, seed=settings.run.seed, pixel_area=area)
     _make(folder)
     title = f"A network over a {chosen.region if given else 'picture'}"
-    save(draw_update_regions(), folder / "01-topologies.png")
-    figure = draw_adapted(inputs, trained.codebook, trained.lattice, start=trained.start, title=title)
-    save(figure, folder / "02-network.png")
+    axes = slice(None if given else 2)  # a neuron's place in a picture is its column and row
+    for name, figure in pictures_of_network(trained, title, axes):
+        save(figure, folder / f"{name}.png")
+    if chosen.film:
+        with io.replacing(folder / "02-film.gif") as file:
+            file.write(film_of_network(trained, settings, area, title, axes))
     report = {"network": trained.measures, "settings": settings.to_dict()}
     _write_documents(chosen, report, settings)
     _tell(chosen, report, summary.of_network(report, chosen.output))
 
 
 def _window_of_picture(path: str, settings: Settings) -> NDArray[np.float64]:
-    """Return the window's pixels of one picture as (column, -row), so that up stays up."""
+    """Return the window's pixels of one picture as (column, -row[, layer]), so that up stays up."""
     import numpy as np
 
-    from ..segment.window import choose_window, window
+    from ..segment.signal import pixels_of
+    from ..segment.window import by_layer, choose_window, window
 
     picture = io.read_picture(path)
     lower, upper = choose_window(picture, settings.window)
-    pixels = np.argwhere(window(picture, lower=lower, upper=upper)[0])
-    return np.asarray(pixels[:, ::-1] * np.array([1.0, -1.0]))
+    mask = window(picture, lower=lower, upper=upper, layers=settings.window.layers)[0]
+    if picture.layers > 1 and settings.network.inputs == "layers":
+        mask = by_layer(picture, lower=lower, upper=upper)[0] & mask[..., None]
+    pixels = pixels_of(mask)
+    return np.asarray(pixels * np.array([1.0, -1.0, 1.0])[: pixels.shape[1]])
 
 
 def _inspect(chosen: Namespace) -> None:
@@ -170,11 +177,26 @@ _COMMANDS = {
 }
 
 
-def _read(study: str, settings: Settings, progress: Bars) -> Volume:
-    progress("read", 0, 1)
-    volume = io.read_volume(study, settings=settings.read)
-    progress("read", 1, 1)
-    return volume
+def _sources(chosen: Namespace, settings: Settings) -> list[str]:
+    """Return the files that are read; refuse a label map without labels, and a command without any."""
+    sources = [path for path in (chosen.study, chosen.labels_in) if path]
+    if not sources:
+        raise UsageError("there is no study", expected="STUDY, or --labels-in with --select")
+    if chosen.labels_in and settings.window.select is None:
+        raise UsageError(
+            "no label was chosen", found=f"--labels-in {chosen.labels_in}", expected="--select with its labels"
+        )
+    return sources
+
+
+def _read(chosen: Namespace, settings: Settings, progress: Bars) -> tuple[Volume, Volume | None]:
+    """Read the study, and the label map where there is one beside it."""
+    total = 2 if chosen.study and chosen.labels_in else 1
+    progress("read", 0, total)
+    volume = io.read_volume(chosen.study or chosen.labels_in, settings=settings.read)
+    labels = io.read_volume(chosen.labels_in, settings=settings.read) if total == 2 else None
+    progress("read", total, total)
+    return volume, labels
 
 
 def _check_folder(path: str | Path) -> Path:
@@ -193,9 +215,9 @@ def _make(folder: Path) -> None:
         raise OutputError("the folder cannot be made", file=str(folder), found=fault.strerror or "") from fault
 
 
-def _check_outputs(chosen: Namespace, writers: Any, source: str) -> None:
-    io.check_output(chosen.output, writers, inputs=[source])
-    _check_files(chosen, source, chosen.output)
+def _check_outputs(chosen: Namespace, writers: Any, *sources: str) -> None:
+    io.check_output(chosen.output, writers, inputs=list(sources))
+    _check_files(chosen, *sources, chosen.output)
 
 
 def _check_files(chosen: Namespace, *taken: str) -> None:
@@ -241,7 +263,9 @@ def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any
     at_vertices = carry(replace(points, attributes=kept), surface.mesh.vertices)
     if not io.keeps(output, "filled", on_faces=True):
         return at_vertices, {}
-    filled = surface.filled if surface.segmentation is None else surface.cap_faces
+    filled = surface.filled
+    if filled is None and surface.segmentation is not None:
+        filled = surface.cap_faces
     return at_vertices, {} if filled is None else {"filled": filled}
 
 
@@ -272,11 +296,11 @@ def _draw(
 
     where = Path(folder)
     _make(where)
-    total = 9 if surface else 5
-    for count, (name, figure) in enumerate(pictures(stage_one, surface, settings)):
-        progress("pictures", count, total)
+    done, expected = 0, 10 if surface else 6
+    for done, (name, figure) in enumerate(pictures(stage_one, surface, settings), 1):
+        progress("pictures", done - 1, max(expected, done))
         save(figure, where / f"{name}.png")
-    progress("pictures", total, total)
+    progress("pictures", done, done)
 
 
 def _tell(chosen: Namespace, report: dict[str, Any], lines: list[str]) -> None:

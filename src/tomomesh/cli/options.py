@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from .. import __version__
 from ..errors import UsageError
-from ..settings import Settings, limits_of, option_of, parameters
+from ..settings import LAYERS, MANY, Settings, limits_of, option_of, parameters
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,10 +31,12 @@ SEVERAL = tuple(
     option for _, entry in parameters() if entry.metadata["length"] == (1, 3) for option in spellings(entry.name)
 )
 """Options that take one number or three."""
+LISTED = tuple(option_of(entry.name) for _, entry in parameters() if entry.metadata["length"] == LAYERS)
+"""Options that take one number, or several with commas between."""
 MESH_ONLY = ("local_origin", "target_faces")
 """Parameters of the run that matter to meshes alone."""
 SURFACE_ONLY = (
-    "cell_mm", "cell_factor", "closing", "contours", "largest", "allow_leaks", "surface", "smoothing", *MESH_ONLY,
+    "cell_mm", "cell_factor", "closing", "stacks", "largest", "allow_leaks", "surface", "smoothing", *MESH_ONLY,
 )  # fmt: skip
 """Parameters that do not matter to the points."""
 
@@ -66,13 +68,13 @@ def build_parser() -> argparse.ArgumentParser:
     _add_settings(demo, ("network", *STAGE_TWO, "run"))
 
     main = _command(commands, "reconstruct", "a study of slices in, a closed surface out")
-    main.add_argument("study", metavar="STUDY", help=STUDY)
+    _add_study(main)
     main.add_argument("-o", "--output", required=True, metavar="MESH", help=MESH)
     _add_outputs(main, "points", "labels", "figures")
     _add_settings(main, (*STAGE_ONE, *STAGE_TWO, "run"))
 
     stage_one = _command(commands, "segment", "stage one alone: the neurons of all slices as points")
-    stage_one.add_argument("study", metavar="STUDY", help=STUDY)
+    _add_study(stage_one)
     stage_one.add_argument("-o", "--output", required=True, metavar="POINTS", help="PLY, XYZ, CSV or NPY")
     _add_outputs(stage_one, "labels", "figures")
     _add_settings(stage_one, (*STAGE_ONE, "cubes", "run"), without=SURFACE_ONLY)
@@ -86,8 +88,13 @@ def build_parser() -> argparse.ArgumentParser:
     network = _command(commands, "network", "one network on a test region or a picture, as the paper's Fig. 1 and 2")
     network.add_argument("region", metavar="REGION", help="square, triangle, cube, or one picture (PNG or TIFF)")
     network.add_argument("-o", "--output", default="tomomesh-network", metavar="FOLDER", help="default: %(default)s")
+    network.add_argument("--film", action="store_true", help="write the training as an animated GIF too")
     _add_outputs(network)
-    _add_settings(network, ("window", "network", "run"), without=("slices", "signal", "units", *MESH_ONLY))
+    _add_settings(
+        network,
+        ("window", "network", "run"),
+        without=("slices", "signal", "contours", "space", "select", "units", *MESH_ONLY),
+    )
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
     inspect.add_argument("study", metavar="STUDY", help=STUDY)
@@ -103,12 +110,14 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
-    """Join the one or three numbers after an option into one word, so that a file may follow them."""
+    """Join the numbers after an option that takes several into one word, so that a file may follow them."""
     words: list[str] = []
     for word in arguments:
         option, _, values = words[-1].partition("=") if words else ("", "", "")
         if option in SEVERAL and values.count(",") < 2 and _is_number(word):
             words[-1] = f"{option}={values},{word}" if values else f"{option}={word}"
+        elif option in LISTED and not values and all(map(_is_number, word.split(","))):
+            words[-1] = f"{option}={word}"  # a list that begins with a minus would look like an option
         else:
             words.append(word)
     return words
@@ -122,6 +131,10 @@ def _is_number(word: str) -> bool:
     return True
 
 
+def _whole_numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split(","))
+
+
 def _numbers(text: str) -> tuple[float, ...]:
     return tuple(float(part) for part in text.split(","))
 
@@ -129,6 +142,15 @@ def _numbers(text: str) -> tuple[float, ...]:
 def _command(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
     return parser
+
+
+def _add_study(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("study", metavar="STUDY", nargs="?", help=f"{STUDY}; --labels-in may stand in its place")
+    parser.add_argument(
+        "--labels-in",
+        metavar="FILE",
+        help="a label map on the study's grid, or alone: its labels of --select are the window",
+    )
 
 
 def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
@@ -181,12 +203,13 @@ def _add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
         text = f"do not {meta['help']}" if entry.default else meta["help"]
         group.add_argument(negated, dest=name, action=action, default=argparse.SUPPRESS, help=text)
         return
-    one_or_three = options[0] in SEVERAL
-    several = meta["length"][0] if meta["length"] and not one_or_three else None
+    one_or_three, many = options[0] in SEVERAL, meta["length"] == MANY
+    listed = meta["length"] == LAYERS
+    several = meta["length"][0] if meta["length"] and not (one_or_three or many or listed) else None
     group.add_argument(
         *options,
         dest=name,
-        type=_numbers if one_or_three else meta["kind"],
+        type=_numbers if one_or_three or listed else _whole_numbers if many else meta["kind"],
         nargs=several,
         choices=meta["choices"] or None,
         metavar=None if meta["choices"] else _metavar(name, meta),
@@ -196,6 +219,8 @@ def _add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
 
 
 def _metavar(name: str, meta: Any) -> Any:
+    if meta["length"] in (MANY, LAYERS):
+        return "N[,N...]" if meta["length"] == MANY else "X[,X...]"
     if meta["length"] in ((), (1, 3)):
         return "X [Y Z]" if meta["length"] else {int: "N", float: "X"}[meta["kind"]]
     return (

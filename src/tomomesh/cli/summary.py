@@ -61,7 +61,7 @@ def of_study(found: dict[str, Any]) -> list[str]:
     x, y, z = found["spacing_mm"]
     tallest = max(max(found["histogram"]), 1)
     bars = "".join(BARS[round((len(BARS) - 1) * (count / tallest) ** 0.5)] for count in found["histogram"])
-    windows = [f"{name}: k > {lower:g}" for name, (lower, _) in found["windows"].items()]
+    windows = [f"{name}: k > {_limit(lower)}" for name, (lower, _) in found["windows"].items()]
     return [
         f"size      {slices} slices x {rows} rows x {columns} columns (S x P x L), "
         f"{found['layers']} layer(s) of {found['type']}",
@@ -130,15 +130,22 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
     if "study" not in report:
         return []
     study, window = report["study"], report["window"]
-    lower = "any" if window["lower"] is None else f"{window['lower']:g}"
-    upper = "any" if window["upper"] is None else f"{window['upper']:g}"
-    chosen = {"otsu": "Otsu's, as no window was given", "preset": "the preset", "given": "as given"}
+    lower, upper = _limit(window["lower"]), _limit(window["upper"])
+    joined = f", in {window['joined_by']} of {window['layers']} layers" if window["joined_by"] else ""
+    chosen = {"otsu": "Otsu's, as no window was given", "preset": "the preset", "given": "as given", "labels": ""}
     lines = [
         f"study     {study['slices']} {study['plane']} slices of {study['columns']} x {study['rows']}",
-        f"window    {lower} < k <= {upper} ({chosen[window['chosen_by']]}), "
+        f"window    {lower} < k <= {upper} ({chosen[window['chosen_by']]}{joined}), "
         f"{100 * window['share']:.1f} % of the voxels",
     ]
-    if "networks" in report:
+    if window["chosen_by"] == "labels":
+        select = ", ".join(map(str, report["settings"]["window"]["select"]))
+        lines[-1] = f"window    label(s) {select}, {100 * window['share']:.1f} % of the voxels"
+    if report.get("rings", {"kind": "one"})["kind"] != "one":
+        lines += _of_contours(report)
+    elif "space" in report:
+        lines.append(_of_space(report))
+    elif "networks" in report:
         networks = report["networks"]
         lines.append(
             f"networks  {networks['trained']} {networks['topology']}s of {networks['neurons']} neurons on the window's "
@@ -147,12 +154,42 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
     return lines
 
 
+def _of_space(report: dict[str, Any]) -> str:
+    """Say what the one network in space is."""
+    networks, left = report["networks"], report["space"]["dropped_voxels"]
+    return (
+        f"network   a {networks['topology']} of {networks['neurons']} neurons in space on the window's "
+        f"{'boundary' if networks['signal'] == 'boundary' else 'voxels'}, "
+        f"{left or 'no'} voxel(s) of small pieces left out"
+    )
+
+
+def _limit(limit: float | list[float | None] | None) -> str:
+    """Name a limit, or one a layer."""
+    each = limit if isinstance(limit, list) else [limit]
+    return ", ".join("any" if one is None else f"{one:g}" for one in each)
+
+
+def _of_contours(report: dict[str, Any]) -> list[str]:
+    """Say what contours there are, and what becomes of them from slice to slice."""
+    rings = report["rings"]
+    return [
+        f"contours  {rings['count']} {rings['kind']} on {report['networks']['trained']} slices, "
+        f"{rings['neurons']} neurons, {rings['dropped']} too small, {len(rings['bridged_gaps'])} bridged gap(s)",
+        f"          {rings['tracks']} tracks: {rings['births']} born, {rings['branches']} branched, "
+        f"{rings['merges']} merged",
+    ]
+
+
 def _of_cubes(report: dict[str, Any]) -> str:
     """Say what the surface was tracked on."""
     if "voxels" in report:
         voxels = report["voxels"]
         places = "gray levels interpolated" if voxels["interpolated"] else "a mask, evened out"
         return f"voxels    {report['surface']['square_faces']} faces, {places}, {voxels['added_for_composition']} added"
+    if "space" in report:
+        space = report["space"]
+        return f"faces     {space['faces']} of the network, divided into {report['surface']['square_faces']} squares"
     cubes = report["cubes"]
     edge = f"edge {_edges(cubes['cell_mm'])} {_unit(report)}"
     walls = "" if "study" in report else ", one wall" if cubes["holds"] else ", TWO walls"

@@ -90,45 +90,6 @@ def gather(
     return count
 
 
-@kernel("void(f8[:,::1], i8[::1], i4[::1], f8[::1], f8, f8[::1], i8, i8)")
-def local_spacing(
-    points: Floats,
-    blocks: Integers,
-    start: NDArray[np.int32],
-    frame: Floats,
-    radius: float,
-    spacing: Floats,
-    begin: int,
-    end: int,
-) -> None:
-    """Estimate how far apart the points lie around each of them, from how many there are within a radius.
-
-    Parameters
-    ----------
-    points : (p, 4) float array
-        Position and mass.
-    blocks, start, frame : arrays
-    radius : float
-        Where to begin; it is doubled, to 16 times at most, while it holds fewer than 8 points, and halved while it
-        holds over 64.
-    spacing : (p,) float array
-        Result: sqrt(pi radius^2 / points).
-    begin, end : int
-        Points to work on.
-    """
-    found = np.empty(MOST, np.int64)
-    for p in range(begin, end):
-        sight = radius
-        count = gather(points, blocks, start, frame, points[p], sight, found)
-        while count < 8 and sight < 16 * radius:
-            sight *= 2
-            count = gather(points, blocks, start, frame, points[p], sight, found)
-        while count > 64 and sight > radius / 16:
-            sight /= 2
-            count = gather(points, blocks, start, frame, points[p], sight, found)
-        spacing[p] = sight * np.sqrt(np.pi / max(count, 1))
-
-
 @kernel("void(f8[:,::1], f8[::1])")
 def smallest_axis(matrix: Floats, axis: Floats) -> None:
     """Find the eigenvector (3,) of the smallest eigenvalue of a symmetric (3, 3) matrix by Jacobi's rotations.
@@ -363,39 +324,3 @@ def settle(
             settled[p, axis] = points[p, axis] + (planes[p, 3] + h * right[0]) * planes[p, axis]
             tilt = right[1] * axes[0, axis] + right[2] * axes[1, axis]
             settled[p, 3 + axis] = (planes[p, axis] - tilt) / length
-
-
-@kernel("void(f8[::1], i8[::1], i8[::1], i8, f8, f8[::1], i8, i8)")
-def region_medians(
-    values: Floats,
-    order: Integers,
-    start: Integers,
-    few: int,
-    usual: float,
-    medians: Floats,
-    begin: int,
-    end: int,
-) -> None:
-    """Find the median of the values in each region.
-
-    Parameters
-    ----------
-    values : (p,) float array
-    order, start : arrays
-        The points of region q are ``order[start[q]:start[q + 1]]``.
-    few : int
-        Points under which a region has no median of its own.
-    usual : float
-        What such a region is given.
-    medians : (p,) float array
-        Result: the median of the region of each point.
-    begin, end : int
-        Regions to work on.
-    """
-    for q in range(begin, end):
-        mine = order[start[q] : start[q + 1]]
-        median = usual
-        if len(mine) >= few:
-            median = np.sort(values[mine])[len(mine) // 2]
-        for p in mine:
-            medians[p] = median

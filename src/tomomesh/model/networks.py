@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from .contours import OUTER, Contour, Contours
+
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from .lattice import Lattice
@@ -41,3 +44,41 @@ class Networks:
     outlined: bool
     pixels: NDArray[np.int64]
     strays: NDArray[np.int64]
+
+    @property
+    def lines(self) -> Contours:
+        """The chains or rings as contours, one a slice and all on one track; none of other networks."""
+        if self.lattice.name not in ("chain", "ring"):
+            return Contours("one", ())
+        each = zip(self.slices, self.codebooks, self.bridged, self.pixels, self.strays, strict=True)
+        return Contours(
+            "one",
+            tuple(
+                Contour(int(k), 0, OUTER, 0, codebook, np.asarray(bridged), self.outlined, int(pixels), int(strays))
+                for k, codebook, bridged, pixels, strays in each
+            ),
+        )
+
+
+@dataclass(frozen=True)
+class SpaceNetwork:
+    """One network in space.
+
+    Attributes
+    ----------
+    lattice : Lattice
+    codebook : (u, 3) float array
+        Positions of the neurons in patient millimeters.
+    outlined : bool
+        Whether it saw the boundary of the window, not its voxels.
+    inputs : int
+        Places presented.
+    strays : int
+        Places dropped by the trimmed re-fit.
+    """
+
+    lattice: Lattice
+    codebook: NDArray[np.float64]
+    outlined: bool
+    inputs: int
+    strays: int

@@ -22,6 +22,10 @@ KINDS = (NEURON, BRIDGE, CAP)
 COLORS = ("red", "green", "blue")
 """The attributes that together are a point's color, uint8."""
 
+RING, SIDE, TRACK = "ring", "side", "track"
+"""The attributes of neurons where a slice has several rings: which ring, what side it is on (`contours.SIDES`; odd ones
+are around what is outside), and which contour it is from slice to slice."""
+
 
 @dataclass(frozen=True)
 class PointSet:

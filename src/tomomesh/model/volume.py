@@ -107,6 +107,11 @@ class Volume:
         return self.voxels.shape[0], self.voxels.shape[1], self.voxels.shape[2]
 
     @property
+    def layers(self) -> int:
+        """Layers L of a voxel: 1 gray, 3 color."""
+        return self.voxels.shape[3] if self.voxels.ndim == 4 else 1
+
+    @property
     def spacing_mm(self) -> tuple[float, float, float]:
         """Distance between neighboring voxels along I, J, K, in millimeters."""
         x, y, z = np.sqrt((self.affine[:3, :3] ** 2).sum(axis=0))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from ..model.lattice import Lattice
@@ -49,34 +51,53 @@ def even_spacing(
     if lattice.name != "ring":
         return codebook, gaps
     if not gaps.any():
-        return _even(np.concatenate([codebook, codebook[:1]]), len(codebook) + 1)[:-1], gaps
+        return evenly(np.concatenate([codebook, codebook[:1]]), len(codebook) + 1)[:-1], gaps
     shift = int(np.flatnonzero(gaps)[-1]) + 1
     turned, inner = _even_arcs(np.roll(codebook, -shift, axis=0), np.roll(gaps, -shift)[:-1])
     return np.roll(turned, shift, axis=0), np.roll(np.append(inner, True), shift)
 
 
 def _even_arcs(line: NDArray[np.float64], gaps: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Even out the runs of neurons between the gaps of an open line, the neurons shared by length."""
+    """Even out the runs of neurons between the gaps of an open line."""
     arcs = np.split(line, np.flatnonzero(gaps) + 1)
-    lengths = np.array([_along(arc)[-1] for arc in arcs])
-    if lengths.sum() == 0:
+    if sum(along(arc)[-1] for arc in arcs) == 0:
         return line, gaps
-    edges = len(line) - len(arcs)
+    return even_arcs(arcs, len(line))
+
+
+def even_arcs(arcs: Sequence[NDArray[np.float64]], count: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Share neurons among open lines by their lengths, and place them evenly along each.
+
+    Parameters
+    ----------
+    arcs : sequence of (p, d) float arrays
+        Not all of length 0.
+    count : int
+        Neurons, one for each line at least.
+
+    Returns
+    -------
+    neurons : (count, d) float array
+    gaps : (count - 1,) bool array
+        Whether the line ends between a neuron and the next.
+    """
+    lengths = np.array([along(arc)[-1] for arc in arcs])
+    edges = count - len(arcs)
     share = edges * lengths / max(lengths.sum(), 1e-300)
     counts = np.floor(share).astype(int)
     counts[np.argsort(counts - share, kind="stable")[: edges - counts.sum()]] += 1
-    moved = np.zeros_like(gaps)
-    moved[np.cumsum(counts + 1)[:-1] - 1] = True
-    return np.concatenate([_even(arc, n + 1) for arc, n in zip(arcs, counts, strict=True)]), moved
+    gaps = np.zeros(count - 1, bool)
+    gaps[np.cumsum(counts + 1)[:-1] - 1] = True
+    return np.concatenate([evenly(arc, n + 1) for arc, n in zip(arcs, counts, strict=True)]), gaps
 
 
-def _even(line: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def evenly(line: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Place points at equal steps along a line, its ends kept; one point alone takes the middle."""
-    along = _along(line)
-    wanted = np.linspace(0.0, along[-1], count) if count > 1 else along[-1:] / 2
-    return np.stack([np.interp(wanted, along, axis) for axis in line.T], axis=1)
+    way = along(line)
+    wanted = np.linspace(0.0, way[-1], count) if count > 1 else way[-1:] / 2
+    return np.stack([np.interp(wanted, way, axis) for axis in line.T], axis=1)
 
 
-def _along(line: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the distance of each neuron from the first, along the line."""
+def along(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance of each point of a line (p, d) from its first, along the line."""
     return np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(line, axis=0) ** 2).sum(axis=1)))])

@@ -9,14 +9,18 @@ import numpy as np
 
 from ..errors import EmptyError, UsageError
 from ..model.lattice import lattice
+from ..settings import IN_SLICE
 from .even import bridged_edges, even_spacing
-from .som import match, start_positions, train
+from .network_measures import network_measures
+from .schedules import schedule_warning
+from .som import fit, start_positions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.lattice import Lattice
     from ..settings import NetworkSettings
+    from .history import History
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,9 @@ class TrainedNetwork:
     start, codebook : (u, d) float arrays
         Positions of the neurons before and after the training.
     measures : dict
-        How well the network lies, lengths in the unit of the inputs.
+        How well the network lies, lengths in the unit of the inputs; what to be warned of under ``"warnings"``.
+    history : History
+        What happened in each epoch.
     """
 
     inputs: NDArray[np.float64]
@@ -38,12 +44,13 @@ class TrainedNetwork:
     start: NDArray[np.float64]
     codebook: NDArray[np.float64]
     measures: dict[str, Any]
+    history: History
 
 
 def train_region(
     inputs: NDArray[np.float64], settings: NetworkSettings, *, seed: int = 0, pixel_area: float = 1.0
 ) -> TrainedNetwork:
-    """Train a network on inputs of any dimension from 2 up.
+    """Train a network on inputs of any dimension.
 
     Parameters
     ----------
@@ -60,13 +67,13 @@ def train_region(
     Raises
     ------
     UsageError
-        For inputs of fewer than two dimensions.
+        For inputs that are no rows of numbers.
     EmptyError
         With fewer inputs than neurons.
     """
-    if inputs.ndim != 2 or inputs.shape[1] < 2:
-        raise UsageError("inputs have two numbers each or more", found=f"shape = {inputs.shape}", expected="(n, d)")
-    graph = lattice(settings.network, settings.neurons)
+    if inputs.ndim != 2 or inputs.shape[1] < 1:
+        raise UsageError("inputs are rows of numbers", found=f"shape = {inputs.shape}", expected="(n, d)")
+    graph = lattice(settings.network, settings.neurons or IN_SLICE)
     if len(inputs) < len(graph):
         raise EmptyError(
             "the region has fewer inputs than the network has neurons",
@@ -75,16 +82,23 @@ def train_region(
             hint="a wider window, or fewer --neurons",
         )
     start = start_positions(inputs, graph, settings.start, np.random.default_rng(seed))
-    codebook, kept = train(inputs, graph, settings, np.random.default_rng(seed), pixel_area=pixel_area)
+    fitted = fit(inputs, graph, settings, np.random.default_rng(seed), pixel_area=pixel_area)
+    codebook = fitted.codebook
     if settings.even:
         codebook, _ = even_spacing(codebook, graph, bridged_edges(codebook, graph, settings.bridge))
-    return TrainedNetwork(inputs, graph, start, codebook, _measures(inputs, graph, codebook, kept))
+    measures = _measures(inputs, graph, codebook, fitted.kept)
+    measures |= {"epochs": len(fitted.history), "seed": seed, "warnings": _warnings(settings)}
+    return TrainedNetwork(inputs, graph, start, codebook, measures, fitted.history)
+
+
+def _warnings(settings: NetworkSettings) -> list[str]:
+    warning = schedule_warning(settings)
+    return [warning] if warning else []
 
 
 def _measures(
     inputs: NDArray[np.float64], graph: Lattice, codebook: NDArray[np.float64], kept: NDArray[np.bool_]
 ) -> dict[str, Any]:
-    winners, squared = match(np.ascontiguousarray(codebook.T), np.ascontiguousarray(inputs.T))
     ends = codebook[graph.edges]
     lengths = np.sqrt(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1))
     return {
@@ -92,7 +106,6 @@ def _measures(
         "neurons": len(graph),
         "inputs": len(inputs),
         "strays": int((~kept).sum()),
-        "dead_neurons": int(len(graph) - len(np.unique(winners))),
-        "quantization_error": float(np.sqrt(squared).mean()),
+        **network_measures(codebook, graph, inputs),
         "longest_over_median_edge": float(lengths.max() / max(np.median(lengths), 1e-300)),
     }

@@ -9,17 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from ..model.points import BRIDGE, CAP, NEURON, PointSet
+from ..model.points import BRIDGE, CAP, NEURON, RING, SIDE, TRACK, PointSet
 from .polygon import area, distance, inside, lattice_inside
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..model.contours import Contours
     from ..model.networks import Networks
     from ..model.volume import Volume
 
 REACH = 2
 """Rings at most this many slices apart count as neighbors: one slice without a network between them is bridged."""
+MOST_PIECES = 4
+"""Samples of a bridged gap for each neuron of its network, at most: the other edges may have no length."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,47 @@ def sample(networks: Networks, volume: Volume, *, caps: bool = True, bridge: flo
     )
 
 
+def sample_contours(contours: Contours, volume: Volume) -> Sampling:
+    """Place the neurons of all contours in space; each knows its slice, ring, side and track.
+
+    Nothing is set along bridged gaps or inside end rings: the surface is closed between the slices themselves.
+
+    Parameters
+    ----------
+    contours : Contours
+    volume : Volume
+        Its slices K are those of the contours.
+
+    Returns
+    -------
+    Sampling
+        Holes take from the area of a slice.
+    """
+    sizes = [len(one) for one in contours.contours]
+    slices, ring, side, track = (
+        np.repeat(np.array(values, np.int32), sizes)
+        for values in zip(*((one.slice, one.ring, one.side, one.track) for one in contours.contours), strict=True)
+    )
+    neurons = np.concatenate([np.arange(size, dtype=np.int32) for size in sizes])
+    positions = _place(np.concatenate([one.codebook for one in contours.contours]), slices, volume)
+    points = PointSet(
+        positions, slices, neurons, np.full(len(slices), NEURON, np.uint8), {RING: ring, SIDE: side, TRACK: track}
+    )
+    areas = np.zeros(len(contours.slices))
+    for one in contours.contours:
+        sign = -1 if one.side % 2 else 1
+        areas[np.searchsorted(contours.slices, one.slice)] += sign * abs(area(one.codebook))
+    lengths = np.concatenate([_sides(one.codebook * volume.spacing_mm[:2])[~one.bridged] for one in contours.contours])
+    spacing = float(lengths.max(initial=0.0))
+    bridged = sum(int(one.bridged.sum()) for one in contours.contours)
+    distance = contours.slices * np.float64(volume.slice_distance_mm)
+    return Sampling(points, spacing, bridged, areas * volume.pixel_area_mm2, distance)
+
+
+def _sides(ring: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.sqrt(((np.roll(ring, -1, axis=0) - ring) ** 2).sum(axis=1)))
+
+
 def _neurons(networks: Networks, volume: Volume) -> PointSet:
     count, u = networks.codebooks.shape[:2]
     slices = np.repeat(networks.slices, u)
@@ -114,7 +158,8 @@ def _bridges(networks: Networks, volume: Volume) -> tuple[PointSet, float]:
     usual = np.where(networks.bridged, 0.0, lengths).max(axis=1, keepdims=True)
     pieces = np.ones(lengths.shape, np.int64)
     sampled = networks.bridged & (usual > 0)
-    pieces[sampled] = np.ceil((lengths / np.where(usual > 0, usual, 1.0))[sampled])
+    most = MOST_PIECES * len(networks.lattice)
+    pieces[sampled] = np.ceil(np.minimum(lengths / np.where(usual > 0, usual, 1.0), most)[sampled])
     which, edge = np.nonzero(pieces > 1)
     inner = pieces[which, edge] - 1
     owner = np.repeat(np.arange(len(which)), inner)

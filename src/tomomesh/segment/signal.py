@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from .starts import moments
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -36,22 +38,17 @@ def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
         pixels = pixels_of(plane)
         if len(pixels) > 2:
             filled += len(pixels)
-            ellipses += 4 * np.pi * np.sqrt(np.linalg.det(moments(pixels)[1] + np.eye(2) / 12))
+            ellipses += 4 * np.pi * np.sqrt(np.linalg.det(moments(np.ascontiguousarray(pixels.T))[1] + np.eye(2) / 12))
     return filled > solid * ellipses
 
 
 def pixels_of(plane: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the pixels of a (J, I) mask, row by row, (n, 2) columns and rows."""
+    """Return the pixels of a (J, I) mask, row by row, (n, 2) columns and rows; of (J, I, L) also layers, (n, 3)."""
+    if plane.ndim == 3:
+        row, column, layer = np.nonzero(plane)
+        return np.stack([column, row, layer], axis=1).astype(np.float64)
     row, column = np.divmod(np.flatnonzero(plane), plane.shape[1])
     return np.stack([column, row], axis=1).astype(np.float64)
-
-
-def moments(inputs: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the mean (d,) and the covariance (d, d) of inputs (n, d)."""
-    by_axis = np.ascontiguousarray(inputs.T)
-    center = by_axis.mean(axis=1)
-    offset = by_axis - center[:, None]
-    return center, np.einsum("an,bn->ab", offset, offset) / max(len(inputs) - 1, 1)
 
 
 def outline(plane: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -66,12 +63,31 @@ def outline(plane: NDArray[np.bool_]) -> NDArray[np.float64]:
     ----------
     plane : (J, I) bool array
     """
+    filled, _, margin = closed(plane)
+    border = ndimage.binary_dilation(filled) & ~ndimage.binary_erosion(filled)
+    return pixels_of(border) - margin
+
+
+def closed(plane: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_], int]:
+    """Close the narrow openings of a window, and fill what the outside cannot reach then.
+
+    Parameters
+    ----------
+    plane : (J, I) bool array
+
+    Returns
+    -------
+    filled, hollow : (J + 2 m, I + 2 m) bool arrays
+        The filled window, and what of it the closing left open.
+    margin : int
+        Pixels m that were added around the slice.
+    """
     reach = round(NARROW / 2 * float(np.sqrt(np.count_nonzero(plane))))
     framed = np.pad(plane, reach + 1)
-    background, _ = ndimage.label(~_grown(framed, reach))
-    filled = framed | ~_grown(background == background[0, 0], reach)
-    border = ndimage.binary_dilation(filled) & ~ndimage.binary_erosion(filled)
-    return pixels_of(border) - (reach + 1)
+    open_ = ~_grown(framed, reach)
+    background, _ = ndimage.label(open_)
+    outside = background == background[0, 0]
+    return framed | ~_grown(outside, reach), open_ & ~outside, reach + 1
 
 
 def _grown(mask: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:

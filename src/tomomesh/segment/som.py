@@ -2,24 +2,57 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels import som as kernels
-from .signal import moments
+from ..kernels.neighborhoods import BUBBLE, GAUSSIAN, LATERAL
+from .passes import Watch, match, train_batch, train_online
+from .schedules import Fall, falling, radius_power
+from .shown import Shown, flat
+from .starts import CLOSED, start_positions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.lattice import Lattice
     from ..settings import NetworkSettings
+    from .history import History
 
-FINEST_RADIUS = 0.65
-"""Last radius of the batch map on a thin line, hops: measured best at 58 to 200 neurons."""
+__all__ = ["Fitted", "fit", "match", "radii", "shape_of", "start_positions", "train"]
+
+Callback = Callable[["NDArray[np.float64]", int], None]
+
+FINEST_OF_SHAPES, FINEST = 0.4, 0.65
+"""Last radius of a bell in batch, hops: of the networks that take the shape of a line or a closed surface; of sheets.
+
+Measured on rings over lines 1 to 8 pixels wide: 0.4 is best or next to it for 20 to 80 neurons, 0.65 draws them in two
+to three times as much and is better from 200; on spheres of 162 to 1,002, half the loss of volume.
+"""
+WIDEST = 0.25
+"""Most of the farthest hop that the last radius may be: a filled disc asks for a third of that."""
 REFIT_EPOCHS = 5
 """Batch passes after stray inputs are dropped."""
+SHAPES = {"bubble": BUBBLE, "gaussian": GAUSSIAN, "lateral": LATERAL}
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A trained network.
+
+    Attributes
+    ----------
+    codebook : (u, d) float array
+    kept : (n,) bool array
+        False for inputs without weight, and for stray ones that the trimmed re-fit dropped.
+    history : History
+    """
+
+    codebook: NDArray[np.float64]
+    kept: NDArray[np.bool_]
+    history: History
 
 
 def train(
@@ -29,7 +62,32 @@ def train(
     rng: np.random.Generator,
     *,
     pixel_area: float = 1.0,
+    weights: NDArray[np.float64] | None = None,
+    start: NDArray[np.float64] | None = None,
+    callback: Callback | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Do what `fit` does, without a history; return the codebook (u, d) and the inputs kept (n,)."""
+    fitted = fit(
+        inputs, lattice, settings, rng, pixel_area=pixel_area, weights=weights, start=start, callback=callback,
+        record=False,
+    )  # fmt: skip
+    return fitted.codebook, fitted.kept
+
+
+def fit(
+    inputs: NDArray[np.float64],
+    lattice: Lattice,
+    settings: NetworkSettings,
+    rng: np.random.Generator,
+    *,
+    pixel_area: float = 1.0,
+    weights: NDArray[np.float64] | None = None,
+    start: NDArray[np.float64] | None = None,
+    callback: Callback | None = None,
+    alpha_fall: Fall | None = None,
+    radius_fall: Fall | None = None,
+    record: bool = True,
+) -> Fitted:
     """Fit a network to inputs.
 
     Parameters
@@ -43,59 +101,68 @@ def train(
         Draws the random start and the order of the presentations.
     pixel_area : float
         Area that one input stands for; from it follows how thick a band the inputs fill.
+    weights : (n,) float array, optional
+        How much each input counts: one of weight 2 as two, one of weight 0 not at all.
+    start : (u, d) float array, optional
+        The codebook to start from, in place of the settings' start.
+    callback : callable, optional
+        Called as ``callback(codebook, epoch)`` after each epoch, with a codebook of its own.
+    alpha_fall, radius_fall : callable, optional
+        How the learning rate and the radius fall, in place of the settings': from the time (t,), 0 to 1, to what
+        is left, 1 to 0.
+    record : bool
+        Whether every epoch of online training is measured; in batch that costs nothing.
 
     Returns
     -------
-    codebook : (u, d) float array
-    kept : (n,) bool array
-        False for the stray inputs that the trimmed re-fit dropped.
+    Fitted
+
+    Raises
+    ------
+    UsageError
+        For weights, a start or a fall that do not fit.
     """
-    codebook = np.ascontiguousarray(start_positions(inputs, lattice, settings.start, rng).T)
-    by_axis = np.ascontiguousarray(inputs.T)
-    first, last = radii(inputs, lattice, settings, pixel_area)
-    if settings.training == "online":
-        _train_online(codebook, inputs, lattice, settings, (first, last), rng)
+    shown = Shown.of(inputs, weights)
+    codebook = _placed(shown, lattice, settings.start if start is None else start, rng)
+    watch = Watch(settings.least_move, callback, record, shown.axes)
+    online = settings.training == "online"
+    steps = settings.iterations if online else settings.epochs
+    first, last = _radii(shown, lattice, settings, pixel_area)
+    radius = falling(first, last, steps, fall=radius_fall or settings.radius_fall, power=radius_power(settings))
+    if online:
+        rate_fall = alpha_fall or settings.alpha_fall
+        alpha = falling(*settings.alpha, steps, fall=rate_fall, power=settings.alpha_power)
+        history = train_online(codebook, shown, lattice, shape_of(settings), alpha, radius, rng, watch)
     else:
-        sigmas = last + (first - last) * _falling(settings.epochs, settings.radius_power)
-        _train_batch(codebook, by_axis, lattice, settings, sigmas)
-    kept = _without_strays(codebook, by_axis, settings.trim)
-    if not kept.all():
-        narrow = np.full(REFIT_EPOCHS, last)
-        _train_batch(codebook, np.ascontiguousarray(by_axis[:, kept]), lattice, settings, narrow)
-    return np.ascontiguousarray(codebook.T), kept
+        history = train_batch(codebook, shown, lattice, shape_of(settings), radius, watch)
+    near = _without_strays(codebook, shown, settings.trim)
+    if not near.all():
+        refit = replace(settings, training="batch")
+        narrow = np.full(REFIT_EPOCHS, _radii(shown, lattice, refit, pixel_area)[1])
+        again = train_batch(codebook, shown.only(near), lattice, shape_of(refit), narrow, watch, len(history))
+        history = history.then(again)
+    kept = near
+    if weights is not None:
+        kept = np.asarray(weights) > 0
+        kept[kept] = near
+    return Fitted(np.ascontiguousarray(codebook[: shown.axes].T), kept, history)
 
 
-def start_positions(
-    inputs: NDArray[np.float64], lattice: Lattice, start: str, rng: np.random.Generator
+def shape_of(settings: NetworkSettings) -> int:
+    """Return the number of the neighborhood; ``"auto"`` is a bubble online and a bell in batch."""
+    if settings.neighborhood == "auto":
+        return BUBBLE if settings.training == "online" else GAUSSIAN
+    return SHAPES[settings.neighborhood]
+
+
+def _placed(
+    shown: Shown, lattice: Lattice, start: str | NDArray[np.float64], rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Place the neurons before training, (u, d).
-
-    ``"random"`` draws inputs. ``"ellipse"`` lays the lattice on the ellipse (ring), the longest axis (chain) or
-    the plane of the two longest axes (grid) of the inputs. A ring starts at the first axis and turns with the
-    symmetric root of the covariance, so that neuron k stays on the same meridian from slice to slice.
-    """
-    u = len(lattice)
-    if start == "random":
-        return inputs[rng.choice(len(inputs), u, replace=len(inputs) < u)]
-    center, covariance = moments(inputs)
-    variance, axes = np.linalg.eigh(covariance)
-    spread = np.sqrt(np.maximum(variance, 0.0))
-    if lattice.name == "ring":
-        angle = 2 * np.pi * np.arange(u) / u
-        plane = np.zeros((u, inputs.shape[1]))
-        plane[:, 0], plane[:, 1] = np.cos(angle), np.sin(angle)
-        return np.asarray(center + np.sqrt(2) * plane @ (axes * spread) @ axes.T)
-    sides = [np.linspace(-1, 1, side) if side > 1 else np.zeros(1) for side in lattice.shape]
-    coordinates = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(u, -1)
-    longest = np.argsort(lattice.shape) + inputs.shape[1] - len(lattice.shape)
-    towards = _pointing_forward(axes[:, longest])
-    return np.asarray(center + np.sqrt(3) * (coordinates * spread[longest]) @ towards.T)
-
-
-def _pointing_forward(axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Choose the sign of each column so that its largest component is positive."""
-    largest = np.abs(axes).argmax(axis=0)
-    return axes * np.where(axes[largest, np.arange(axes.shape[1])] < 0, -1.0, 1.0)
+    """Return the start, (d, u)."""
+    given = start if isinstance(start, str) else flat(np.asarray(start, np.float64))
+    spread = shown.spread if isinstance(start, str) and start != "random" else None
+    places = start_positions(shown.inputs, lattice, given, rng, weights=shown.weights, spread=spread)
+    return np.array(places.T, order="C")
 
 
 def radii(
@@ -103,78 +170,54 @@ def radii(
 ) -> tuple[float, float]:
     """Return the first and the last radius, hops.
 
-    The first is half of the farthest hop. Online, the last is 1. In batch it is `FINEST_RADIUS`, and more where
-    the inputs are a thick band of half width h: h / s for neurons s apart. A line of neurons folds into the
-    band at half of that (Ritter & Schulten 1988), and at twice that it shrinks; measured, h / s is best.
+    The first is half of the farthest hop. The last is 1 for a bubble and for lateral coupling: a neuron on its own
+    would fold into a band. For a bell it is `FINEST`, in batch on lines and closed surfaces `FINEST_OF_SHAPES`, and
+    more where the inputs of a ring's batch are a thick band of half width h: h / s for neurons s apart. A line of
+    neurons folds into the band at half of that (Ritter & Schulten 1988), and at twice that it shrinks; measured,
+    h / s is best.
+
+    Parameters
+    ----------
+    inputs : (n, d) float array
+    lattice : Lattice
+    settings : NetworkSettings
+    pixel_area : float
+        Area that one input stands for; 0 where inputs are no pixels.
     """
+    return _radii(Shown.of(inputs, None), lattice, settings, pixel_area)
+
+
+def _radii(shown: Shown, lattice: Lattice, settings: NetworkSettings, pixel_area: float) -> tuple[float, float]:
     if settings.radius is not None:
         return settings.radius
-    first = lattice.hops.max() / 2
-    if settings.training == "online":
-        return first, 1.0
-    return max(first, FINEST_RADIUS), max(FINEST_RADIUS, _half_widths(inputs, lattice, pixel_area))
+    bell = shape_of(settings) == GAUSSIAN
+    shaped = lattice.name in ("chain", *CLOSED) and settings.training == "batch"
+    last = (FINEST_OF_SHAPES if shaped else FINEST) if bell else 1.0
+    if settings.training == "batch" and bell and lattice.name == "ring" and shown.axes == 2:
+        last = max(last, min(_half_widths(shown, lattice, pixel_area), WIDEST * lattice.farthest))
+    return max(lattice.farthest / 2, last), last
 
 
-def _half_widths(inputs: NDArray[np.float64], lattice: Lattice, pixel_area: float) -> float:
+def _half_widths(shown: Shown, lattice: Lattice, pixel_area: float) -> float:
     """Estimate h / s of a ring from the number and the spread of its inputs."""
-    if lattice.name != "ring" or inputs.shape[1] != 2:
-        return 0.0
-    length = 2 * np.pi * np.sqrt(np.trace(moments(inputs)[1]))
-    half_width = len(inputs) * pixel_area / (2 * length)
-    return float(half_width * len(lattice) / length)
+    length = 2 * np.pi * shown.spread[1].trace() ** 0.5
+    half_width = len(shown) * pixel_area / (2 * max(length, 1e-300))
+    return float(half_width * len(lattice) / max(length, 1e-300))
 
 
-@lru_cache(maxsize=8)
-def _falling(steps: int, power: float) -> NDArray[np.float64]:
-    """Fall from 1 to 0 as (1 - t)^power (Reyes Aldasoro 1998); kept, for every slice asks for the same."""
-    return np.asarray((1 - np.arange(steps) / max(steps - 1, 1)) ** power)
-
-
-def _train_online(
-    codebook: NDArray[np.float64],
-    inputs: NDArray[np.float64],
-    lattice: Lattice,
-    settings: NetworkSettings,
-    radii: tuple[float, float],
-    rng: np.random.Generator,
-) -> None:
-    shown = inputs[rng.integers(len(inputs), size=settings.iterations)]
-    alpha = settings.alpha[1] + (settings.alpha[0] - settings.alpha[1]) * _falling(len(shown), settings.alpha_power)
-    radius = radii[1] + (radii[0] - radii[1]) * _falling(len(shown), settings.radius_power)
-    gaussian = settings.neighborhood == "gaussian"
-    kernels.train_online(codebook, shown, lattice.hops, lattice.nearest_first, lattice.within, alpha, radius, gaussian)
-
-
-def _train_batch(
-    codebook: NDArray[np.float64],
-    by_axis: NDArray[np.float64],
-    lattice: Lattice,
-    settings: NetworkSettings,
-    radius: NDArray[np.float64],
-) -> None:
-    hop, reach = np.arange(lattice.hops.max() + 1), radius[:, None]
-    if settings.neighborhood == "bubble":
-        weights = (hop <= reach) * 1.0
-    else:
-        weights = np.exp(-0.5 * (hop / np.maximum(reach, 1e-6)) ** 2)
-    kernels.train_batch(codebook, by_axis, lattice.hops, weights.astype(np.float64))
-
-
-def _without_strays(codebook: NDArray[np.float64], by_axis: NDArray[np.float64], trim: float) -> NDArray[np.bool_]:
+def _without_strays(codebook: NDArray[np.float64], shown: Shown, trim: float) -> NDArray[np.bool_]:
     """Keep the inputs that are nearer to their neuron than `trim` times the median; all where `trim` is 0."""
     if trim == 0:
-        return np.ones(by_axis.shape[1], bool)
-    _, squared = match(codebook, by_axis)
-    return np.asarray(squared <= trim**2 * np.median(squared))
+        return np.ones(len(shown), bool)
+    _, squared = match(codebook, shown.by_axis)
+    return np.asarray(squared <= trim**2 * _median(squared, shown.weights))
 
 
-def match(codebook: NDArray[np.float64], by_axis: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return the winner of each input and the squared distance to it (eq. 1); arrays are (d, u) and (d, n).
-
-    In single precision, relative to the first neuron.
-    """
-    first = codebook[:, :1]
-    winners, squared = np.empty(by_axis.shape[1], np.int32), np.empty(by_axis.shape[1], np.float32)
-    near_codebook, near_inputs = (np.ascontiguousarray(places - first, np.float32) for places in (codebook, by_axis))
-    kernels.best_matching_units(near_codebook, near_inputs, winners, squared)
-    return winners, squared
+def _median(values: NDArray[np.float32], weights: NDArray[np.float64] | None) -> float:
+    """Return the median of weighted values: that of values repeated as often as they weigh."""
+    if weights is None:
+        return float(np.median(values))
+    order = np.argsort(values, kind="stable")
+    steps = np.cumsum(weights[order])
+    middle = np.searchsorted(steps, steps[-1] / 2, side="left"), np.searchsorted(steps, steps[-1] / 2, side="right")
+    return float(values[order[np.minimum(middle, len(order) - 1)]].mean())

@@ -25,6 +25,7 @@ def train_study(
     mask: NDArray[np.bool_],
     settings: NetworkSettings,
     *,
+    layers: NDArray[np.bool_] | None = None,
     pixel_mm: tuple[float, float] = (1.0, 1.0),
     seed: int = 0,
     threads: int = 0,
@@ -39,6 +40,11 @@ def train_study(
     ----------
     mask : (K, J, I) bool array
     settings : NetworkSettings
+    layers : (K, J, I, L) bool array, optional
+        The layers of a color study that lie in their windows. Eq. 4 has an input x_ijl for each k_ijl that is not 0:
+        it is read as a pixel that is presented once for every layer in which it lies in the window, at
+        (i, j, l), layers lying as far apart as columns. A neuron's place is its first two coordinates. Outlines have
+        no layers, and are presented once.
     pixel_mm : (float, float)
         Distance of the columns and of the rows: the networks live in millimeters.
     seed, threads : int
@@ -54,7 +60,7 @@ def train_study(
     EmptyError
         Where no slice has pixels enough.
     """
-    graph = lattice(settings.network, settings.neurons)
+    graph = lattice(settings.network, settings.neuron_count)
     solid = settings.signal == "auto" and graph.name != "grid" and fills_most(mask)
     outlined = settings.signal == "boundary" or solid
     count = len(mask)
@@ -64,11 +70,14 @@ def train_study(
 
     def work(start: int, stop: int) -> None:
         for k in range(start, stop):
-            shown = (outline(mask[k]) if outlined else pixels_of(mask[k])) * np.array(pixel_mm)
+            plane = mask[k] if outlined or layers is None else layers[k]
+            shown = outline(plane) if outlined else pixels_of(plane)
+            shown = shown * (*pixel_mm, pixel_mm[0])[: shown.shape[1]]
             pixels[k] = len(shown)
             if len(shown) >= len(graph):
                 rng = np.random.default_rng([seed, k])
                 found, kept = train(shown, graph, settings, rng, pixel_area=pixel_area)
+                found = np.ascontiguousarray(found[:, :2])
                 gaps = bridged_edges(found, graph, settings.bridge)
                 if settings.even:
                     found, gaps = even_spacing(found, graph, gaps)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.volume import AXES
-from .window import PRESETS_HU, histogram, otsu_threshold
+from .window import PRESETS_HU, histogram, otsu_thresholds
 
 if TYPE_CHECKING:
     from ..model.volume import Volume
@@ -32,12 +32,13 @@ def survey(volume: Volume) -> dict[str, Any]:
     """
     voxels = volume.voxels
     low, high = float(voxels.min()), float(voxels.max())
-    windows = {"otsu": [otsu_threshold(voxels), None]}
+    otsu = np.asarray(otsu_thresholds(volume)).tolist()
+    windows = {"otsu": [otsu if volume.layers == 1 else [_finite(one) for one in otsu], None]}
     if low < 0:
         windows |= {name: [lower, None] for name, (lower, _) in PRESETS_HU.items()}
     return {
         "slices_rows_columns": list(volume.shape),
-        "layers": 1 if voxels.ndim == 3 else voxels.shape[3],
+        "layers": volume.layers,
         "spacing_mm": list(volume.spacing_mm),
         "stored_plane": AXES[volume.stored_axis],
         "default_plane": AXES[volume.thickest_axis()],
@@ -52,6 +53,10 @@ def survey(volume: Volume) -> dict[str, Any]:
         "windows": windows,
         "notes": list(volume.notes),
     }
+
+
+def _finite(limit: float) -> float | None:
+    return limit if np.isfinite(limit) else None
 
 
 def _stored_axes(volume: Volume) -> str:

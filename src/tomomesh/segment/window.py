@@ -1,4 +1,4 @@
-"""Gray-level windows (eq. 3, Fig. 4)."""
+"""Gray-level windows (eq. 3, Fig. 4), one a layer where the slices are in color."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ if TYPE_CHECKING:
     from ..model.volume import Volume
     from ..settings import WindowSettings
 
+    Limit = float | NDArray[np.float64]
+
 PRESETS_HU = {"bone": (300.0, np.inf), "skin": (-300.0, np.inf)}
 """Windows for CT, Hounsfield units."""
 PILED, SPAN = 0.999, (0.01, 99.99)
 """Share of the levels in one bin over which a histogram tells nothing, and the percentiles that it then spans."""
 
 
-def window(volume: Volume, *, lower: float = -np.inf, upper: float = np.inf) -> NDArray[np.bool_]:
+def window(volume: Volume, *, lower: Limit = -np.inf, upper: Limit = np.inf, layers: str = "all") -> NDArray[np.bool_]:
     """Keep the voxels with lower < k <= upper (Reyes Aldasoro & Algorri 2000, eq. 3).
 
     The window is a mask of its own: a kept voxel of gray level 0 stays kept.
@@ -28,9 +30,10 @@ def window(volume: Volume, *, lower: float = -np.inf, upper: float = np.inf) -> 
     Parameters
     ----------
     volume : Volume
-        Of a color volume, every layer must lie in the window.
-    lower, upper : float
-        Stored gray levels; HU where the study is CT.
+    lower, upper : float or (L,) float array
+        Stored gray levels; HU where the study is CT. One for all layers of a color volume, or one a layer.
+    layers : {"all", "any"}
+        Whether all layers of a voxel must lie in their windows, or one at least.
 
     Returns
     -------
@@ -43,30 +46,61 @@ def window(volume: Volume, *, lower: float = -np.inf, upper: float = np.inf) -> 
     EmptyError
         Where nothing lies in the window; names the range of the data.
     """
-    if not lower < upper:
-        raise UsageError("the window is empty", found=f"lower = {lower:g}, upper = {upper:g}", expected="lower < upper")
-    levels = volume.voxels
-    kept = levels <= upper if np.isneginf(lower) else (levels > lower) & (levels <= upper)
-    mask = np.ascontiguousarray(kept.all(axis=3) if levels.ndim == 4 else kept)
+    kept, levels = by_layer(volume, lower=lower, upper=upper), volume.voxels
+    joined = kept if levels.ndim == 3 else ~any_of_layers(~kept) if layers == "all" else any_of_layers(kept)
+    mask = np.ascontiguousarray(joined)
     if not mask.any():
+        hint = "--layers any, or " if levels.ndim == 4 and layers == "all" else ""
         raise EmptyError(
             "the window selects nothing",
-            found=f"lower = {lower:g}, upper = {upper:g}",
+            found=f"lower = {said(lower)}, upper = {said(upper)}",
             expected=f"gray levels between {levels.min():g} and {levels.max():g}",
-            hint="`tomomesh inspect` to see the histogram",
+            hint=f"{hint}`tomomesh inspect` to see the histogram",
         )
     return mask
 
 
-def choose_window(volume: Volume, settings: WindowSettings) -> tuple[float, float]:
-    """Return the limits that the settings ask for; Otsu's threshold where they ask for none.
+def by_layer(volume: Volume, *, lower: Limit = -np.inf, upper: Limit = np.inf) -> NDArray[np.bool_]:
+    """Tell which levels lie in their layer's window, (K, J, I[, L]); parameters and errors are those of `window`."""
+    if not np.less(lower, upper).all():
+        found = f"lower = {said(lower)}, upper = {said(upper)}"
+        raise UsageError("the window is empty", found=found, expected="lower < upper")
+    for limit in (lower, upper):
+        if np.ndim(limit) and np.size(limit) != volume.layers:
+            kind = "gray" if volume.layers == 1 else f"of {volume.layers} layers"
+            raise UsageError(
+                "the limits do not fit the layers of the study", found=f"{np.size(limit)} limits: {said(limit)}",
+                expected=f"one, or one a layer; the study is {kind}",
+            )  # fmt: skip
+    levels = volume.voxels
+    if np.isneginf(lower).all():
+        return np.asarray(levels <= upper)
+    return np.asarray((levels > lower) & (levels <= upper))
+
+
+def any_of_layers(kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell where one of the few layers at least is kept: layer by layer, which is many times as fast as along them."""
+    return np.asarray(np.logical_or.reduce([kept[..., n] for n in range(kept.shape[-1])]))
+
+
+def said(limit: Limit) -> str:
+    """Put a limit, or one a layer, into words."""
+    return ", ".join(f"{value:g}" for value in np.ravel(limit))
+
+
+def choose_window(volume: Volume, settings: WindowSettings) -> tuple[Limit, Limit]:
+    """Return the limits that the settings ask for; Otsu's threshold, in each layer its own, where they ask for none.
+
+    A layer that has one level alone tells nothing, and is not limited.
 
     Raises
     ------
     UsageError
         Where a preset for CT is asked of a study that is not in Hounsfield units.
     """
-    lower, upper = settings.lower, settings.upper
+    lower, upper = (
+        np.array(limit) if isinstance(limit, tuple) else limit for limit in (settings.lower, settings.upper)
+    )
     if settings.preset is not None:
         if volume.voxels.min() >= 0:
             raise UsageError(
@@ -77,8 +111,17 @@ def choose_window(volume: Volume, settings: WindowSettings) -> tuple[float, floa
             )
         return PRESETS_HU[settings.preset]
     if lower is None and upper is None:
-        lower = otsu_threshold(volume.voxels)
+        lower = otsu_thresholds(volume)
     return -np.inf if lower is None else lower, np.inf if upper is None else upper
+
+
+def otsu_thresholds(volume: Volume) -> Limit:
+    """Return Otsu's threshold of a gray volume, or those of the layers of a color one, (L,)."""
+    levels = volume.voxels
+    if levels.ndim == 3:
+        return otsu_threshold(levels)
+    layers = [levels[..., n] for n in range(levels.shape[3])]
+    return np.array([otsu_threshold(one) if one.min() < one.max() else -np.inf for one in layers])
 
 
 def otsu_threshold(levels: NDArray[Any], *, bins: int = 256) -> float:

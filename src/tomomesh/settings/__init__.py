@@ -5,15 +5,16 @@ The command line, the TOML file and the functions all read this table, so they c
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import Field, asdict, dataclass, field, fields, replace
 from typing import Any
 
 from ..errors import UsageError
-from .parameter import UNSET, Group, limits_of, option_of, param
+from .parameter import LAYERS, MANY, UNSET, Group, limits_of, option_of, param
 
 __all__ = [
+    "LAYERS",
+    "MANY",
     "UNSET",
     "CubeSettings",
     "FitSettings",
@@ -26,6 +27,14 @@ __all__ = [
     "option_of",
     "parameters",
 ]
+
+
+SURFACES = ("sphere", "torus")
+"""Networks with faces: closed surfaces, which live in space."""
+IN_SLICE, IN_SPACE = 58, 2562
+"""Neurons where none are asked for: the paper's of a slice, and those of an icosahedron divided 16-fold."""
+FALLS = ("linear", "power", "exponential", "inverse")
+"""How a learning rate or a radius may fall."""
 
 
 @dataclass(frozen=True)
@@ -50,28 +59,52 @@ class ReadSettings(Group):
 class WindowSettings(Group):
     """Gray-level window (eq. 3): a voxel is kept where lower < k <= upper."""
 
-    lower: float | None = param(
-        None, "lowest gray level, itself left out; Otsu's where not given", unit="stored, HU for CT"
-    )
-    upper: float | None = param(
-        None, "highest gray level, itself kept; no limit where not given", unit="stored, HU for CT"
-    )
+    lower: float | tuple[float, ...] | None = param(
+        None, "lowest gray level, itself left out, one or one a layer; Otsu's where not given",
+        unit="stored, HU for CT", length=LAYERS,
+    )  # fmt: skip
+    upper: float | tuple[float, ...] | None = param(
+        None, "highest gray level, itself kept, one or one a layer; no limit where not given",
+        unit="stored, HU for CT", length=LAYERS,
+    )  # fmt: skip
+    layers: str = param(
+        "all", "whether all layers of a color voxel must lie in their windows, or any", choices=("all", "any"),
+        paper="any",
+    )  # fmt: skip
     preset: str | None = param(
         None, "a window for CT: bone is k > 300 HU, skin is k > -300 HU", kind=str, choices=("bone", "skin")
+    )
+    select: tuple[int, ...] | None = param(
+        None, "labels of a label map whose voxels are the window", kind=int, low=0, length=MANY
     )
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.preset is not None and (self.lower is not None or self.upper is not None):
+        for name in ("lower", "upper"):
+            value = getattr(self, name)
+            if isinstance(value, tuple) and len(value) == 1:
+                object.__setattr__(self, name, value[0])
+        limited = self.lower is not None or self.upper is not None
+        if self.preset is not None and limited:
             raise UsageError("two windows are asked for", found="--preset and a window", expected="one of them")
-        lower = -math.inf if self.lower is None else self.lower
-        upper = math.inf if self.upper is None else self.upper
-        if lower >= upper:
-            raise UsageError(
-                "the window is empty",
-                found=f"--lower = {lower:g}, --upper = {upper:g}",
-                expected="lower < upper",
-            )
+        if self.select is not None and (limited or self.preset is not None):
+            raise UsageError("two windows are asked for", found="--select and a window", expected="one of them")
+        if self.lower is not None and self.upper is not None:
+            self._check_limits(self.lower, self.upper)
+
+    @staticmethod
+    def _check_limits(*limits: float | tuple[float, ...]) -> None:
+        lower, upper = (limit if isinstance(limit, tuple) else (limit,) for limit in limits)
+        count = max(len(lower), len(upper))
+        found = ", ".join(
+            f"--{name} = {' '.join(f'{value:g}' for value in limit)}"
+            for name, limit in (("lower", lower), ("upper", upper))
+        )
+        if len(lower) not in (1, count) or len(upper) not in (1, count):
+            raise UsageError("the limits do not fit each other", found=found, expected="one, or as many as layers")
+        pairs = zip(lower * (count // len(lower)), upper * (count // len(upper)), strict=True)
+        if any(low >= high for low, high in pairs):
+            raise UsageError("the window is empty", found=found, expected="lower < upper")
 
 
 @dataclass(frozen=True)
@@ -95,9 +128,30 @@ class NetworkSettings(Group):
         "ring",
         "topology of the network; none takes the window's boundary itself as the surface, at the places between the "
         "voxels where the gray levels cross the window's bounds",
-        choices=("chain", "ring", "grid", "none"),
+        choices=("chain", "ring", "grid", "hexagonal", "cylinder", "torus", "sphere", "none"),
     )
-    neurons: int = param(58, "neurons a slice", low=3, high=4_096)
+    space: str = param(
+        "slice",
+        "where networks live: one in each slice, or one in space over the voxels of the whole window (volume), as a "
+        "sphere or a torus always does",
+        choices=("slice", "volume"),
+    )
+    contours: str = param(
+        "one",
+        "networks of a slice: one; a ring for each connected component of the window; two rings on the two sides of "
+        "each wall; or a ring for every closed outline, holes included (loops). Several share the neurons by length",
+        choices=("one", "components", "walls", "loops"),
+    )
+    inputs: str = param(
+        "pixels",
+        "how often a pixel of a color slice is presented: once, or once for each layer that has it in its window, the "
+        "layer being a third coordinate (eq. 4)",
+        choices=("pixels", "layers"),
+        paper="layers",
+    )
+    neurons: int | None = param(
+        None, "neurons a slice, by default 58; of a network in space 2562", kind=int, low=3, high=4_096
+    )
     training: str = param(
         "batch", "one presentation at a time, or all at once", choices=("online", "batch"), paper="online"
     )
@@ -105,27 +159,35 @@ class NetworkSettings(Group):
     epochs: int = param(10, "batch: passes over all pixels", unit="passes", low=1)
     start: str = param(
         "ellipse",
-        "start positions: the ellipse of the pixels, or pixels drawn at random",
-        choices=("ellipse", "random"),
+        "start positions: the ellipse of the pixels, their principal axes, or pixels drawn at random",
+        choices=("ellipse", "axes", "random"),
         paper="random",
     )
     neighborhood: str = param(
         "auto",
-        "shape of the neighborhood; auto is gaussian in batch and bubble online, the better of each",
-        choices=("auto", "bubble", "gaussian"),
+        "shape of the neighborhood; lateral is a bubble with inhibition around it and weak excitation beyond (Mexican "
+        "hat); auto is gaussian in batch and bubble online, the better of each",
+        choices=("auto", "bubble", "gaussian", "lateral"),
         paper="bubble",
     )
     alpha: tuple[float, float] = param((0.5, 0.01), "online: first and last learning rate", low=0, high=1, length=(2,))
     radius: tuple[float, float] | None = param(
         None,
         "first and last radius of the neighborhood (gaussian: its sigma); "
-        "by default from half of the farthest hop down to 1 (online) or to what the region's thickness needs (batch)",
+        "by default from half of the farthest hop down to 1, or for gaussian to what the region's thickness needs",
         unit="hops",
         low=0,
         length=(2,),
     )
+    alpha_fall: str = param("power", "online: how the learning rate falls", choices=FALLS)
+    radius_fall: str = param("power", "how the radius falls; not slower than the learning rate", choices=FALLS)
     alpha_power: float = param(3.0, "online: power of the learning rate's fall; 1 is linear", above=0)
-    radius_power: float = param(5.0, "power of the radius' fall; 1 is linear", above=0)
+    radius_power: float | None = param(
+        None, "power of the radius' fall, by default 5 online and 2 in batch; 1 is linear", above=0
+    )
+    least_move: float = param(
+        0.0, "stop when no neuron moves more than this in an epoch; 0 where none moves at all", unit="mm", low=0
+    )
     bridge: float = param(
         2.0,
         "an edge of the network over this many medians is a bridged gap, sampled along its line; 0 finds none",
@@ -148,6 +210,27 @@ class NetworkSettings(Group):
             raise UsageError(
                 "--trim would drop most pixels", found=f"--trim = {self.trim:g}", expected="0 or at least 1"
             )
+        if self.space == "volume" and self.network == "none":
+            raise UsageError(
+                "there is no network to be in space", found="--space = volume, --network = none",
+                expected="a network, or --space slice",
+            )  # fmt: skip
+        if self.contours != "one" and (self.network != "ring" or self.in_space):
+            raise UsageError(
+                "several contours are rings",
+                found=f"--contours = {self.contours}, --network = {self.network}, --space = {self.space}",
+                expected="--network ring in slices, or --contours one",
+            )
+
+    @property
+    def in_space(self) -> bool:
+        """Whether one network is trained in space, and not one a slice."""
+        return self.space == "volume" or self.network in SURFACES
+
+    @property
+    def neuron_count(self) -> int:
+        """Neurons of a network: as asked, or enough for a slice or for a surface."""
+        return self.neurons or (IN_SPACE if self.in_space else IN_SLICE)
 
 
 @dataclass(frozen=True)
@@ -164,7 +247,7 @@ class CubeSettings(Group):
         None, "cubes by which gaps in the shell are closed; by default the fewest that keep the outside out",
         kind=int, unit="cubes", low=0, high=64,
     )  # fmt: skip
-    contours: str = param(
+    stacks: str = param(
         "auto",
         "take points on parallel slices as contours, and close what lies between their insides; none never does",
         choices=("auto", "none"),

@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 UNSET = object()
+MANY = tuple(range(1, 257))
+"""Lengths of a parameter that takes as many values as one likes."""
+LAYERS = (1, 2, 3, 4)
+"""Lengths of a parameter that takes one value, or one a layer of a color image."""
 
 
 def param(
@@ -80,7 +84,7 @@ def _check(entry: Field[Any], value: Any) -> None:
         return
     values = value if isinstance(value, tuple) else (value,)
     if len(values) not in (meta["length"] or (1,)) or (isinstance(value, tuple) and not meta["length"]):
-        counts = " or ".join(map(str, meta["length"] or ("one",)))
+        counts = "at least one" if meta["length"] == MANY else " or ".join(map(str, meta["length"] or ("one",)))
         raise UsageError(
             f"{option} has too few or too many values", found=f"{option} = {_said(value)}", expected=counts
         )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .contact import draw_slices
 from .fit import draw_fit
 from .plane import Plane
 from .relief import draw_relief
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from ..model.contours import Contours
     from ..model.mesh import QuadMesh, TriMesh
     from ..model.networks import Networks
     from ..model.points import PointSet
@@ -31,6 +33,7 @@ def draw_all(
     mask: NDArray[np.bool_] | None = None,
     networks: Networks | None = None,
     labels: NDArray[Any] | None = None,
+    contours: Contours | None = None,
     points: PointSet | None = None,
     cuberille: QuadMesh | None = None,
     triangulated: TriMesh | None = None,
@@ -53,6 +56,8 @@ def draw_all(
         The trained networks.
     labels : (K, J, I) int array
         0 outside, else neuron plus one.
+    contours : Contours
+        Several networks a slice, where there are.
     points, cuberille, triangulated, smoothed, mesh, trace
         The later stages.
     plane : Plane
@@ -70,6 +75,10 @@ def draw_all(
     """
     if images is not None and mask is not None:
         yield from _of_slice(images, mask, networks, labels, plane)
+    found = networks if contours is None else contours
+    if mask is not None and found is not None and len(found.slices):
+        pages = draw_slices(mask, found, plane)
+        yield from ((f"06-slices-{number}", page) for number, page in enumerate(pages, 1))
     if points is not None and len(points):
         yield "07-points", draw_points(points, view)
     if cuberille is not None or triangulated is not None or smoothed is not None:

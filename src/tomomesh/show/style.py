@@ -24,9 +24,12 @@ R = TypeVar("R")
 
 INK, MUTED, RULE = "#17222b", "#66757f", "#d3dae0"
 SIGNAL, NETWORK, ACCENT = "#b4bfc7", "#0b6b88", "#d9480f"
+TRACKS = (NETWORK, "#8a4f9e", "#2e7d4f", "#a8791a", INK)
+"""Contours of a slice, by their tracks."""
 BONE = LinearSegmentedColormap.from_list("bone", ["#2c2420", "#86735f", "#cdbb9d", "#f7eedd"])
 HEIGHT = LinearSegmentedColormap.from_list("height", ["#12345a", "#0b6b88", "#2fa58e", "#9ccb5b", "#f2c14e"])
 RELIEF = LinearSegmentedColormap.from_list("relief", ["#3c6078", "#5a8ea0", "#a9cac8", "#f0e2c2", "#fffaf0"])
+TINT = LinearSegmentedColormap.from_list("tint", ["#f6f8f9", "#a9cad4", "#0b6b88", "#0d2b45"])
 DPI = 150
 
 _RULES: Any = {
@@ -104,6 +107,7 @@ def save(figure: Figure, file: str | PathLike[str] | BinaryIO) -> None:
     """
     try:
         figure.savefig(file, format="png", metadata={"Software": None}, pil_kwargs={"compress_level": 4})
+        figure.set_layout_engine("none")  # laid out again, panels beside scales would move by a fraction of a pixel
     except OSError as error:
         name = str(file) if isinstance(file, str | PathLike) else ""
         raise OutputError("the picture cannot be written", file=name, hint=str(error.strerror)) from error

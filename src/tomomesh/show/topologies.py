@@ -55,7 +55,7 @@ def _draw_update(
         small_print(ax, str(number), place, color=INK if moves else MUTED)
     for tail, tip in zip(places[near], moved[near], strict=True):
         arrow(ax, tail, tip, color=NETWORK, head="->")
-    _frame(ax)
+    frame(ax)
     ax.set(xlim=(-1.3, 1.3), ylim=(-1.2, 1.2))
 
 
@@ -90,21 +90,22 @@ def draw_adapted(
     panels.append((codebook, "adapted"))
     figure, axes = canvas(4.3 * len(panels), 4.4, 1, len(panels))
     for ax, (neurons, state) in zip(axes, panels, strict=True):
-        places = _flat(neurons, camera)
-        dots(ax, _flat(region, camera), size=5, color=SIGNAL)
+        places = flat(neurons, camera)
+        dots(ax, flat(region, camera), size=5, color=SIGNAL)
         lines(ax, places[network.edges], color=NETWORK, width=1.1)
         dots(ax, places, size=16, color=NETWORK, rim="white", width=0.5)
         heading(ax, title, f"{network.name} of {len(network)} neurons, {state}")
-        _frame(ax)
+        frame(ax)
     return figure
 
 
-def _flat(points: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
+def flat(points: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
     """Project (n, 3) points; leave (n, 2) points."""
     return camera.project(points)[:, :2] if points.shape[1] == 3 else points
 
 
-def _frame(ax: Axes) -> None:
+def frame(ax: Axes) -> None:
+    """Put a thin frame around a panel without axes."""
     ax.set_aspect("equal")
     ax.set_xticks([])
     ax.set_yticks([])

@@ -16,12 +16,14 @@ from ..model.volume import Grid, Volume
 from ..progress import Progress, silent
 from ..settings import FitSettings
 from .between import Stack, filled_between
-from .curves import DENSE, fine_curve, moments_of
-from .rings import Outline, outline
+from .curves import DENSE, fine_curve
+from .rings import Outline, nested, outline
 from .tracks import Part, link_slices
 from .voxels import Boundary, VoxelSurface, boundary, voxel_surface
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from ..model.mesh import TriMesh
@@ -120,8 +122,8 @@ def contour_surface(
 
     def work(start: int, stop: int) -> None:
         for k in range(start, stop):
-            ring = slices.placed(slices.rings[k])[:, :2] if slices.rings else None
-            planar[k], found[k] = _outlined(planar[k], allow_leaks) if ring is None else _known(ring)
+            rings = [slices.placed(ring)[:, :2] for ring in slices.rings[k]] if slices.rings else []
+            planar[k], found[k] = _known(rings) if rings else _outlined(planar[k], allow_leaks)
 
     in_blocks(work, len(planar), block=1, threads=threads, done=lambda n: progress("contours", n, len(planar)))
     _refuse_open(found, slices, allow_leaks)
@@ -135,7 +137,8 @@ def contour_surface(
     softer = replace(fit, stiffness=SPRINGS * fit.stiffness)
     rest = voxel_surface(edges, softer, threads=threads, progress=progress)
     centers = rest.mesh.corners.mean(axis=1)
-    away, _ = cKDTree(points).query(centers, distance_upper_bound=MEASURED * slices.distance)
+    measured = _along(stack, slices) if slices.rings else points
+    away, _ = cKDTree(measured).query(centers, distance_upper_bound=MEASURED * slices.distance)
     return ContourSurface(
         edges, rest, np.isinf(away), len(planar),
         sum(len(outlined.rings) for outlined in found), sum(len(outlined.open) for outlined in found),
@@ -143,10 +146,10 @@ def contour_surface(
     )  # fmt: skip
 
 
-def _known(ring: Floats) -> tuple[Floats, Outline]:
-    """Return the points of a ring that is known, and the outline along them."""
-    along = np.arange(len(ring))
-    return ring, Outline([along if moments_of([ring]).area > 0 else along[::-1]], [0], [], 0.0)
+def _known(rings: Sequence[Floats]) -> tuple[Floats, Outline]:
+    """Return the points of rings that are known, each once, and the outline along them."""
+    curves = [ring[(ring != np.roll(ring, 1, axis=0)).any(axis=1)] for ring in rings]
+    return np.concatenate(curves), nested(curves)
 
 
 def _outlined(points: Floats, allow_leaks: bool) -> tuple[Floats, Outline]:
@@ -197,6 +200,19 @@ def _stack(planar: list[Floats], found: list[Outline], slices: Slices, edge: flo
     while np.prod(stack.shape) > MOST_VOXELS:
         stack = replace(stack, edge=COARSER * stack.edge)
     return stack
+
+
+def _along(stack: Stack, slices: Slices) -> Floats:
+    """Return places about a voxel apart along the curves of all slices, in space."""
+    step = round(1 / DENSE)
+    curves = [
+        (curve[::step], h)
+        for h, parts in zip(stack.heights, stack.slices, strict=True)
+        for p in parts
+        for curve in p.curves
+    ]
+    placed = np.concatenate([np.column_stack([curve, np.full(len(curve), height)]) for curve, height in curves])
+    return np.asarray(slices.origin + placed @ slices.axes)
 
 
 def _parts(points: Floats, outlined: Outline, distance: float) -> list[Part]:

@@ -28,13 +28,16 @@ class Levels:
     Attributes
     ----------
     voxels : (K, J, I) or (K, J, I, L) array
-    lower, upper : float
-        A voxel is inside where lower < k <= upper in every layer.
+    lower, upper : float or (L,) float array
+        A layer is in its window where lower < k <= upper.
+    layers : {"all", "any"}
+        A voxel is inside where all its layers are in their windows, or one at least.
     """
 
     voxels: NDArray[Any]
-    lower: float
-    upper: float
+    lower: float | NDArray[np.float64]
+    upper: float | NDArray[np.float64]
+    layers: str = "all"
 
     def nearest(self, places: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the voxels that are nearest to places (n, 3), which are (x, y, z) and may lie beyond the border."""
@@ -50,26 +53,35 @@ class Levels:
         return np.asarray(levels)
 
     def kept(self, levels: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which levels lie in the window."""
-        return (levels > self.lower) & (levels <= self.upper)
+        """Tell which levels (n, L) lie in their layer's window."""
+        return np.asarray((levels > self.lower) & (levels <= self.upper))
+
+    def inside(self, levels: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which voxels are inside by their levels (n, L), (n,)."""
+        kept = self.kept(levels)
+        return np.asarray(kept.all(axis=1) if self.layers == "all" else kept.any(axis=1))
 
     def excess(self, places: NDArray[np.int32]) -> NDArray[np.float64]:
         """Return how far the level of each voxel is outside the window, (n,); infinite where it is unknown."""
         levels = self.at(places)
-        return np.asarray(np.nan_to_num(np.maximum(self.lower - levels, levels - self.upper).max(axis=1), nan=np.inf))
+        beyond = np.nan_to_num(np.maximum(self.lower - levels, levels - self.upper), nan=np.inf)
+        return np.asarray(beyond.max(axis=1) if self.layers == "all" else beyond.min(axis=1))
 
     def crossed(self, inner: NDArray[np.int32], outer: NDArray[np.int32]) -> NDArray[np.float64]:
         """Return the share of the way from voxels inside to their neighbors outside where a bound is crossed, (n,).
 
-        Levels are interpolated linearly, and of several layers the first to leave the window counts. Where a level
-        is not known the border is half way.
+        Levels are interpolated linearly. Of several layers the first to leave its window counts; where one inside is
+        enough, the last of those that were. Where a level is not known the border is half way.
         """
         inside, outside = self.at(inner), self.at(outer)
         bound = np.where(outside > self.upper, self.upper, self.lower)
         with np.errstate(divide="ignore", invalid="ignore"):  # a voxel that was added may be no brighter than outside
             share = (inside - bound) / (inside - outside)
-        first = np.where(self.kept(outside), np.inf, share).min(axis=1)
-        return np.where(first <= 1, np.clip(first, CLOSEST, 1 - CLOSEST), 0.5)
+        if self.layers == "all":
+            leaves = np.where(self.kept(outside), np.inf, share).min(axis=1)
+        else:
+            leaves = np.where(self.kept(inside), share, -np.inf).max(axis=1)
+        return np.where(np.abs(leaves) <= 1, np.clip(leaves, CLOSEST, 1 - CLOSEST), 0.5)
 
     def stepped(self, inner: NDArray[np.int32], steps: NDArray[np.int32]) -> bool:
         """Tell whether the levels are those of a mask, and so say nothing about where between voxels the border is.
@@ -81,7 +93,7 @@ class Levels:
         inner, steps = inner[::every], steps[::every]
         before, inside, outside, after = (self.at(inner + n * steps) for n in (-1, 0, 1, 2))
         whole, step = (np.abs(one - other).sum(axis=1) for one, other in ((before, after), (inside, outside)))
-        clear = self.kept(before).all(axis=1) & ~self.kept(after).all(axis=1) & (whole > 0)
+        clear = self.inside(before) & ~self.inside(after) & (whole > 0)
         return bool(2 * clear.sum() > len(clear) and np.median(step[clear] / whole[clear]) > STEPPED)
 
 

@@ -18,7 +18,11 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, cKDTree
 
+from ..kernels.polygons import inside_polygon
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 REACHES = tuple(2.0 * 1.3**n for n in range(5))
@@ -85,6 +89,55 @@ def outline(points: NDArray[np.float64]) -> Outline:
     opened = [numbers[contour == c] for c in np.flatnonzero((share < OPEN) & (np.bincount(contour) >= LEAST))]
     rings, parts = web.rings(walls)
     return Outline(rings, parts, opened, reach)
+
+
+def nested(curves: Sequence[NDArray[np.float64]]) -> Outline:
+    """Find which closed curves bound the inside of a slice, and which of them bound one part of it.
+
+    A place is inside where the curves wind around it in all, those with the inside on their left once forward: so
+    curves within others count by turns, outer border and hole, and an outer border within another counts for nothing.
+
+    Parameters
+    ----------
+    curves : sequence of (u, 2) float arrays
+        The inside on the left. They should not cross.
+
+    Returns
+    -------
+    Outline
+        Its numbers are of the points of all curves, one after the other.
+    """
+    first = np.cumsum([0, *map(len, curves)])
+    areas = np.array([signed_area(curve) for curve in curves])
+    turn = np.sign(areas).astype(np.int64)
+    within = _within(curves, np.abs(areas))
+    around = within @ turn
+    bounding = (around > 0) != (around + turn > 0)
+    rings, parts = [], []
+    for n in np.flatnonzero(bounding).tolist():
+        outer = np.flatnonzero(within[n] & bounding & (turn > 0))
+        part = n if turn[n] > 0 else int(outer[np.argmin(areas[outer])])
+        rings.append(np.arange(first[n], first[n + 1]))
+        parts.append(part)
+    return Outline(rings, parts, [], 0.0)
+
+
+def signed_area(curve: NDArray[np.float64]) -> float:
+    """Return the area of a closed polygon (u, 2); below 0 where the inside is on its right."""
+    x, y = (curve - curve[0]).T
+    return float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)
+
+
+def _within(curves: Sequence[NDArray[np.float64]], areas: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which curves (one a row) lie within which others, by most of their points."""
+    low, high = (np.array([end(curve, axis=0) for curve in curves]) for end in (np.min, np.max))
+    apart = (low[:, None] > high[None]).any(axis=2) | (high[:, None] < low[None]).any(axis=2)
+    found = ~apart & (areas[:, None] < areas[None, :])
+    for one, other in np.argwhere(found).tolist():
+        inside = np.empty(len(curves[one]), np.bool_)
+        inside_polygon(np.ascontiguousarray(curves[other]), np.ascontiguousarray(curves[one]), inside)
+        found[one, other] = inside.mean() > 0.5
+    return np.asarray(found)
 
 
 @dataclass(frozen=True)

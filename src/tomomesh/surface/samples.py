@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.samples import fit_planes, local_spacing, region_medians, settle
+from ..kernels.samples import fit_planes, settle
+from ..kernels.spacing import find_lonely, local_spacing, region_medians
 from ..kernels.threads import in_blocks
 from ..model.columns import any_of
 from ..progress import Progress, silent
@@ -59,6 +60,10 @@ LONELY = 1.7
 """Spacing over that of the region from which a point is a stray."""
 LOOSE = 0.3
 """Least distance of the neighbors from the quadratic under a point, sampling distances, from which it is a stray."""
+DOUBTFUL = 1.1
+"""Spacing over that of the region from which a point is looked at again where it has settled."""
+EMPTY, SOME = 2.0, 2
+"""Radius around that place, sampling distances, and how many others it must hold: 13 are usual."""
 SPARSE = 8.0
 """Spacing over that of the whole cloud from which a point is a stray, whatever its region is like."""
 STRAIGHTER = 0.9
@@ -139,6 +144,7 @@ def settle_points(positions: Floats, *, threads: int = 0, progress: Progress = s
     settled = cloud.settled(planes, width, stray)
     noise = cloud.regions.median(settled[:, 6])
     stray |= settled[:, 6] > np.maximum(OFF * noise, LOOSE * spacing)
+    stray |= cloud.lonely(settled, spacing)
     kept = np.flatnonzero(~stray)
     strays = int(len(points) - cloud.points[kept, 3].sum())
     bend = float(np.quantile(planes[kept, 4] / spacing[kept], STRAIGHTER)) if len(kept) else 1.0
@@ -189,6 +195,13 @@ class _Cloud:
         settled = np.empty((len(self.points), 7))
         self._run(3, lambda a, b: settle(self.points, planes, *self._cells, width, stray, settled, a, b))
         return settled
+
+    def lonely(self, settled: Floats, spacing: Floats) -> NDArray[np.bool_]:
+        """Tell which points with few others around have settled where there are none."""
+        lonely = np.empty(len(settled), np.bool_)
+        reach = np.where(spacing > DOUBTFUL * self.regions.median(spacing), EMPTY * spacing, 0.0)
+        self._run(3, lambda a, b: find_lonely(self.points, *self._cells, settled, reach, SOME, lonely, a, b))
+        return lonely
 
     @property
     def _cells(self) -> tuple[NDArray[np.int64], NDArray[np.int32], Floats]:

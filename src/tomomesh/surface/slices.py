@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..model.points import NEURON
+from ..model.points import NEURON, RING, SIDE
 from .rings import outline
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ class Slices:
         The plane of each point; -1 where it lies in none.
     spacing : float
         Distance of neighboring points within the planes.
-    rings : tuple of (u, 3) float arrays
-        The contour of each plane, where it is known.
+    rings : tuple of tuples of (u, 3) float arrays
+        The contours of each plane, where they are known: seen against the normal, the inside on their left.
     """
 
     origin: Floats
@@ -70,7 +70,7 @@ class Slices:
     heights: Floats
     labels: NDArray[np.int32]
     spacing: float
-    rings: tuple[Floats, ...] = ()
+    rings: tuple[tuple[Floats, ...], ...] = ()
 
     @property
     def normal(self) -> Floats:
@@ -132,21 +132,25 @@ def known_slices(points: PointSet) -> Slices | None:
     Parameters
     ----------
     points : PointSet
+        Of several rings in a slice, the attributes `RING` and `SIDE` tell which each point is on, and whether the
+        ring is around the inside or around a hole.
 
     Returns
     -------
     Slices or None
         None where the points do not know, or where their slices are not parallel planes.
     """
-    ring = (points.slices >= 0) & (points.neurons >= 0) & (points.kinds == NEURON)
-    numbers = np.unique(points.slices[ring])
-    order = np.lexsort((points.neurons, points.slices))
-    order = order[ring[order]]
-    rings = [points.positions[order[points.slices[order] == number]] for number in numbers]
-    if len(rings) < SLICES or min(map(len, rings)) < FEWEST:
+    neuron = (points.slices >= 0) & (points.neurons >= 0) & (points.kinds == NEURON)
+    ring = np.asarray(points.attributes.get(RING, np.zeros(len(points), np.int64)))
+    order = np.lexsort((points.neurons, ring, points.slices))
+    order = order[neuron[order]]
+    numbers = np.unique(points.slices[neuron])
+    grouped = _grouped(order, points.slices, ring)
+    if len(numbers) < 2 or min(map(len, grouped)) < FEWEST:
         return None
-    origin = np.mean([corner for ring in rings for corner in (ring.min(axis=0), ring.max(axis=0))], axis=0)
-    labels = np.where(ring, np.searchsorted(numbers, points.slices), -1).astype(np.int32)
+    rings = [points.positions[one] for one in grouped]
+    origin = np.mean([corner for one in rings for corner in (one.min(axis=0), one.max(axis=0))], axis=0)
+    labels = np.where(neuron, np.searchsorted(numbers, points.slices), -1).astype(np.int32)
     local = points.positions - origin
     normal = _common_normal(local[order], labels[order], rings[-1].mean(axis=0) - rings[0].mean(axis=0))
     height = local[order] @ normal
@@ -154,9 +158,28 @@ def known_slices(points: PointSet) -> Slices | None:
     gaps = np.diff(heights)
     if gaps.min() <= 0 or np.abs(height - heights[labels[order]]).max() > PARTED * gaps.min():
         return None
-    sides = np.concatenate([np.roll(ring, -1, axis=0) - ring for ring in rings])
+    sides = np.concatenate([np.roll(one, -1, axis=0) - one for one in rings])
     spacing = min(float(np.median(np.sqrt((sides**2).sum(axis=1)))), float(np.median(gaps)))
-    return Slices(origin, _axes_across(normal), heights, labels, spacing, tuple(rings))
+    found = Slices(origin, _axes_across(normal), heights, labels, spacing)
+    return replace(found, rings=_oriented(points, grouped, found))
+
+
+def _grouped(order: NDArray[np.int64], slices: NDArray[np.int32], ring: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Split points in order where the slice or the ring changes."""
+    changes = (np.diff(slices[order]) != 0) | (np.diff(ring[order]) != 0)
+    return np.split(order, np.flatnonzero(changes) + 1)
+
+
+def _oriented(points: PointSet, grouped: list[NDArray[np.int64]], found: Slices) -> tuple[tuple[Floats, ...], ...]:
+    """Turn each ring so that the inside is on its left, and gather those of each plane."""
+    side = points.attributes.get(SIDE)
+    planes: list[list[Floats]] = [[] for _ in found.heights]
+    for one in grouped:
+        x, y, _ = found.placed(points.positions[one]).T
+        area = float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+        hole = side is not None and bool(side[one[0]] % 2)
+        planes[found.labels[one[0]]].append(points.positions[one if (area > 0) != hole else one[::-1]])
+    return tuple(map(tuple, planes))
 
 
 def _lots(local: Floats) -> Floats:

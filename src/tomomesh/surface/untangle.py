@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -14,9 +14,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.mesh import TriMesh
-    from .drape import Ring
 
     Tangled = Callable[..., NDArray[np.bool_]]
+
+    class Smoother(Protocol):
+        """Whatever smooths vertices."""
+
+        def smoothed(self, vertices: NDArray[np.float64], passes: int) -> NDArray[np.float64]:
+            """Return the vertices after some passes of a low-pass filter."""
+
 
 ROUNDS = 24
 """Rounds after which what still passes through itself is left, and reported."""
@@ -27,7 +33,7 @@ BACK = 0.25
 
 
 def untangle(
-    mesh: TriMesh, origin: NDArray[np.float64], ring: Ring, tangled: Tangled
+    mesh: TriMesh, origin: NDArray[np.float64], ring: Smoother, tangled: Tangled
 ) -> tuple[TriMesh, int, NDArray[np.bool_]]:
     """Smooth a mesh where it passes through itself, and take it back towards where it came from.
 
@@ -36,7 +42,7 @@ def untangle(
     mesh : TriMesh
     origin : (n, 3) float array
         Its vertices where it does not pass through itself: before the fit.
-    ring : Ring
+    ring : Smoother
         The neighbors of its vertices.
     tangled : callable
         Marks the faces (m,) of a mesh that pass through others; told which vertices have moved since it last did.

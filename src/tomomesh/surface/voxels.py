@@ -81,8 +81,9 @@ def boundary(
     volume: Volume,
     mask: NDArray[np.bool_],
     *,
-    lower: float = -np.inf,
-    upper: float = np.inf,
+    lower: float | NDArray[np.float64] = -np.inf,
+    upper: float | NDArray[np.float64] = np.inf,
+    layers: str = "all",
     surface: str = "all",
     threads: int = 0,
 ) -> Boundary:
@@ -93,7 +94,9 @@ def boundary(
     volume : Volume
     mask : (K, J, I) bool array
         The voxels with lower < k <= upper, one at least. What surrounds the volume is background.
-    lower, upper : float
+    lower, upper : float or (L,) float array
+    layers : {"all", "any"}
+        Whether a voxel is kept where all its layers lie in their windows, or one at least.
     surface : {"all", "outer"}
         All surfaces, or those that nothing surrounds.
     threads : int
@@ -108,7 +111,7 @@ def boundary(
     ResourceError
         Where the boundary would not fit into the memory.
     """
-    levels, padded = Levels(volume.voxels, lower, upper), np.pad(mask, 1)
+    levels, padded = Levels(volume.voxels, lower, upper, layers), np.pad(mask, 1)
     joined = without_contacts(padded, lambda voxels: levels.excess(voxels - np.int32(1)), threads)
     net = net_around(_filled(joined) if surface == "outer" else joined, threads)
     x, y, z = (net.inner + 1).T

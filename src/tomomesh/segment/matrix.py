@@ -1,0 +1,79 @@
+"""What an estimator takes and refuses, in the words that scikit-learn's own use."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+def checked_matrix(X: ArrayLike, estimator: str, *, features: int | None = None) -> NDArray[np.float64]:
+    """Return inputs (n, d) as floats.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For what is no matrix of finite real numbers with a sample and a feature at least, or has other than
+        `features` columns.
+    """
+    if hasattr(X, "toarray"):
+        raise TypeError("Sparse data was passed, but dense data is required: convert it with X.toarray().")
+    found = np.asarray(X)
+    if np.iscomplexobj(found):
+        raise ValueError("Complex data not supported: found an array of complex numbers.")
+    found = np.asarray(found, np.float64)
+    if found.ndim != 2:
+        raise ValueError(f"Expected 2D array, got {found.ndim}D array instead. Reshape your data to (n, d).")
+    for count, what in zip(found.shape, ("sample", "feature"), strict=True):
+        if count < 1:
+            raise ValueError(f"Found array with 0 {what}(s) (shape={found.shape}) while a minimum of 1 is required.")
+    if not np.isfinite(found).all():
+        raise ValueError(f"Input X contains NaN or infinity: {estimator} takes finite numbers alone.")
+    if features is not None and found.shape[1] != features:
+        raise ValueError(f"X has {found.shape[1]} features, but {estimator} is expecting {features} features as input.")
+    return found
+
+
+def checked_weights(sample_weight: ArrayLike | None, samples: int) -> NDArray[np.float64] | None:
+    """Return weights (n,), or None where all inputs count alike.
+
+    Raises
+    ------
+    ValueError
+        For what is no such weights.
+    """
+    if sample_weight is None:
+        return None
+    weights = np.asarray(sample_weight, np.float64)
+    weights = np.full(samples, weights) if weights.ndim == 0 else weights
+    if weights.shape != (samples,):
+        raise ValueError(f"Sample weights must be 1D and one a sample: found {weights.shape}, wanted ({samples},).")
+    if not np.isfinite(weights).all() or (weights < 0).any() or not weights.any():
+        raise ValueError("Sample weights must be finite, none negative, and not all zero.")
+    return weights
+
+
+def seed_of(random_state: Any) -> int:
+    """Return the seed that a random state comes down to: itself, or one drawn from it, or from the system."""
+    if random_state is None:
+        return int(np.random.default_rng().integers(2**32))
+    if isinstance(random_state, np.random.Generator):
+        return int(random_state.integers(2**32))
+    if isinstance(random_state, np.random.RandomState):
+        return int(random_state.randint(2**31 - 1))
+    return int(random_state)
+
+
+class NotFittedError(ValueError, AttributeError):
+    """The estimator was not fitted before."""
+
+
+def not_fitted(estimator: str) -> Exception:
+    """Return scikit-learn's own error where that is at work, so that its tools know it."""
+    theirs = sys.modules.get("sklearn.exceptions")
+    kind: type[Exception] = NotFittedError if theirs is None else theirs.NotFittedError
+    return kind(f"This {estimator} instance is not fitted yet. Call 'fit' first.")

@@ -1,0 +1,87 @@
+"""Labels of a label map as a window."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import EmptyError, GeometryError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from ..model.volume import Volume
+
+NAMED = 24
+"""Labels that are named where one is missing, at most."""
+NEAR = 0.01
+"""Share of a voxel by which two grids may differ."""
+
+
+def select(labels: Volume, wanted: Sequence[int]) -> NDArray[np.bool_]:
+    """Keep the voxels of some labels.
+
+    Parameters
+    ----------
+    labels : Volume
+        Whole numbers, one layer.
+    wanted : sequence of int
+
+    Returns
+    -------
+    (K, J, I) bool array
+
+    Raises
+    ------
+    UsageError
+        Where the volume is no label map.
+    EmptyError
+        Where it lacks a label; names those that it has.
+    """
+    voxels = labels.voxels
+    if voxels.ndim != 3 or (voxels.dtype.kind == "f" and not (voxels == np.rint(voxels)).all()):
+        raise UsageError(
+            "the labels are no whole numbers", found=f"{voxels.dtype}, {voxels.ndim - 2} layer(s)",
+            expected="a label map of one layer",
+        )  # fmt: skip
+    present = np.unique(voxels).astype(np.int64)
+    missing = np.setdiff1d(wanted, present)
+    if len(missing):
+        named = ", ".join(map(str, present[:NAMED])) + (", ..." if len(present) > NAMED else "")
+        raise EmptyError(
+            "the label map has no such label", found=f"--select = {', '.join(map(str, missing))}",
+            expected=f"labels among {named}",
+        )  # fmt: skip
+    return np.ascontiguousarray(np.isin(voxels, wanted))
+
+
+def require_same_grid(labels: Volume, study: Volume) -> None:
+    """Refuse labels that are not on the study's own grid.
+
+    Raises
+    ------
+    GeometryError
+        Where sizes or places differ.
+    """
+    if labels.shape != study.shape:
+        raise GeometryError(
+            "the labels do not fit the study", found=f"{_sizes(labels)} voxels",
+            expected=f"{_sizes(study)}, as the study",
+            hint="labels on the study's own grid, or the labels alone as the study",
+        )  # fmt: skip
+    corners = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]) * (
+        np.array(study.shape[::-1]) - 1.0
+    )
+    apart = np.sqrt(((labels.to_mm(corners) - study.to_mm(corners)) ** 2).sum(axis=1)).max()
+    if apart > NEAR * min(study.spacing_mm):
+        raise GeometryError(
+            "the labels lie elsewhere than the study", found=f"corners {apart:.4g} mm apart",
+            expected="the study's own grid", hint="labels on the study's own grid, or the labels alone as the study",
+        )  # fmt: skip
+
+
+def _sizes(volume: Volume) -> str:
+    return " x ".join(map(str, volume.shape[::-1]))

@@ -1,0 +1,160 @@
+"""A network while it is trained, as an animated GIF."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from PIL import Image
+
+from .camera import Camera
+from .marks import dots
+from .plane import Plane
+from .style import NETWORK, canvas, heading, styled
+from .topologies import flat, frame
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from ..model.lattice import Lattice
+
+    Floats = NDArray[np.float64]
+
+MOST_FRAMES = 120
+"""More are thinned out, the first and the last kept."""
+FRAME_MS, START_MS, END_MS = 80, 800, 2400
+"""How long a frame stands, and the first and the last."""
+SIDE = 4.0
+"""Inches of a frame."""
+DPI = 100
+COLORS = 32
+FRONT = Camera()
+FLAT = Plane()
+PALE = (0.80, 0.84, 0.87)
+
+
+@styled
+def film(
+    region: Floats,
+    codebooks: Floats | Sequence[Floats],
+    network: Lattice,
+    *,
+    notes: Sequence[str] | None = None,
+    title: str = "A network over a region",
+    camera: Camera = FRONT,
+) -> bytes:
+    """Draw a network over its inputs, codebook after codebook.
+
+    Parameters
+    ----------
+    region : (n, 2) or (n, 3) float array
+        The input signal.
+    codebooks : (s, u, 2) or (s, u, 3) float array
+        Positions of the neurons, the start first; as `tomomesh.segment.snapshots.snapshots` keeps them, or a
+        ``callback`` of `tomomesh.SOM`.
+    network : Lattice
+        Which neurons are neighbors.
+    notes : sequence of str, optional
+        What is said under the title of each frame; by default its number.
+    title : str
+    camera : Camera
+        How points in space are looked at.
+
+    Returns
+    -------
+    bytes
+        An animated GIF, which goes on for ever; the same input gives the same bytes.
+    """
+    figure, (ax,) = canvas(SIDE, SIDE + 0.25)
+    seen, places = flat(region, camera), np.stack([flat(one, camera) for one in codebooks])
+    dots(ax, seen, size=_dot_size(*np.shape(region)), color=PALE)
+    frame(ax)
+    ends = np.concatenate([seen, places.reshape(-1, 2)])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    margin = 0.04 * float((high - low).max()) or 1.0
+    ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
+    return _encoded(list(_frames(figure, ax, places, network, notes, title)))
+
+
+@styled
+def film_slice(
+    mask: NDArray[np.bool_],
+    codebooks: Floats | Sequence[Floats],
+    network: Lattice,
+    plane: Plane = FLAT,
+    *,
+    notes: Sequence[str] | None = None,
+    title: str = "A network over its slice",
+) -> bytes:
+    """Draw a network over the window of its slice, codebook after codebook.
+
+    Parameters
+    ----------
+    mask : (J, I) bool array
+        The window.
+    codebooks : (s, u, 2) float array
+        Neurons in pixel indices (column, row), the start first.
+    network : Lattice
+    plane : Plane
+        Spacing and sense of the slice.
+    notes : sequence of str, optional
+        What is said under the title of each frame; by default its number.
+    title : str
+
+    Returns
+    -------
+    bytes
+        An animated GIF, as of `film`.
+    """
+    places = np.stack([plane.place(one) for one in codebooks])
+    bounds = plane.bounds(mask, places.reshape(-1, 2))
+    ratio = float(np.clip((bounds[1] - bounds[0])[1] / (bounds[1] - bounds[0])[0], 0.4, 1.8))
+    figure, (ax,) = canvas(SIDE, SIDE * ratio + 0.35)
+    plane.draw(ax, np.where(np.asarray(mask, bool)[:, :, None], PALE, 1.0))
+    plane.crop(ax, bounds)
+    plane.rule([ax])
+    return _encoded(list(_frames(figure, ax, places, network, notes, title)))
+
+
+def _dot_size(count: int, dimensions: int) -> float:
+    """Let the dots of a filled plane region overlap, which also is shorter to store; keep those in space apart."""
+    return float(np.clip(1.5e5 / count, 2.0, 36.0) if dimensions == 2 else np.clip(1.5e4 / count, 1.0, 9.0))
+
+
+def _frames(
+    figure: Figure, ax: Axes, places: Floats, network: Lattice, notes: Sequence[str] | None, title: str
+) -> Iterator[Image.Image]:
+    """Move one network over one background, so that nothing but it changes."""
+    chosen = np.unique(np.linspace(0, len(places) - 1, min(len(places), MOST_FRAMES)).round().astype(int))
+    edges = LineCollection(list(places[0][network.edges]), colors=NETWORK, linewidths=1.1, zorder=3)
+    ax.add_collection(edges)
+    neurons = ax.scatter(
+        places[0][:, 0], places[0][:, 1], s=14, facecolors=NETWORK, edgecolors="white", linewidths=0.4, zorder=4
+    )
+    heading(ax, title, " ")
+    note = ax.texts[-1]
+    figure.set_dpi(DPI)
+    figure.canvas.draw()
+    figure.set_layout_engine("none")
+    for n in chosen:
+        edges.set_segments(list(places[n][network.edges]))
+        neurons.set_offsets(places[n])
+        note.set_text(notes[n] if notes is not None else f"{n} of {len(places) - 1}")
+        figure.canvas.draw()
+        yield Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[:, :, :3].copy())  # type: ignore[attr-defined]
+
+
+def _encoded(frames: list[Image.Image]) -> bytes:
+    """Write frames of one palette, so that what stands still is stored once."""
+    palette = frames[len(frames) // 2].quantize(COLORS, method=Image.Quantize.MAXCOVERAGE)
+    first, *others = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in frames]
+    shown_ms = [START_MS, *[FRAME_MS] * (len(frames) - 2), END_MS][-len(frames) :]
+    file = io.BytesIO()
+    first.save(file, format="GIF", save_all=True, append_images=others, duration=shown_ms, loop=0, optimize=False)
+    return file.getvalue()

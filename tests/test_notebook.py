@@ -1,0 +1,70 @@
+"""The notebook of the documentation runs, and measures what it says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+from conftest import COMPILED
+
+if TYPE_CHECKING:
+    from nbformat import NotebookNode
+
+NOTEBOOK = Path(__file__).parents[1] / "docs" / "networks.ipynb"
+
+
+@pytest.fixture(scope="module")
+def written() -> NotebookNode:
+    notebook: NotebookNode = nbformat.read(NOTEBOOK, as_version=4)  # type: ignore[no-untyped-call]
+    return notebook
+
+
+@pytest.fixture(scope="module")
+def executed(tmp_path_factory: pytest.TempPathFactory) -> NotebookNode:
+    if not COMPILED:
+        pytest.skip("a head takes too long in plain Python")
+    folder = tmp_path_factory.mktemp("notebook")
+    notebook = nbformat.read(NOTEBOOK, as_version=4)  # type: ignore[no-untyped-call]
+    client = NotebookClient(notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(folder)}})
+    found = client.execute()
+    assert list(folder.iterdir()) == []
+    return found
+
+
+def test_is_kept_without_outputs(written: NotebookNode) -> None:
+    nbformat.validate(written)
+    code = [cell for cell in written.cells if cell.cell_type == "code"]
+    assert all(not cell.outputs and cell.execution_count is None for cell in code)
+
+
+def test_measures_what_it_says(executed: NotebookNode) -> None:
+    found: dict[str, Any] = json.loads(executed.cells[-1].outputs[0].text)
+    assert found["moved"] == {"chain": 4, "ring": 5}
+    assert found["triangle"]["dead_neurons"] == 0
+    assert found["triangle"]["quantization_error"] < 0.08
+    assert found["skull"]["self_crossings"] == 0
+    assert found["skull"]["bridged"] == 1
+    assert 400 < found["skull"]["perimeter_mm"] < 500
+    assert found["off_bone"]["ring"] <= 2 < found["off_bone"]["grid"]
+    assert 11 <= found["slices_with_gaps"] <= 12
+
+
+def test_draws_its_figures(executed: NotebookNode) -> None:
+    kinds = [
+        kind
+        for cell in executed.cells
+        if cell.cell_type == "code"
+        for output in cell.outputs
+        for kind in output.get("data", {})
+        if kind.startswith("image/")
+    ]
+    assert kinds.count("image/gif") == 2
+    assert kinds.count("image/png") == 6
+    assert not [
+        output for cell in executed.cells for output in cell.get("outputs", []) if output.get("name") == "stderr"
+    ]
