@@ -201,3 +201,29 @@ class TestRegion:
     def test_wants_an_input_for_every_neuron(self) -> None:
         with pytest.raises(EmptyError, match="5 inputs"):
             train_region(np.zeros((5, 2)), NetworkSettings(neurons=6))
+
+
+class TestNeighborStart:
+    def test_follows_the_slice_below(self) -> None:
+        """A ring that starts where the one below came to rest lies as well, and neuron k keeps its meridian."""
+        mask = np.stack([annulus(20 + k, 12 + k) for k in range(6)])
+        settings = NetworkSettings(neurons=40, start="neighbor")
+        found = train_study(mask, settings, threads=2)
+        plain = train_study(mask, NetworkSettings(neurons=40))
+        for one, other in zip(found.codebooks, plain.codebooks, strict=True):
+            assert np.abs(radius_of(one).mean() - radius_of(other).mean()) < 0.2
+            assert radius_of(one).std() < 0.5
+        turned = np.diff(np.unwrap(np.arctan2(*(found.codebooks - 31.5).T).T, axis=0), axis=0)
+        assert np.abs(turned).max() < 2 * np.pi / 40
+        assert np.array_equal(found.codebooks, train_study(mask, settings, threads=1).codebooks)
+
+
+def annulus(outer: float, inner: float) -> NDArray[np.bool_]:
+    """Draw a ring of pixels about the middle of a picture of 64 x 64."""
+    away = np.hypot(*(np.mgrid[:64, :64] - 31.5))
+    return np.asarray((away < outer) & (away > inner))
+
+
+def radius_of(ring: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance of each neuron from the middle."""
+    return np.asarray(np.hypot(*(ring - 31.5).T))

@@ -34,11 +34,11 @@ def start_positions(
     ----------
     inputs : (n, d) float array
     lattice : Lattice
-    start : {"random", "ellipse", "axes"} or (u, d) float array
+    start : {"random", "ellipse", "axes", "neighbor"} or (u, d) float array
         ``"random"`` draws inputs. ``"axes"`` lays the network at rest along the principal axes of the inputs, with
         their mean and variances. ``"ellipse"`` does the same to open networks; closed ones are stretched by the
         symmetric root of the covariance, which turns them the least: neuron k stays on the same meridian from
-        slice to slice. An array is taken as it is.
+        slice to slice; so do those that have no ``"neighbor"``. An array is taken as it is.
     rng : Generator
     weights : (n,) float array, optional
         Of the inputs, all over 0.
@@ -56,12 +56,12 @@ def start_positions(
     if start == "random":
         share = None if weights is None else weights / weights.sum()
         return inputs[rng.choice(len(inputs), u, replace=len(inputs) < u, p=share)]
-    if start not in ("ellipse", "axes"):
+    if start not in ("ellipse", "axes", "neighbor"):
         raise UsageError("there is no such start", found=f"start = {start}", expected="random | ellipse | axes")
     center, covariance = spread or moments(np.ascontiguousarray(inputs.T), weights)
     variance, axes = np.linalg.eigh(covariance)
     deviation = np.sqrt(np.maximum(variance, 0.0))
-    if start == "ellipse" and lattice.name in CLOSED:
+    if start != "axes" and lattice.name in CLOSED:
         shared = min(lattice.places.shape[1], d)
         return np.asarray(center + lattice.places[:, :shared] @ ((axes * deviation) @ axes.T)[:shared])
     own, towards = _longest_first(lattice), np.arange(d)[::-1]

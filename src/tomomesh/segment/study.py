@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,12 +14,16 @@ from ..model.networks import Networks
 from ..progress import Progress, silent
 from .even import bridged_edges, even_spacing
 from .signal import fills_most, outline, pixels_of
-from .som import match, train
+from .som import match, radii, train
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..model.lattice import Lattice
     from ..settings import NetworkSettings
+
+NEAR = 2.0
+"""First radius, hops, where a network starts from the result of the slice below."""
 
 
 def train_study(
@@ -34,7 +39,7 @@ def train_study(
     """Run one self-organising map on each slice of a window (the paper's Fig. 5, 7).
 
     Slices are the unit of parallel work, and each draws from a generator of its own, so the result does not
-    depend on the number of threads.
+    depend on the number of threads. With ``start="neighbor"`` each starts from the one below, one after the other.
 
     Parameters
     ----------
@@ -68,6 +73,9 @@ def train_study(
     codebooks, bridged = np.zeros((count, len(graph), 2)), np.zeros((count, len(graph.edges)), bool)
     pixels, strays = np.zeros(count, np.int64), np.zeros(count, np.int64)
 
+    followed = settings.start == "neighbor"
+    before: list[NDArray[np.float64]] = []
+
     def work(start: int, stop: int) -> None:
         for k in range(start, stop):
             plane = mask[k] if outlined or layers is None else layers[k]
@@ -76,14 +84,19 @@ def train_study(
             pixels[k] = len(shown)
             if len(shown) >= len(graph):
                 rng = np.random.default_rng([seed, k])
-                found, kept = train(shown, graph, settings, rng, pixel_area=pixel_area)
+                chosen = _from_neighbor(shown, graph, settings, pixel_area, begun=bool(before)) if followed else settings
+                found, kept = train(
+                    shown, graph, chosen, rng, pixel_area=pixel_area, start=before.pop() if before else None
+                )
+                before.extend([found] if followed else [])
                 found = np.ascontiguousarray(found[:, :2])
                 gaps = bridged_edges(found, graph, settings.bridge)
                 if settings.even:
                     found, gaps = even_spacing(found, graph, gaps)
                 codebooks[k], bridged[k], strays[k] = found / pixel_mm, gaps, (~kept).sum()
 
-    in_blocks(work, count, block=1, threads=threads, done=lambda done: progress("networks", done, count))
+    workers = 1 if followed else threads
+    in_blocks(work, count, block=1, threads=workers, done=lambda done: progress("networks", done, count))
     trained = pixels >= len(graph)
     if not trained.any():
         raise EmptyError(
@@ -102,6 +115,16 @@ def train_study(
         pixels[trained],
         strays[trained],
     )
+
+
+def _from_neighbor(
+    shown: NDArray[np.float64], graph: Lattice, settings: NetworkSettings, pixel_area: float, *, begun: bool
+) -> NetworkSettings:
+    """Return the settings of a slice that follows another, near whose result its own will be; or of the first."""
+    if not begun or settings.radius is not None:
+        return settings
+    _, last = radii(shown, graph, settings, pixel_area)
+    return replace(settings, radius=(max(NEAR, last), last))
 
 
 def regions(
