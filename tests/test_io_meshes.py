@@ -173,7 +173,7 @@ class TestWrite:
         assert len(read_mesh(tmp_path / "m.stl").vertices) == len(mesh.vertices)
 
     def test_outputs_are_checked(self, tmp_path: Path) -> None:
-        with pytest.raises(UsageError, match=r"\.obj \| \.ply \| \.stl"):
+        with pytest.raises(UsageError, match=r"\.obj \| \.off \| \.ply \| \.stl"):
             write_mesh(ball(), tmp_path / "m.vtk")
         with pytest.raises(OutputError):
             write_mesh(ball(), tmp_path / "none" / "m.stl")

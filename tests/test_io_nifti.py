@@ -13,7 +13,7 @@ from nibabel.orientations import inv_ornt_aff
 
 from studies import AFFINES, LPS_TO_RAS, SHAPE, assert_in_place, indices_of, sampled, shared, write_nifti
 from tomomesh.errors import FormatError, GeometryError, OutputError, ResourceError, TomomeshError, UsageError
-from tomomesh.io import limits, nifti, read_volume, write_labels
+from tomomesh.io import limits, read_volume, unpack, write_labels
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:
@@ -220,7 +220,7 @@ class TestFaults:
         path = write_nifti(tmp_path / "f.nii", sampled(AFFINES["axial"]), AFFINES["axial"])
         (tmp_path / "f.nii.gz").write_bytes(gzip.compress(path.read_bytes() + bytes(2**22)))
         assert_in_place(read_volume(tmp_path / "f.nii.gz"))
-        monkeypatch.setattr(nifti, "SURPLUS_BYTES", 2**20)
+        monkeypatch.setattr(unpack, "SURPLUS_BYTES", 2**20)
         with pytest.raises(ResourceError):
             read_volume(tmp_path / "f.nii.gz")
 

@@ -13,6 +13,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+GIVEN = "no frame in the file: --spacing, columns to the left, rows to the back"
+UNTURNED = "no directions in the file: columns to the left, rows to the back, slices up"
+NOT_GIVEN = "--spacing is not used: the file holds its own"
+"""Notes on where a frame came from."""
+
 SMALLEST_SPACING = 1e-6
 """Shorter distances of voxels are taken for a broken header; in the file's own unit."""
 
@@ -57,6 +62,11 @@ def check_affine(affine: NDArray[np.float64], *, file: str, hint: str) -> None:
         expected="three independent axes of finite length",
         hint=hint,
     )
+
+
+def passed_over(spacing: Sequence[float] | None) -> tuple[str, ...]:
+    """Return the note on a spacing that was given for a file that holds its own."""
+    return (NOT_GIVEN,) if spacing else ()
 
 
 def upright(spacing: Sequence[float]) -> NDArray[np.float64]:

@@ -72,13 +72,26 @@ def _members(path: Path) -> Fields:
 
 def _array(data: bytes, file: str) -> NDArray[Any]:
     """Return the array in the bytes of an NPY file, once they are as many as its header promises."""
+    shape, by_columns, kind, start = npy_header(data, file=file)
+    require_bytes(start + math.prod(shape) * kind.itemsize, len(data), file=file)
+    with third_party("numpy", file):
+        return np.ndarray(shape, kind, data, start, order="F" if by_columns else "C")
+
+
+def npy_header(data: bytes, *, file: str) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
+    """Return an NPY file's shape, whether its first axis is the fastest, its type, and the bytes up to the numbers.
+
+    Raises
+    ------
+    FormatError
+        For a broken header, and arrays of Python objects.
+    """
     stream = io.BytesIO(data)
     with third_party("numpy", file):
         shape, by_columns, kind = HEADERS[np.lib.format.read_magic(stream)](stream)
         if kind.hasobject or any(length < 0 for length in shape):
             raise ValueError(kind)
-        require_bytes(stream.tell() + math.prod(shape) * kind.itemsize, len(data), file=file)
-        return np.ndarray(shape, kind, data, stream.tell(), order="F" if by_columns else "C")
+        return shape, by_columns, kind, stream.tell()
 
 
 def _positions(array: NDArray[Any], file: str) -> NDArray[np.float64]:

@@ -7,6 +7,9 @@ from typing import Any
 
 from ..errors import FormatError
 
+EXTRAS = {"tifffile": "tiff", "imagecodecs": "tiff", "laspy": "clouds", "lazrs": "clouds", "pye57": "clouds"}
+"""Package to the extra that brings it."""
+
 
 def required(package: str, *, file: str) -> Any:
     """Return a package that reads a kind of file, imported on first use.
@@ -23,5 +26,5 @@ def required(package: str, *, file: str) -> Any:
             f"this kind of file needs the package {package}",
             file=file,
             found=f"{package} = not installed",
-            hint='pip install "tomomesh[clouds]"',
+            hint=f'pip install "tomomesh[{EXTRAS[package]}]"',
         ) from None

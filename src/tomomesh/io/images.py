@@ -1,4 +1,4 @@
-"""PNG and TIFF slices in a folder."""
+"""PNG, TIFF and JPEG slices in a folder."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-FAMILIES = {".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF"}
+FAMILIES = {".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF", ".jpg": "JPEG", ".jpeg": "JPEG"}
 """Suffixes of slices, and the format behind each."""
 
 COLOR = {"RGB": "RGB", "RGBA": "RGB", "P": "RGB", "1": "L", "LA": "L"}
@@ -37,7 +37,7 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
     Parameters
     ----------
     files : list of Path
-        PNG or TIFF files, of one kind.
+        PNG, TIFF or JPEG files, of one kind.
     settings : ReadSettings
         `spacing` must be given: such files hold none.
     folder : str
@@ -84,7 +84,7 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
 
 
 def read_picture(path: str | Path) -> Volume:
-    """Read one PNG or TIFF picture as a slice of pixels of 1 mm.
+    """Read one PNG, TIFF or JPEG picture as a slice of pixels of 1 mm.
 
     Raises
     ------
@@ -94,7 +94,9 @@ def read_picture(path: str | Path) -> Volume:
     file = existing_file(path)
     if suffix_of(file) not in FAMILIES:
         found = f"suffix = {suffix_of(file) or 'none'}"
-        raise FormatError("the picture is of an unknown kind", file=str(path), found=found, expected="PNG or TIFF")
+        raise FormatError(
+            "the picture is of an unknown kind", file=str(path), found=found, expected="PNG, TIFF or JPEG"
+        )
     return read_images([file], ReadSettings(spacing=(1.0, 1.0, 1.0)), folder=str(path))
 
 
@@ -110,7 +112,7 @@ def _pixels(path: Path) -> NDArray[Any]:
 
     with third_party("Pillow", path.name):
         try:
-            image = Image.open(path, formats=("PNG", "TIFF"))
+            image = Image.open(path, formats=tuple(set(FAMILIES.values())))
         except Image.DecompressionBombError:
             raise ResourceError("the slice is too large to be read", file=path.name) from None
         with image:

@@ -3,32 +3,34 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import EmptyError, FormatError, OutputError
+from ..errors import EmptyError, FormatError
 from ..model.mesh import TriMesh
 from ..model.points import COLORS
 from .atomic import check_output, replacing
 from .colors import named_colors
 from .fields import AXES, flat_columns
 from .finite import check_finite
+from .gifti import write_gifti
+from .glb import write_glb
 from .limits import require_bytes
+from .off import write_off
 from .ply import parse_header, write_ply
-from .signature import signature
 from .source import existing_file, reader_of, suffix_of, third_party, whole
+from .threemf import write_3mf
+from .vtp import write_vtp_mesh
 from .weld import weld
+from .written import Written, single
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
-
-    from .fields import Fields
 
     Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
 
@@ -110,15 +112,6 @@ MESH_READERS: dict[str, Callable[[bytes, str], Arrays]] = {
 """Suffix to reader of vertices and faces."""
 
 
-@dataclass(frozen=True)
-class Written:
-    """What a writer is given beside the mesh: a line about it, and the fields of its vertices and faces."""
-
-    head: str
-    vertex_fields: Fields
-    face_fields: Fields
-
-
 def write_mesh(
     mesh: TriMesh,
     path: str | Path,
@@ -135,36 +128,46 @@ def write_mesh(
     mesh : TriMesh
         Its coordinates are written as they are.
     path : path
-        ``.stl`` (binary, 32-bit coordinates), ``.ply`` (binary, 64-bit) or ``.obj`` (text, 64-bit).
+        ``.ply`` and ``.vtp`` (binary), ``.obj``, ``.off`` and ``.3mf`` (text) keep 64-bit coordinates; ``.stl``,
+        ``.glb`` and ``.gii`` (binary) 32-bit ones.
     unit, frame : str
         What the coordinates are in, named in the file.
     vertex_fields : mapping of str to (n,) or (n, c) array, optional
-        Numbers at the vertices. PLY keeps them all, OBJ the colors (``red``, ``green`` and ``blue``), STL none.
+        Numbers at the vertices. PLY, VTP, GLB and GIFTI keep them all, OBJ, OFF and 3MF the colors (``red``,
+        ``green`` and ``blue``), STL none.
     face_fields : mapping of str to (m,) or (m, c) array, optional
-        Numbers on the faces, kept by PLY.
+        Numbers on the faces, kept by PLY and VTP.
 
     Raises
     ------
     UsageError
         For a suffix that has no writer, and fields of another length or without numbers.
     OutputError
-        Where the file cannot be written, or the format cannot keep distinct vertices apart.
+        Where the file cannot be written, the format cannot keep distinct vertices apart, or needs a unit.
     """
     check_output(path, MESH_WRITERS)
     at_vertices = flat_columns(vertex_fields or {}, len(mesh.vertices), AXES)
     on_faces = flat_columns(face_fields or {}, len(mesh.faces), ["count", "corners", "vertex_indices"])
-    MESH_WRITERS[suffix_of(path)](mesh, path, Written(signature(unit, frame), at_vertices, on_faces))
+    MESH_WRITERS[suffix_of(path)](mesh, path, Written(unit, frame, at_vertices, on_faces))
+
+
+KEEP_ALL = (".ply", ".vtp")
+KEEP_AT_VERTICES = (".glb", ".gii")
+KEEP_COLORS = (".obj", ".off", ".3mf")
+"""Suffixes by the fields that the format keeps: all, those at vertices, and the colors at vertices."""
 
 
 def keeps(path: str | Path, field: str, *, on_faces: bool = False) -> bool:
-    """Whether the format of a mesh file keeps a field: PLY all of them, OBJ the colors at vertices."""
+    """Whether the format of a mesh file keeps a field."""
     suffix = suffix_of(path)
-    return suffix == ".ply" or (suffix == ".obj" and field in COLORS and not on_faces)
+    if on_faces or suffix in KEEP_ALL:
+        return suffix in KEEP_ALL
+    return suffix in KEEP_AT_VERTICES or (suffix in KEEP_COLORS and field in COLORS)
 
 
 def _write_stl(mesh: TriMesh, path: str | Path, beside: Written) -> None:
     rows = np.zeros(len(mesh.faces), STL_ROW)
-    rows["corners"] = _single(mesh.vertices, path)[mesh.faces]
+    rows["corners"] = single(mesh.vertices, path, kind="STL")[mesh.faces]
     length = np.linalg.norm(mesh.face_vectors, axis=1, keepdims=True)
     rows["normal"] = mesh.face_vectors / np.where(length > 0, length, 1.0)
     with replacing(path) as file:
@@ -179,21 +182,6 @@ def _shortened(head: str) -> str:
     while len(" ".join(words)) > STL_TEXT:
         del words[1 if len(words) > 2 else -1]
     return " ".join(words)
-
-
-def _single(vertices: NDArray[np.float64], path: str | Path) -> NDArray[np.float32]:
-    """Return 32-bit coordinates, if they still tell the vertices apart."""
-    with np.errstate(over="ignore"):
-        single = vertices.astype(np.float32)
-    kept = np.isfinite(single).all() and len(weld(single.astype(np.float64))[0]) == len(weld(vertices)[0])
-    if not kept:
-        raise OutputError(
-            "the 32-bit coordinates of STL cannot keep the vertices apart",
-            file=str(path),
-            found=f"largest coordinate = {np.abs(vertices).max():g}",
-            hint="a .ply file, which keeps 64 bits, or --local-origin for a cloud",
-        )
-    return single
 
 
 def _write_ply(mesh: TriMesh, path: str | Path, beside: Written) -> None:
@@ -217,5 +205,10 @@ MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, Written], None]] = {
     ".stl": _write_stl,
     ".ply": _write_ply,
     ".obj": _write_obj,
+    ".off": write_off,
+    ".glb": write_glb,
+    ".vtp": write_vtp_mesh,
+    ".3mf": write_3mf,
+    ".gii": write_gifti,
 }
 """Suffix to writer."""

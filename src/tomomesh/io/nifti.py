@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import gzip
-import zlib
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import FormatError, GeometryError, ResourceError, UnreadableError
+from ..errors import FormatError, GeometryError
 from ..model.volume import Volume
-from .affine import SMALLEST_SPACING, check_affine, check_spacing, upright
+from .affine import GIVEN, SMALLEST_SPACING, check_affine, check_spacing, passed_over, upright
 from .gray import check_scale, native, scaled, scaled_dtype, without_holes
-from .limits import require_bytes, require_memory
+from .limits import require_bytes
 from .source import existing_file, suffix_of, third_party
+from .unpack import GZIP, PLAIN, check_promise, fill, unpacked
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from io import BufferedIOBase
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -34,12 +30,6 @@ MM_PER_UNIT = {0: 1.0, 1: 1000.0, 2: 1.0, 3: 0.001}
 
 SIZES = {348: "Nifti1Header", 540: "Nifti2Header"}
 """Header lengths in bytes, and nibabel's classes for them."""
-
-DEFLATE_RATIO = 1032
-"""No deflated stream holds more than this many times its own bytes."""
-
-SURPLUS_BYTES = 2**26
-"""A stream that goes on for longer after its voxels is taken for a bomb."""
 
 HINT = "--spacing x y z"
 
@@ -93,32 +83,18 @@ def read_nifti(path: Path, settings: ReadSettings) -> Volume:
         As the header or the voxels demand.
     """
     path, name = existing_file(path), str(path)
-    with _stream(path, name) as stream:
+    packing = GZIP if suffix_of(path) == ".nii.gz" else PLAIN
+    with unpacked(path, packing, file=name) as stream:
         start = stream.read(max(SIZES))
         header = _header(start, name)
         layout = _layout(header, name)
         affine, notes = _frame(header, settings, name)
-        _check_promise(layout, path, name)
-        data = _voxel_bytes(stream, start, layout, name)
+        check_promise(layout.offset + layout.promised, path.stat().st_size, packing, file=name)
+        data = np.empty(layout.promised, np.uint8)
+        stream.seek(layout.offset)
+        fill(data, stream, file=name)
     stored, more = _gray(data, layout, name)
     return Volume.from_stored(stored, affine, notes=notes + more)
-
-
-@contextmanager
-def _stream(path: Path, name: str) -> Iterator[BufferedIOBase]:
-    try:
-        with gzip.open(path) if suffix_of(path) == ".nii.gz" else path.open("rb") as stream:
-            yield stream
-    except (EOFError, zlib.error, gzip.BadGzipFile) as fault:
-        raise FormatError(
-            "the compressed file is damaged",
-            file=name,
-            found=f"gzip = {type(fault).__name__}",
-            expected="a whole gzip stream with the right check sum",
-            hint="a fresh copy of the file",
-        ) from None
-    except OSError as fault:
-        raise UnreadableError("the file cannot be read", file=name, found=fault.strerror or "") from None
 
 
 def _header(start: bytes, name: str) -> Any:
@@ -177,7 +153,7 @@ def _frame(header: Any, settings: ReadSettings, name: str) -> tuple[NDArray[np.f
     forms = [form for form in ("sform", "qform") if int(header[f"{form}_code"]) > 0]
     broken = not forms or not all(SMALLEST_SPACING <= size < np.inf for size in pixdim)
     if settings.spacing and broken:
-        return upright(settings.spacing), ("no frame in the file: --spacing, columns to the left, rows to the back",)
+        return upright(settings.spacing), (GIVEN,)
     check_spacing(pixdim, ["pixdim[1]", "pixdim[2]", "pixdim[3]"], file=name, hint=HINT)
     if not forms:
         raise GeometryError(
@@ -192,7 +168,7 @@ def _frame(header: Any, settings: ReadSettings, name: str) -> tuple[NDArray[np.f
     unit, notes = _unit(header, name)
     affine = np.diag([unit, unit, unit, 1.0]) @ FLIP @ affine
     check_affine(affine, file=name, hint="a file with a valid sform")
-    return affine, notes + (("--spacing is not used: the file holds its own",) if settings.spacing else ())
+    return affine, notes + passed_over(settings.spacing)
 
 
 def _unit(header: Any, name: str) -> tuple[float, tuple[str, ...]]:
@@ -206,46 +182,6 @@ def _unit(header: Any, name: str) -> tuple[float, tuple[str, ...]]:
         )
     factor = MM_PER_UNIT[code]
     return factor, () if factor == 1 else (f"coordinates were brought to millimeters: x {factor:g}",)
-
-
-def _check_promise(layout: Layout, path: Path, name: str) -> None:
-    require_memory(layout.promised, file=name)
-    size = path.stat().st_size
-    held = size * DEFLATE_RATIO if suffix_of(path) == ".nii.gz" else size
-    require_bytes(layout.promised, held - layout.offset, file=name)
-
-
-def _voxel_bytes(stream: BufferedIOBase, start: bytes, layout: Layout, name: str) -> NDArray[np.uint8]:
-    """Read the promised bytes, and the rest of a compressed stream for its check sum."""
-    before = start[layout.offset :]
-    _skip(stream, layout.offset - len(start))
-    data = np.empty(layout.promised, np.uint8)
-    data[: len(before)] = np.frombuffer(before, np.uint8)[: len(data)]
-    done = min(len(before), len(data))
-    while count := stream.readinto(data.data[done : done + 2**24]):
-        done += count
-    require_bytes(layout.promised, done, file=name)
-    if isinstance(stream, gzip.GzipFile):
-        _drain(stream, name)
-    return data
-
-
-def _skip(stream: BufferedIOBase, count: int) -> None:
-    while count > 0 and (chunk := stream.read(min(count, 2**20))):
-        count -= len(chunk)
-
-
-def _drain(stream: BufferedIOBase, name: str) -> None:
-    surplus = 0
-    while chunk := stream.read(2**20):
-        surplus += len(chunk)
-        if surplus > SURPLUS_BYTES:
-            raise ResourceError(
-                "the compressed file goes on far beyond its voxels",
-                file=name,
-                found=f"surplus = {surplus} bytes and more",
-                expected=f"at most {SURPLUS_BYTES} bytes",
-            )
 
 
 def _gray(data: NDArray[np.uint8], layout: Layout, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:

@@ -20,6 +20,8 @@ from .ply import write_ply
 from .ply_vertices import read_ply
 from .signature import signature
 from .source import existing_file, reader_of, suffix_of, whole
+from .vtp import write_vtp_points
+from .written import Written
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -99,8 +101,8 @@ def write_points(points: PointSet, path: str | Path, *, unit: str = "mm", frame:
     points : PointSet
         Its coordinates are written as they are.
     path : path
-        ``.ply`` keeps slice, neuron, kind and the attributes of each point, and so does ``.csv``; ``.xyz`` and
-        ``.npy`` keep positions.
+        ``.ply`` keeps slice, neuron, kind and the attributes of each point, and so do ``.csv`` and ``.vtp``;
+        ``.xyz`` and ``.npy`` keep positions.
     unit, frame : str
         What the coordinates are in: named in the file where its format can.
 
@@ -122,10 +124,15 @@ def _write_ply(points: PointSet, path: str | Path, unit: str, frame: str) -> Non
     write_ply(path, signature(unit, frame), columns)
 
 
+def _write_vtp(points: PointSet, path: str | Path, unit: str, frame: str) -> None:
+    write_vtp_points(points, path, Written(unit, frame, {}, {}))
+
+
 POINT_WRITERS: dict[str, Callable[[PointSet, str | Path, str, str], None]] = {
     ".ply": _write_ply,
     ".xyz": write_xyz,
     ".csv": write_csv,
     ".npy": write_npy,
+    ".vtp": _write_vtp,
 }
 """Suffix to writer."""

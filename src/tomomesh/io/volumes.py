@@ -8,9 +8,14 @@ from typing import TYPE_CHECKING
 from ..errors import FormatError, UnreadableError
 from ..settings import ReadSettings
 from .dicom import is_dicom, read_dicom
+from .freesurfer import read_mgh
 from .images import FAMILIES, read_images
+from .metaimage import read_metaimage
 from .nifti import read_nifti
+from .npy_volume import read_npy_volume
+from .nrrd import read_nrrd
 from .source import counted, existing, existing_file, regular_files, suffix_of
+from .tiff import read_tiff
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,12 +31,23 @@ def _read_one_dicom(path: Path, settings: ReadSettings) -> Volume:
 VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
     ".nii": read_nifti,
     ".nii.gz": read_nifti,
+    ".nrrd": read_nrrd,
+    ".nhdr": read_nrrd,
+    ".mha": read_metaimage,
+    ".mhd": read_metaimage,
+    ".mgh": read_mgh,
+    ".mgz": read_mgh,
+    ".npy": read_npy_volume,
+    ".tif": read_tiff,
+    ".tiff": read_tiff,
     ".dcm": _read_one_dicom,
     ".ima": _read_one_dicom,
 }
 """Suffix of a single file to its reader; folders, and DICOM of any name, are known by their content."""
 
-READABLE = "a folder of DICOM, PNG or TIFF slices, a DICOM file, .nii or .nii.gz"
+READABLE = "a folder of DICOM, PNG, TIFF or JPEG slices, a DICOM file, " + " | ".join(
+    suffix for suffix in VOLUME_READERS if suffix not in (".dcm", ".ima")
+)
 
 
 def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Volume:
@@ -40,7 +56,8 @@ def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Vo
     Parameters
     ----------
     path : path
-        A NIfTI file, a DICOM file, or a folder of DICOM, PNG or TIFF slices.
+        A DICOM, NIfTI, NRRD, MetaImage, MGH, NPY or multi-page TIFF file, or a folder of DICOM, PNG, TIFF or JPEG
+        slices.
     settings : ReadSettings, optional
         What to do where the files leave a choice.
 
@@ -100,7 +117,7 @@ def _read_folder(folder: Path, settings: ReadSettings) -> Volume:
 
 
 def _read_images(files: list[Path], others: Counter[str], folder: Path, settings: ReadSettings) -> Volume | None:
-    """Read DICOM where there is any, else PNG or TIFF slices."""
+    """Read DICOM where there is any, else PNG, TIFF or JPEG slices."""
     dicom = [path for path in files if is_dicom(path)]
     if dicom:
         others = others + Counter({"not DICOM": len(files) - len(dicom)})
