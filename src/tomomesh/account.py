@@ -55,6 +55,10 @@ WIDE = 3
 """Closing over which a result is warned of, cubes."""
 CROWDED = 0.25
 """Share of the slices with several components side by side over which one network a slice is warned of."""
+HOLES = 0.15
+"""Area of the holes in the slices over that of the window from which an outline that fills them is warned of."""
+FAR = 2.0
+"""Distance of the surface from one point in twenty, slice distances, from which a result is warned of."""
 FILLED = 0.05
 """Share of filled faces over which a result is warned of."""
 PACKAGES = ("tomomesh", "numpy", "scipy", "numba")
@@ -153,6 +157,11 @@ class Account:
             self.warn(
                 f"{slices} slices hold several components side by side: --contours components has a ring for each"
             )
+
+    def filled_holes(self, share: float) -> None:
+        """Warn of outlines that fill much that is not in the window."""
+        if share > HOLES:
+            self.warn(f"holes of {share:.0%} of the window's area are filled: --contours loops follows them too")
 
     def _lines(self, contours: Contours, *, closed: bool = True) -> None:
         if len(contours):
@@ -410,6 +419,11 @@ class Account:
             quality["volume_over_rings"] = quality["volume_mm3"] / self._rings_mm3
             if abs(quality["volume_over_rings"] - 1) > PLAUSIBLE:
                 self.warn(f"the mesh encloses {quality['volume_over_rings']:.0%} of the volume of its rings")
+        far = quality.get("points_to_surface_p95_mm", 0.0)
+        if "study" in self._sections and far > FAR * self._sections["study"]["slice_spacing_mm"]:
+            self.warn(
+                f"one point in twenty lies over {far:.3g} mm from the surface: it does not follow the window there"
+            )
         if quality["self_intersections"]:
             self.warn(f"{quality['self_intersections']} faces pass through others")
 

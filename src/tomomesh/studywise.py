@@ -11,7 +11,7 @@ from .contourwise import find_contours
 from .errors import UsageError
 from .model.volume import AXES, Volume
 from .results import NO_NETWORKS, Segmentation
-from .segment.looks import slices_with_several
+from .segment.looks import share_of_holes, slices_with_several
 from .segment.sample import sample
 from .segment.select import require_same_grid, select
 from .segment.study import regions, train_study
@@ -58,6 +58,8 @@ def segment_study(
         found = regions(mask, networks, pixel_mm=stack.spacing_mm[:2], threads=settings.run.threads)
     account.networks(networks, mask)
     account.crowded(slices_with_several(mask, settings.run.threads), len(networks.slices))
+    if networks.outlined:
+        account.filled_holes(share_of_holes(mask, settings.run.threads))
     with account.timed("points"):
         sampling = sample(networks, stack, caps=settings.cubes.caps, bridge=settings.network.bridge)
     account.points(sampling.points, sampling.spacing_mm, sampling.bridged)

@@ -13,9 +13,12 @@ from ..settings import LAYERS, MANY, Settings, limits_of, option_of, parameters
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-STUDY = "a NIfTI file, a folder of DICOM slices, or a folder of PNG or TIFF slices (with --spacing)"
+STUDY = (
+    "a NIfTI, NRRD, MetaImage, MGH, NPY or TIFF file, a folder of DICOM slices, "
+    "or a folder of PNG, TIFF or JPEG slices (with --spacing)"
+)
 POINTS = "an unoriented cloud: PLY, XYZ, TXT, CSV, NPY, NPZ, PCD, LAS, LAZ or E57, or the vertices of OBJ, OFF or STL"
-MESH = "STL, PLY or OBJ"
+MESH = "STL, PLY, OBJ, OFF, VTP, 3MF, GLB or GIFTI"
 STAGE_ONE = ("read", "window", "network")
 STAGE_TWO = ("cubes", "fit")
 ALIASES = {"cell_mm": "--cell"}
@@ -137,6 +140,11 @@ def _whole_numbers(text: str) -> tuple[int, ...]:
 
 def _numbers(text: str) -> tuple[float, ...]:
     return tuple(float(part) for part in text.split(","))
+
+
+# argparse names them where they fail: "invalid whole numbers, joined by commas, value"
+_whole_numbers.__name__ = "whole numbers, joined by commas,"
+_numbers.__name__ = "numbers, joined by commas,"
 
 
 def _command(commands: Any, name: str, text: str) -> argparse.ArgumentParser:

@@ -185,14 +185,16 @@ def _of_cubes(report: dict[str, Any]) -> str:
     """Say what the surface was tracked on."""
     if "voxels" in report:
         voxels = report["voxels"]
-        places = "gray levels interpolated" if voxels["interpolated"] else "a mask, evened out"
+        known = "insides of contours interpolated" if "stack" in report else "gray levels interpolated"
+        places = known if voxels["interpolated"] else "a mask, evened out"
         return f"voxels    {report['surface']['square_faces']} faces, {places}, {voxels['added_for_composition']} added"
     if "space" in report:
         space = report["space"]
         return f"faces     {space['faces']} of the network, divided into {report['surface']['square_faces']} squares"
     cubes = report["cubes"]
     edge = f"edge {_edges(cubes['cell_mm'])} {_unit(report)}"
-    walls = "" if "study" in report else ", one wall" if cubes["holds"] else ", TWO walls"
+    open_ = report["settings"]["cubes"]["open"]
+    walls = "" if "study" in report or open_ else ", one wall" if cubes["holds"] else ", TWO walls"
     return f"cubes     {edge}, {cubes['occupied']} occupied, closed by {cubes['closing']}{walls}"
 
 

@@ -179,11 +179,35 @@ def slices_with_several(mask: NDArray[np.bool_], threads: int = 0) -> int:
     return int(several.sum())
 
 
-def _side_by_side(plane: NDArray[np.bool_]) -> bool:
+def share_of_holes(mask: NDArray[np.bool_], threads: int = 0) -> float:
+    """Return the area of the holes in the slices of a window over its own, which an outline fills, in coarse pixels.
+
+    Parameters
+    ----------
+    mask : (K, J, I) bool array
+    threads : int
+    """
+    areas = np.zeros((len(mask), 2))
+
+    def work(start: int, stop: int) -> None:
+        for k in range(start, stop):
+            coarse = _coarse(mask[k])
+            areas[k] = ndimage.binary_fill_holes(coarse).sum(), coarse.sum()
+
+    in_blocks(work, len(mask), block=8, threads=threads)
+    filled, own = areas.sum(axis=0)
+    return float(filled / max(own, 1.0) - 1.0)
+
+
+def _coarse(plane: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return a plane in pixels twice as wide."""
     rows, columns = plane.shape[0] // 2 * 2, plane.shape[1] // 2 * 2
     coarse = plane[:rows:2, :columns:2] | plane[1:rows:2, :columns:2]
-    coarse |= plane[:rows:2, 1:columns:2] | plane[1:rows:2, 1:columns:2]
-    labels, count = ndimage.label(coarse, TOUCHING)
+    return np.asarray(coarse | plane[:rows:2, 1:columns:2] | plane[1:rows:2, 1:columns:2])
+
+
+def _side_by_side(plane: NDArray[np.bool_]) -> bool:
+    labels, count = ndimage.label(_coarse(plane), TOUCHING)
     if count < 2:
         return False
     boxes = np.array([[(one.start, one.stop) for one in box] for box in ndimage.find_objects(labels)])

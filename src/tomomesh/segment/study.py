@@ -84,7 +84,9 @@ def train_study(
             pixels[k] = len(shown)
             if len(shown) >= len(graph):
                 rng = np.random.default_rng([seed, k])
-                chosen = _from_neighbor(shown, graph, settings, pixel_area, begun=bool(before)) if followed else settings
+                chosen = (
+                    _from_neighbor(shown, graph, settings, pixel_area, begun=bool(before)) if followed else settings
+                )
                 found, kept = train(
                     shown, graph, chosen, rng, pixel_area=pixel_area, start=before.pop() if before else None
                 )

@@ -159,8 +159,8 @@ class NetworkSettings(Group):
     epochs: int = param(10, "batch: passes over all pixels", unit="passes", low=1)
     start: str = param(
         "ellipse",
-        "start positions: the ellipse of the pixels, their principal axes, pixels drawn at random, or the result of the "
-        "slice below (with --contours one; elsewhere as ellipse)",
+        "start positions: the ellipse of the pixels, their principal axes, pixels drawn at random, or the result of "
+        "the slice below (with --contours one; elsewhere as ellipse)",
         choices=("ellipse", "axes", "random", "neighbor"),
         paper="random",
     )
