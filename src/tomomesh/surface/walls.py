@@ -119,6 +119,8 @@ class Walls:
 
     def only(self, taken: NDArray[np.bool_]) -> Walls:
         """Keep some of the surfaces, (count,)."""
+        if taken.all():
+            return self
         faces, vertices = taken[self.face_labels], taken[self.labels]
         number = np.cumsum(vertices, dtype=np.int32) - np.int32(1)
         return Walls(
