@@ -12,7 +12,7 @@ from bench import at_most, header, holds, judge, note
 from tomomesh.measure.contour import measure_contour
 from tomomesh.model.lattice import lattice
 from tomomesh.segment.even import bridged_edges
-from tomomesh.segment.som import train
+from tomomesh.segment.som.fit import train
 from tomomesh.settings import NetworkSettings
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from minisom import MiniSom
 
 from bench import at_least, header, holds, note
 from tomomesh.model.lattice import lattice
-from tomomesh.segment.som import fit, train
+from tomomesh.segment.som.fit import fit, train
 from tomomesh.settings import NetworkSettings
 
 if TYPE_CHECKING:

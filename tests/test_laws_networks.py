@@ -15,7 +15,7 @@ from tomomesh.errors import EmptyError
 from tomomesh.model.lattice import TOPOLOGIES, lattice
 from tomomesh.segment.region import train_region
 from tomomesh.segment.shapes import SHAPES, shape
-from tomomesh.segment.som import match, start_positions, train
+from tomomesh.segment.som.fit import match, start_positions, train
 from tomomesh.segment.study import regions, train_study
 from tomomesh.settings import FALLS, NetworkSettings
 

@@ -18,7 +18,7 @@ from tomomesh.settings import NetworkSettings
 
 def test_names_stay_functions_whatever_modules_are_imported() -> None:
     import tomomesh.phantom
-    import tomomesh.segment.som
+    import tomomesh.segment.som.fit
 
     assert callable(tomomesh.phantom)
     assert callable(tomomesh.segment)

@@ -17,11 +17,11 @@ from tomomesh.errors import EmptyError, UsageError
 from tomomesh.measure.contour import crossings, crossings_between, measure_contour
 from tomomesh.model.contours import BIRTH, BRANCH, DEATH, HOLE, MERGE, OUTER, WALL_INNER, WALL_OUTER
 from tomomesh.model.lattice import lattice
-from tomomesh.segment.curved import evened, finely
+from tomomesh.segment.contours.curved import evened, finely
+from tomomesh.segment.contours.looks import SHORTEST, slices_with_several
+from tomomesh.segment.contours.loops import trace
+from tomomesh.segment.contours.train import drawn, regions_of, train_contours
 from tomomesh.segment.even import bridged_edges, even_spacing
-from tomomesh.segment.looks import SHORTEST, slices_with_several
-from tomomesh.segment.loops import trace
-from tomomesh.segment.several import drawn, regions_of, train_contours
 from tomomesh.settings import NetworkSettings, Settings
 
 if TYPE_CHECKING:

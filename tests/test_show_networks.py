@@ -18,7 +18,7 @@ from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
 from tomomesh.model.networks import Networks
 from tomomesh.segment.region import train_region
 from tomomesh.segment.shapes import shape
-from tomomesh.segment.snapshots import snapshots, thinned
+from tomomesh.segment.som.snapshots import snapshots, thinned
 from tomomesh.settings import NetworkSettings
 from tomomesh.show import save
 from tomomesh.show.contact import COLUMNS, ROWS, draw_slices

@@ -14,8 +14,8 @@ from conftest import law, seeds, size
 from tomomesh.errors import UsageError
 from tomomesh.model.graph import lattice_of
 from tomomesh.model.lattice import TOPOLOGIES, lattice
-from tomomesh.segment.schedules import falling, radius_power, schedule_warning
-from tomomesh.segment.som import fit, match, start_positions, train
+from tomomesh.segment.som.fit import fit, match, start_positions, train
+from tomomesh.segment.som.schedules import falling, radius_power, schedule_warning
 from tomomesh.settings import FALLS, NetworkSettings
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from tomomesh.kernels import batch as batch_kernels
 from tomomesh.kernels import som as kernels
 from tomomesh.kernels.neighborhoods import BUBBLE, GAUSSIAN, LATERAL, weigh
 from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
-from tomomesh.segment import wide
-from tomomesh.segment.som import match
+from tomomesh.segment.som import products
+from tomomesh.segment.som.fit import match
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -113,7 +113,7 @@ class TestBatch:
     @given(
         seed=seeds, name=topologies, d=st.integers(2, 4), sigma=st.floats(0.3, 6), inhibition=st.sampled_from([0, 0.03])
     )
-    @pytest.mark.parametrize("run", [batch_kernels.train_batch, wide.train_batch])
+    @pytest.mark.parametrize("run", [batch_kernels.train_batch, products.train_batch])
     def test_is_the_definition(self, run: Train, seed: int, name: str, d: int, sigma: float, inhibition: float) -> None:
         graph, start, inputs, rng = made(seed, name, d, 100)
         fall, amounts = sigma * np.array([[1.0], [0.7], [0.4]]), rng.uniform(0, 2, 100)
@@ -129,7 +129,7 @@ class TestBatch:
             moved = np.linalg.norm(wanted[epoch + 1] - wanted[epoch], axis=1).max()
             assert history[epoch, 1] == pytest.approx(moved, rel=1e-6, abs=1e-9)
 
-    @pytest.mark.parametrize("run", [batch_kernels.train_batch, wide.train_batch])
+    @pytest.mark.parametrize("run", [batch_kernels.train_batch, products.train_batch])
     def test_a_neuron_that_nothing_reaches_stays_and_one_at_rest_ends_it(self, run: Train) -> None:
         codebook, history = np.array([[0.0, 10.0, 20.0], [0.0, 0.0, 0.0]]), np.empty((9, 2))
         weights, inputs = np.repeat([[1.0, 0.0, 0.0]], 9, axis=0), np.array([[1.0, 3.0], [0.0, 0.0]])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 _HOMES = {
-    "SOM": "segment.estimator",
+    "SOM": "segment.som.estimator",
     "PointSet": "model.points",
     "Settings": "settings",
     "TomomeshError": "errors",
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from .model.volume import Volume
     from .phantom import phantom
     from .pipeline import reconstruct, reconstruct_points, segment
-    from .segment.estimator import SOM
+    from .segment.som.estimator import SOM
     from .segment.window import window
     from .settings import Settings
 

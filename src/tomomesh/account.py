@@ -15,7 +15,7 @@ from .measure.report import assess, compare
 from .measure.rings import assess_contours
 from .model.points import BRIDGE, CAP, NEURON
 from .progress import Progress, silent
-from .segment.schedules import schedule_warning
+from .segment.som.schedules import schedule_warning
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

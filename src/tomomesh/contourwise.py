@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import EmptyError
+from .segment.contours.train import regions_of, train_contours
 from .segment.sample import sample_contours
-from .segment.several import regions_of, train_contours
 from .surface.contours import contour_surface
 from .surface.slices import find_slices, known_slices
 

@@ -11,7 +11,7 @@ from .contourwise import find_contours
 from .errors import UsageError
 from .model.volume import AXES, Volume
 from .results import NO_NETWORKS, Segmentation
-from .segment.looks import share_of_holes, slices_with_several
+from .segment.contours.looks import share_of_holes, slices_with_several
 from .segment.sample import sample
 from .segment.select import require_same_grid, select
 from .segment.study import regions, train_study

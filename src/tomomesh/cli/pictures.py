@@ -9,8 +9,8 @@ import numpy as np
 from ..model.lattice import Lattice
 from ..model.networks import Networks
 from ..model.points import PointSet
-from ..segment.snapshots import snapshots
-from ..segment.som import match
+from ..segment.som.fit import match
+from ..segment.som.snapshots import snapshots
 from ..show import draw_all
 from ..show.film import film
 from ..show.gallery import median_slice

@@ -11,16 +11,16 @@ from ..errors import EmptyError, UsageError
 from ..model.lattice import lattice
 from ..settings import IN_SLICE
 from .even import bridged_edges, even_spacing
-from .network_measures import network_measures
-from .schedules import schedule_warning
-from .som import fit, start_positions
+from .som.fit import fit, start_positions
+from .som.measures import network_measures
+from .som.schedules import schedule_warning
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.lattice import Lattice
     from ..settings import NetworkSettings
-    from .history import History
+    from .som.history import History
 
 
 @dataclass(frozen=True)

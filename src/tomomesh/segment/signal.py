@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from .starts import moments
+from .som.starts import moments
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -13,7 +13,7 @@ from ..errors import EmptyError
 from ..model.lattice import lattice
 from ..model.networks import SpaceNetwork
 from .signal import closed
-from .som import fit
+from .som.fit import fit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

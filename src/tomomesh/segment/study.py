@@ -14,7 +14,7 @@ from ..model.networks import Networks
 from ..progress import Progress, silent
 from .even import bridged_edges, even_spacing
 from .signal import fills_most, outline, pixels_of
-from .som import match, radii, train
+from .som.fit import match, radii, train
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

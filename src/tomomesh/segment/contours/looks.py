@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from ..kernels.threads import in_blocks
-from ..model.contours import HOLE, OUTER
+from ...kernels.threads import in_blocks
+from ...model.contours import HOLE, OUTER
+from ..signal import SOLID, outline, pixels_of
+from ..som.starts import moments
 from .loops import Loop, Patch, trace
-from .signal import SOLID, outline, pixels_of
-from .starts import moments
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

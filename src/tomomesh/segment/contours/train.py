@@ -9,16 +9,16 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from ..errors import EmptyError
-from ..kernels.threads import in_blocks
-from ..model.contours import Contour, Contours
-from ..model.lattice import lattice
-from ..progress import Progress, silent
+from ...errors import EmptyError
+from ...kernels.threads import in_blocks
+from ...model.contours import Contour, Contours
+from ...model.lattice import lattice
+from ...progress import Progress, silent
+from ..even import bridged_edges, evenly
+from ..signal import pixels_of
+from ..som.fit import radii, train
 from .curved import evened, unshrunk
-from .even import bridged_edges, evenly
 from .looks import SHORTEST, Look, components_of, looks_at_loops, solids
-from .signal import pixels_of
-from .som import radii, train
 from .tracking import track
 from .walls import looks_at_walls
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..settings import NetworkSettings
+    from ...settings import NetworkSettings
 
     Floats = NDArray[np.float64]
 

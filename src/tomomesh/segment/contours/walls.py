@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from ..model.contours import WALL_INNER, WALL_OUTER
-from ..model.lattice import lattice
+from ...model.contours import WALL_INNER, WALL_OUTER
+from ...model.lattice import lattice
+from ..polygon import area, distance, inside
+from ..signal import closed, pixels_of
+from ..som.fit import train
 from .looks import SHORTEST, TOUCHING, Look, look_at_loop
 from .loops import Loop, trace
-from .polygon import area, distance, inside
-from .signal import closed, pixels_of
-from .som import train
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..settings import NetworkSettings
+    from ...settings import NetworkSettings
 
     Floats = NDArray[np.float64]
 

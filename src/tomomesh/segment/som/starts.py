@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import UsageError
+from ...errors import UsageError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..model.lattice import Lattice
+    from ...model.lattice import Lattice
 
     Moments = tuple[NDArray[np.float64], NDArray[np.float64]]
 

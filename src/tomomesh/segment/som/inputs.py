@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import UsageError
+from ...errors import UsageError
+from .products import WIDE
 from .starts import moments
-from .wide import WIDE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

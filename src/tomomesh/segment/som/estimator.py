@@ -8,28 +8,28 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..errors import UsageError
-from ..kernels.som import INDEX_BITS
-from ..model.graph import lattice_of
-from ..model.lattice import lattice
-from ..settings import NetworkSettings
-from .manners import Parametrized
-from .matrix import checked_matrix, checked_weights, not_fitted, seed_of
-from .network_measures import quantization_error
+from ...errors import UsageError
+from ...kernels.som import INDEX_BITS
+from ...model.graph import lattice_of
+from ...model.lattice import lattice
+from ...settings import NetworkSettings
+from .checks import checked_matrix, checked_weights, not_fitted, seed_of
+from .fit import fit, match
+from .inputs import flat
+from .measures import quantization_error
+from .parameters import Parametrized
 from .saving import load_network, save_network
 from .schedules import schedule_warning
-from .shown import flat
-from .som import fit, match
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
 
-    from ..model.lattice import Lattice
+    from ...model.lattice import Lattice
+    from .fit import Callback
     from .history import History
     from .schedules import Fall
-    from .som import Callback
 
 
 class SOM(Parametrized):

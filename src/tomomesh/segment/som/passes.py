@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels import batch as batch_kernels
-from ..kernels import som as kernels
-from ..kernels.neighborhoods import LATERAL, weigh
-from . import wide
+from ...kernels import batch as batch_kernels
+from ...kernels import som as kernels
+from ...kernels.neighborhoods import LATERAL, weigh
+from ..som import products as wide
 from .history import History
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..model.lattice import Lattice
-    from .shown import Shown
+    from ...model.lattice import Lattice
+    from .inputs import Shown
 
     Floats = NDArray[np.float64]
 

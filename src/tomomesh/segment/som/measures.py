@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from ..errors import UsageError
-from ..kernels.neighborhoods import GAUSSIAN, weigh
+from ...errors import UsageError
+from ...kernels.neighborhoods import GAUSSIAN, weigh
+from .inputs import Shown, flat
 from .passes import match
-from .shown import Shown, flat
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from ..model.lattice import Lattice
+    from ...model.lattice import Lattice
 
     Floats = NDArray[np.float64]
 

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.neighborhoods import BUBBLE, GAUSSIAN, LATERAL
+from ...kernels.neighborhoods import BUBBLE, GAUSSIAN, LATERAL
+from .inputs import Shown, flat
 from .passes import Watch, match, train_batch, train_online
 from .schedules import Fall, falling, radius_power
-from .shown import Shown, flat
 from .starts import CLOSED, start_positions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..model.lattice import Lattice
-    from ..settings import NetworkSettings
+    from ...model.lattice import Lattice
+    from ...settings import NetworkSettings
     from .history import History
 
 __all__ = ["Fitted", "fit", "match", "radii", "shape_of", "start_positions", "train"]

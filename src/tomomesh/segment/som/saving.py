@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import FormatError, UnreadableError, UsageError
-from ..model.graph import Lattice
+from ...errors import FormatError, UnreadableError, UsageError
+from ...model.graph import Lattice
 from .history import History
 
 if TYPE_CHECKING:

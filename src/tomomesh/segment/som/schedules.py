@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import UsageError
+from ...errors import UsageError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..settings import NetworkSettings
+    from ...settings import NetworkSettings
 
 Fall = Callable[["NDArray[np.float64]"], "NDArray[np.float64]"]
 """From the time (t,), 0 to 1, to what is left of the fall, 1 to 0."""

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from .even import along, even_arcs, evenly
-from .som import train
+from ..even import along, even_arcs, evenly
+from ..som.fit import train
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..model.lattice import Lattice
-    from ..settings import NetworkSettings
+    from ...model.lattice import Lattice
+    from ...settings import NetworkSettings
 
     Floats = NDArray[np.float64]
 

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .fit import fit, radii, start_positions
 from .schedules import falling, radius_power
-from .som import fit, radii, start_positions
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from ..model.lattice import Lattice
-    from ..settings import NetworkSettings
+    from ...model.lattice import Lattice
+    from ...settings import NetworkSettings
 
     Floats = NDArray[np.float64]
 

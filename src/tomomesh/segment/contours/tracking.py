@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from ..model.contours import BIRTH, BRANCH, DEATH, MERGE, Event
+from ...model.contours import BIRTH, BRANCH, DEATH, MERGE, Event
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.batch import add_shares
+from ...kernels.batch import add_shares
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -1,0 +1,1 @@
+"""Several rings on every slice: window -> contours."""

@@ -1,0 +1,1 @@
+"""The self-organising map itself: inputs -> codebook."""
