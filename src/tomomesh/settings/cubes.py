@@ -1,0 +1,37 @@
+"""Cubes, the shell of them, and what is taken of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .parameter import Group, param
+
+
+@dataclass(frozen=True)
+class CubeSettings(Group):
+    """Space partition, cuberille and low-pass filter (Fig. 8)."""
+
+    cell_mm: tuple[float, ...] | None = param(
+        None, "edge of the cubes, one or one an axis (x y z), in a cloud's unit; by default what the points ask for",
+        unit="mm", above=0, length=(1, 3),
+    )  # fmt: skip
+    cell_factor: float = param(1.0, "dilation factor on the edge of the cubes, for coarser models", above=0)
+    caps: bool = param(True, "close the inside of rings that have nothing above or below")
+    closing: int | None = param(
+        None, "cubes by which gaps in the shell are closed; by default the fewest that keep the outside out",
+        kind=int, unit="cubes", low=0, high=64,
+    )  # fmt: skip
+    stacks: str = param(
+        "auto",
+        "take points on parallel slices as contours, and close what lies between their insides; none never does",
+        choices=("auto", "none"),
+    )
+    largest: bool = param(False, "keep the largest surface alone")
+    allow_leaks: bool = param(False, "write the surface even where the outside leaks into the shell")
+    open: bool = param(False, "write an open surface as a one-sided sheet with its borders")
+    surface: str = param(
+        "auto",
+        "the outer surfaces, or all, with what lies in cavities; auto is outer, and all without a network",
+        choices=("auto", "outer", "all"),
+    )
+    smoothing: int = param(3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000)

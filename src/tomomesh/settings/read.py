@@ -1,0 +1,25 @@
+"""How a study is read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .parameter import Group, param
+
+
+@dataclass(frozen=True)
+class ReadSettings(Group):
+    """How a study is read where its files leave a choice."""
+
+    series: int | None = param(None, "number of the series to take from a folder that holds several", kind=int, low=0)
+    spacing: tuple[float, ...] | None = param(
+        None,
+        "distance of the voxels along columns, rows and slices, for files that hold none",
+        unit="mm",
+        above=0,
+        length=(3,),
+    )
+    spacing_z: float | None = param(
+        None, "distance of the slices, for one slice or slices without positions", unit="mm", above=0
+    )
+    fill_gaps: bool = param(False, "interpolate the slices that are missing from a regular stack")

@@ -1,0 +1,26 @@
+"""How to run, and what becomes of the mesh at the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .parameter import Group, param
+
+
+@dataclass(frozen=True)
+class RunSettings(Group):
+    """How to run; no result depends on the number of threads."""
+
+    seed: int = param(0, "seed of everything drawn at random", low=0)
+    threads: int = param(0, "threads; 0 is one a core", low=0, high=1024)
+    units: str = param(
+        "mm",
+        "unit that the numbers of a cloud are in; studies are always in mm",
+        choices=("mm", "cm", "m", "unknown"),
+    )
+    local_origin: bool = param(
+        False, "count a cloud's coordinates from its lowest corner, which report and file name: for STL far from 0"
+    )
+    target_faces: int | None = param(
+        None, "most faces of the mesh, which is made coarser where it has more", kind=int, unit="faces", low=4
+    )

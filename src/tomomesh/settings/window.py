@@ -1,0 +1,60 @@
+"""Which gray levels or labels are the window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import UsageError
+from .parameter import LAYERS, MANY, Group, param
+
+
+@dataclass(frozen=True)
+class WindowSettings(Group):
+    """Gray-level window (eq. 3): a voxel is kept where lower < k <= upper."""
+
+    lower: float | tuple[float, ...] | None = param(
+        None, "lowest gray level, itself left out, one or one a layer; Otsu's where not given",
+        unit="stored, HU for CT", length=LAYERS,
+    )  # fmt: skip
+    upper: float | tuple[float, ...] | None = param(
+        None, "highest gray level, itself kept, one or one a layer; no limit where not given",
+        unit="stored, HU for CT", length=LAYERS,
+    )  # fmt: skip
+    layers: str = param(
+        "all", "whether all layers of a color voxel must lie in their windows, or any", choices=("all", "any"),
+        paper="any",
+    )  # fmt: skip
+    preset: str | None = param(
+        None, "a window for CT: bone is k > 300 HU, skin is k > -300 HU", kind=str, choices=("bone", "skin")
+    )
+    select: tuple[int, ...] | None = param(
+        None, "labels of a label map whose voxels are the window", kind=int, low=0, length=MANY
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("lower", "upper"):
+            value = getattr(self, name)
+            if isinstance(value, tuple) and len(value) == 1:
+                object.__setattr__(self, name, value[0])
+        limited = self.lower is not None or self.upper is not None
+        if self.preset is not None and limited:
+            raise UsageError("two windows are asked for", found="--preset and a window", expected="one of them")
+        if self.select is not None and (limited or self.preset is not None):
+            raise UsageError("two windows are asked for", found="--select and a window", expected="one of them")
+        if self.lower is not None and self.upper is not None:
+            self._check_limits(self.lower, self.upper)
+
+    @staticmethod
+    def _check_limits(*limits: float | tuple[float, ...]) -> None:
+        lower, upper = (limit if isinstance(limit, tuple) else (limit,) for limit in limits)
+        count = max(len(lower), len(upper))
+        found = ", ".join(
+            f"--{name} = {' '.join(f'{value:g}' for value in limit)}"
+            for name, limit in (("lower", lower), ("upper", upper))
+        )
+        if len(lower) not in (1, count) or len(upper) not in (1, count):
+            raise UsageError("the limits do not fit each other", found=found, expected="one, or as many as layers")
+        pairs = zip(lower * (count // len(lower)), upper * (count // len(upper)), strict=True)
+        if any(low >= high for low, high in pairs):
+            raise UsageError("the window is empty", found=found, expected="lower < upper")
