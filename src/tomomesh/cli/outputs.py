@@ -30,6 +30,7 @@ def check_folder(path: str | Path) -> Path:
 
 
 def make_folder(folder: Path) -> None:
+    """Make a folder, if it is not there."""
     try:
         folder.mkdir(exist_ok=True)
     except OSError as fault:
