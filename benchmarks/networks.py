@@ -11,7 +11,7 @@ from minisom import MiniSom
 from bench import at_least, header, holds, median_times, note
 from tomomesh import phantom, window
 from tomomesh.model.lattice import lattice
-from tomomesh.segment.som.fit import train
+from tomomesh.segment.som.fit import fit
 from tomomesh.segment.study import train_study
 from tomomesh.settings import NetworkSettings
 
@@ -68,7 +68,7 @@ def _ours(inputs: Inputs, settings: NetworkSettings) -> Callable[[], None]:
 
     def run() -> None:
         for k, pixels in enumerate(inputs):
-            train(pixels, ring, settings, np.random.default_rng([0, k]))
+            fit(pixels, ring, settings, np.random.default_rng([0, k]))
 
     return run
 

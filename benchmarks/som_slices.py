@@ -12,7 +12,7 @@ from bench import at_most, header, holds, judge, note
 from tomomesh.measure.contour import measure_contour
 from tomomesh.model.lattice import lattice
 from tomomesh.segment.even import bridged_edges
-from tomomesh.segment.som.fit import train
+from tomomesh.segment.som.fit import fit
 from tomomesh.settings import NetworkSettings
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def pixels(band: Any, seed: int, shape: str = "band", strays: float = 0.0) -> Fl
 
 def rings(inputs: list[Floats], **chosen: Any) -> list[Floats]:
     settings = NetworkSettings(neurons=NEURONS, **chosen)
-    return [train(shown, RING, settings, np.random.default_rng(seed))[0] for seed, shown in enumerate(inputs)]
+    return [fit(shown, RING, settings, np.random.default_rng(seed)).codebook for seed, shown in enumerate(inputs)]
 
 
 def lies(band: Any, inputs: list[Floats], shape: str, figure: str, mark: float, **chosen: Any) -> None:

@@ -16,7 +16,7 @@ from minisom import MiniSom
 
 from bench import at_least, header, holds, note
 from tomomesh.model.lattice import lattice
-from tomomesh.segment.som.fit import fit, train
+from tomomesh.segment.som.fit import fit
 from tomomesh.settings import NetworkSettings
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def main() -> None:
     start = inputs[np.random.default_rng(1).choice(samples, len(grid), replace=samples < len(grid))]
 
     def batch() -> None:
-        train(inputs, grid, NetworkSettings(epochs=EPOCHS, trim=0), np.random.default_rng(0), start=start)
+        fit(inputs, grid, NetworkSettings(epochs=EPOCHS, trim=0), np.random.default_rng(0), start=start)
 
     ours = cpu(batch)
     note(f"batch, {EPOCHS} epoch: CPU time", f"{ours:.3g} s")
@@ -63,7 +63,7 @@ def online(inputs: NDArray[np.float64], grid: Any, start: NDArray[np.float64], p
 
     def ours(neighborhood: str, count: int = presentations) -> Callable[[], Any]:
         kind = NetworkSettings(training="online", iterations=count, trim=0, neighborhood=neighborhood)
-        return lambda: train(inputs, grid, kind, np.random.default_rng(0), start=start)
+        return lambda: fit(inputs, grid, kind, np.random.default_rng(0), start=start)
 
     ours("auto", 1)()  # the grid's tables are made once
     peer = MiniSom(SIDE, SIDE, AXES, sigma=SIDE // 4, learning_rate=0.5, random_seed=0)

@@ -15,7 +15,7 @@ from tomomesh.errors import EmptyError
 from tomomesh.model.lattice import TOPOLOGIES, lattice
 from tomomesh.segment.region import train_region
 from tomomesh.segment.shapes import SHAPES, shape
-from tomomesh.segment.som.fit import match, start_positions, train
+from tomomesh.segment.som.fit import fit, match, start_positions
 from tomomesh.segment.study import regions, train_study
 from tomomesh.settings import FALLS, NetworkSettings
 
@@ -60,7 +60,7 @@ class TestHull:
     def test_the_codebook_stays_inside_the_hull_of_its_inputs(self, seed: int, kind: NetworkSettings, d: int) -> None:
         rng = np.random.default_rng(seed)
         inputs = rng.normal(size=(60, d)) * 10
-        codebook, _ = train(inputs, lattice(kind.network, kind.neuron_count), kind, rng)
+        codebook = fit(inputs, lattice(kind.network, kind.neuron_count), kind, rng).codebook
         slack = 1e-9
         assert (codebook >= inputs.min(axis=0) - slack).all()
         assert (codebook <= inputs.max(axis=0) + slack).all()
@@ -72,9 +72,9 @@ class TestHull:
     @given(seed=seeds, kind=kinds)
     def test_equal_inputs_draw_every_neuron_onto_them(self, seed: int, kind: NetworkSettings) -> None:
         inputs = np.full((30, 3), 7.25)
-        codebook, kept = train(inputs, lattice(kind.network, kind.neuron_count), kind, np.random.default_rng(seed))
-        np.testing.assert_allclose(codebook, 7.25, rtol=1e-12)
-        assert kept.all()
+        fitted = fit(inputs, lattice(kind.network, kind.neuron_count), kind, np.random.default_rng(seed))
+        np.testing.assert_allclose(fitted.codebook, 7.25, rtol=1e-12)
+        assert fitted.kept.all()
 
     @pytest.mark.parametrize("name", TOPOLOGIES)
     def test_an_ellipse_start_has_the_center_of_its_inputs(self, name: str) -> None:

@@ -20,8 +20,9 @@ from tomomesh.model.lattice import lattice
 from tomomesh.segment.contours.curved import evened, finely
 from tomomesh.segment.contours.looks import SHORTEST, slices_with_several
 from tomomesh.segment.contours.loops import trace
-from tomomesh.segment.contours.train import drawn, regions_of, train_contours
+from tomomesh.segment.contours.train import drawn, train_contours
 from tomomesh.segment.even import bridged_edges, even_spacing
+from tomomesh.segment.study import regions
 from tomomesh.settings import NetworkSettings, Settings
 
 if TYPE_CHECKING:
@@ -175,7 +176,7 @@ class TestKinds:
     def test_regions_name_the_nearest_neuron(self) -> None:
         mask = np.stack([disk(26, 48, 20) | disk(72, 48, 20)] * 2)
         found = trained(list(mask), "components", neurons=60)
-        labels = regions_of(mask, found)
+        labels = regions(mask, found)
         neurons = np.concatenate([one.codebook for one in found.on(1)])
         places = np.argwhere(mask[1])[:, ::-1]
         np.testing.assert_array_equal(labels[1][mask[1]], cKDTree(neurons).query(places)[1] + 1)

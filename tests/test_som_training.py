@@ -14,7 +14,7 @@ from conftest import law, seeds, size
 from tomomesh.errors import UsageError
 from tomomesh.model.graph import lattice_of
 from tomomesh.model.lattice import TOPOLOGIES, lattice
-from tomomesh.segment.som.fit import fit, match, start_positions, train
+from tomomesh.segment.som.fit import fit, match, start_positions
 from tomomesh.segment.som.schedules import falling, radius_power, schedule_warning
 from tomomesh.settings import FALLS, NetworkSettings
 
@@ -108,7 +108,7 @@ class TestStart:
     def test_a_given_start_is_taken_as_it_is(self) -> None:
         given_start = np.random.default_rng(0).normal(size=(20, 2))
         seen: list[Floats] = []
-        train(circle(), RING, NetworkSettings(trim=0.0, radius=(0.0, 0.0), epochs=1), rng(), start=given_start,
+        fit(circle(), RING, NetworkSettings(trim=0.0, radius=(0.0, 0.0), epochs=1), rng(), start=given_start,
               callback=lambda codebook, epoch: seen.append(codebook))  # fmt: skip
         winners, _ = match(np.ascontiguousarray(given_start.T), np.ascontiguousarray(circle().T))
         dead = np.setdiff1d(np.arange(20), winners)
@@ -117,7 +117,7 @@ class TestStart:
     @pytest.mark.parametrize("start", [np.zeros((19, 2)), np.zeros((20, 3)), np.full((20, 2), np.nan)])
     def test_refuses_a_start_that_does_not_fit(self, start: Floats) -> None:
         with pytest.raises(UsageError, match="start"):
-            train(circle(), RING, BATCH, rng(), start=start)
+            fit(circle(), RING, BATCH, rng(), start=start)
 
 
 class TestWeights:
@@ -129,23 +129,23 @@ class TestWeights:
         times[:2] = 1
         kind = NetworkSettings(network=name, trim=trim, epochs=4, start="axes")
         graph = lattice(name, 9)
-        weighted, kept = train(inputs, graph, kind, rng(), weights=times.astype(float))
-        repeated, again = train(np.repeat(inputs, times, axis=0), graph, kind, rng())
-        np.testing.assert_allclose(weighted, repeated, rtol=0, atol=1e-6)
-        np.testing.assert_array_equal(np.repeat(kept, times), again)
-        assert not kept[times == 0].any()
+        weighted = fit(inputs, graph, kind, rng(), weights=times.astype(float))
+        repeated = fit(np.repeat(inputs, times, axis=0), graph, kind, rng())
+        np.testing.assert_allclose(weighted.codebook, repeated.codebook, rtol=0, atol=1e-6)
+        np.testing.assert_array_equal(np.repeat(weighted.kept, times), repeated.kept)
+        assert not weighted.kept[times == 0].any()
 
     def test_online_draws_in_proportion(self) -> None:
         inputs, weights = np.array([[0.0, 0.0], [1.0, 0.0], [9.0, 9.0]]), np.array([1.0, 3.0, 0.0])
         kind = NetworkSettings(training="online", iterations=20_000, alpha=(0.001, 0.001), trim=0, radius=(9.0, 9.0))
-        codebook, kept = train(inputs, lattice("chain", 3), kind, rng(), weights=weights)
-        np.testing.assert_allclose(codebook, [[0.75, 0.0]] * 3, atol=0.05)
-        np.testing.assert_array_equal(kept, [True, True, False])
+        fitted = fit(inputs, lattice("chain", 3), kind, rng(), weights=weights)
+        np.testing.assert_allclose(fitted.codebook, [[0.75, 0.0]] * 3, atol=0.05)
+        np.testing.assert_array_equal(fitted.kept, [True, True, False])
 
     @pytest.mark.parametrize("weights", [np.ones(299), -np.ones(300), np.zeros(300), np.full(300, np.inf)])
     def test_refuses_what_are_none(self, weights: Floats) -> None:
         with pytest.raises(UsageError, match="weights"):
-            train(circle(), RING, BATCH, rng(), weights=weights)
+            fit(circle(), RING, BATCH, rng(), weights=weights)
 
 
 class TestWatched:
@@ -154,7 +154,7 @@ class TestWatched:
     def test_looking_on_changes_nothing(self, kind: NetworkSettings, d: int) -> None:
         inputs = np.random.default_rng(1).normal(size=(200, d))
         seen: list[tuple[int, Floats]] = []
-        alone, _ = train(inputs, RING, kind, rng())
+        alone = fit(inputs, RING, kind, rng()).codebook
         watched = fit(inputs, RING, kind, rng(), callback=lambda codebook, epoch: seen.append((epoch, codebook)))
         assert alone.tobytes() == watched.codebook.tobytes() == seen[-1][1].tobytes()
         assert [epoch for epoch, _ in seen] == list(range(len(watched.history)))
@@ -165,7 +165,9 @@ class TestWatched:
 
     def test_history_is_what_happened(self) -> None:
         places: list[Floats] = []
-        found = fit(circle(), RING, ONLINE, rng(), callback=lambda codebook, epoch: places.append(codebook)).history
+        found = fit(
+            circle(), RING, ONLINE, rng(), callback=lambda codebook, epoch: places.append(codebook), record=True
+        ).history
         assert len(found) == 2
         errors = [np.linalg.norm(circle()[:, None] - m, axis=2).min(axis=1).mean() for m in places]
         np.testing.assert_allclose(found.quantization_error, errors, rtol=1e-5)
@@ -182,7 +184,7 @@ class TestWatched:
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            train(circle(), RING, BATCH, rng(), callback=stop)
+            fit(circle(), RING, BATCH, rng(), callback=stop)
 
 
 class TestThreads:
@@ -193,9 +195,9 @@ class TestThreads:
         inputs, found = np.random.default_rng(0).normal(size=(5000, d)), []
         for threads in (1, 2):
             with limits(threads):
-                found.append(train(inputs, lattice("grid", 400), NetworkSettings(epochs=3, start=start), rng()))
-        assert found[0][0].tobytes() == found[1][0].tobytes()
-        assert found[0][1].tobytes() == found[1][1].tobytes()
+                found.append(fit(inputs, lattice("grid", 400), NetworkSettings(epochs=3, start=start), rng()))
+        assert found[0].codebook.tobytes() == found[1].codebook.tobytes()
+        assert found[0].kept.tobytes() == found[1].kept.tobytes()
 
 
 class TestEarlyStop:
@@ -225,7 +227,7 @@ class TestNeighborhoods:
     def test_inhibition_drives_no_neuron_out_of_the_inputs(self, training: str, name: str) -> None:
         inputs = np.random.default_rng(2).normal(size=(400, 3))
         kind = NetworkSettings(training=training, neighborhood="lateral", start="random", iterations=2000, trim=0.0)
-        codebook, _ = train(inputs, lattice(name, 30), kind, rng())
+        codebook = fit(inputs, lattice(name, 30), kind, rng()).codebook
         assert (codebook >= inputs.min(axis=0)).all()
         assert (codebook <= inputs.max(axis=0)).all()
         _, squared = match(np.ascontiguousarray(codebook.T), np.ascontiguousarray(inputs.T))
@@ -238,7 +240,7 @@ class TestConverges:
     def test_with_any_number_of_neurons_and_inputs(self, start: str, neurons: int, count: int) -> None:
         inputs = 50 * circle(size(count, min(count, 200)), noise=0.01)
         kind = NetworkSettings(neurons=neurons, start=start)
-        ring, _ = train(inputs, lattice("ring", neurons), kind, rng(), pixel_area=0.1)
+        ring = fit(inputs, lattice("ring", neurons), kind, rng(), pixel_area=0.1).codebook
         turn = np.diff(np.unwrap(np.arctan2(*np.concatenate([ring, ring[:1]]).T)))
         assert abs(turn.sum()) == pytest.approx(2 * np.pi)
         if neurons >= 58:
@@ -246,7 +248,7 @@ class TestConverges:
 
     def test_a_graph_learns_as_well(self) -> None:
         graph = lattice_of([[0, 1], [1, 2], [2, 0], [2, 3], [3, 4]], 5)
-        codebook, _ = train(circle(), graph, BATCH, rng())
+        codebook = fit(circle(), graph, BATCH, rng()).codebook
         assert (np.linalg.norm(codebook, axis=1) > 0.4).all()
         assert (np.linalg.norm(codebook, axis=1) < 1.1).all()
 
@@ -254,7 +256,7 @@ class TestConverges:
         draw = np.random.default_rng(4).normal(size=(3000, 3))
         shell = draw / np.linalg.norm(draw, axis=1, keepdims=True) * 30
         graph = lattice("sphere", 162)
-        codebook, _ = train(shell, graph, NetworkSettings(network="sphere", epochs=10), rng())
+        codebook = fit(shell, graph, NetworkSettings(network="sphere", epochs=10), rng()).codebook
         corners = codebook[graph.faces]
         volume = np.einsum("na,na->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
         assert volume == pytest.approx(4 / 3 * np.pi * 30**3, rel=0.1)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import EmptyError
-from .segment.contours.train import regions_of, train_contours
+from .segment.contours.train import train_contours
 from .segment.sample import sample_contours
+from .segment.study import regions
 from .surface.contours import contour_surface
 from .surface.slices import find_slices, known_slices
 
@@ -43,7 +44,7 @@ def find_contours(
             mask, settings.network, pixel_mm=pixel_mm, seed=run.seed, threads=run.threads, progress=progress
         )
     with account.timed("regions"):
-        labels = regions_of(mask, contours, pixel_mm=pixel_mm, threads=run.threads)
+        labels = regions(mask, contours, pixel_mm=pixel_mm, threads=run.threads)
     account.contours(contours, mask)
     with account.timed("points"):
         sampling = sample_contours(contours, volume)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .compile import kernel
-from .samples import gather, tangents
+from .samples import MOST, gather, tangents
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,8 +19,6 @@ SECTORS = 16
 """Directions around a point that are told apart."""
 TANGENT = 0.41421356237309503
 """Tangent of the angle of a sector: pi / 8."""
-MOST = 1024
-"""Neighbors that are looked at."""
 STEEP = 0.5
 """Slope over which a bridge would leave the surface at its end."""
 ALIKE = 0.5

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .compile import kernel
-from .samples import gather, tangents
+from .samples import MOST, gather, tangents
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 DIRECTIONS = 32
 """Directions around a sample in which a disk is laid beside it."""
-MOST = 1024
-"""Samples and disks that are looked at."""
 BEND = 0.5
 """Sine of the angle between two planes from which a neighbor is unfolded about the line where they meet."""
 STEEP = 0.5

@@ -114,6 +114,10 @@ class Contours:
         """Return the contours of a slice."""
         return [contour for contour in self.contours if contour.slice == number]
 
+    def codebook_on(self, number: int) -> NDArray[np.float64]:
+        """Return the neurons (u, 2) of all rings of a slice, one ring after the other."""
+        return np.concatenate([contour.codebook for contour in self.on(number)])
+
     def count(self, kind: str) -> int:
         """Count events of a kind."""
         return sum(event.kind == kind for event in self.events)

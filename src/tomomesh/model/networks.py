@@ -45,6 +45,10 @@ class Networks:
     pixels: NDArray[np.int64]
     strays: NDArray[np.int64]
 
+    def codebook_on(self, number: int) -> NDArray[np.float64]:
+        """Return the neurons (u, 2) of a slice that has a network."""
+        return np.asarray(self.codebooks[np.searchsorted(self.slices, number)])
+
     @property
     def lines(self) -> Contours:
         """The chains or rings as contours, one a slice and all on one track; none of other networks."""

@@ -82,7 +82,7 @@ def train_region(
             hint="a wider window, or fewer --neurons",
         )
     start = start_positions(inputs, graph, settings.start, np.random.default_rng(seed))
-    fitted = fit(inputs, graph, settings, np.random.default_rng(seed), pixel_area=pixel_area)
+    fitted = fit(inputs, graph, settings, np.random.default_rng(seed), pixel_area=pixel_area, record=True)
     codebook = fitted.codebook
     if settings.even:
         codebook, _ = even_spacing(codebook, graph, bridged_edges(codebook, graph, settings.bridge))

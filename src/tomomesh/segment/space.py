@@ -82,7 +82,7 @@ def train_space(
     start = "axes" if (settings.network, settings.start) == ("torus", "ellipse") else settings.start
     asked = replace(settings, start=start, trim=0.0 if outlined else settings.trim)
     origin = shown.mean(axis=0)
-    fitted = fit(shown - origin, graph, asked, np.random.default_rng(seed), record=False)
+    fitted = fit(shown - origin, graph, asked, np.random.default_rng(seed))
     return SpaceNetwork(graph, fitted.codebook + origin, outlined, len(shown), int((~fitted.kept).sum()))
 
 

@@ -14,13 +14,15 @@ from ..model.networks import Networks
 from ..progress import Progress, silent
 from .even import bridged_edges, even_spacing
 from .signal import fills_most, outline, pixels_of
-from .som.fit import match, radii, train
+from .som.fit import fit, match, radii
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..model.contours import Contours
     from ..model.lattice import Lattice
     from ..settings import NetworkSettings
+    from .som.fit import Fitted
 
 NEAR = 2.0
 """First radius, hops, where a network starts from the result of the slice below."""
@@ -69,33 +71,22 @@ def train_study(
     solid = settings.signal == "auto" and graph.name != "grid" and fills_most(mask)
     outlined = settings.signal == "boundary" or solid
     count = len(mask)
-    pixel_area = pixel_mm[0] * pixel_mm[1]
     codebooks, bridged = np.zeros((count, len(graph), 2)), np.zeros((count, len(graph.edges)), bool)
     pixels, strays = np.zeros(count, np.int64), np.zeros(count, np.int64)
-
     followed = settings.start == "neighbor"
-    before: list[NDArray[np.float64]] = []
+    below: NDArray[np.float64] | None = None
 
     def work(start: int, stop: int) -> None:
+        nonlocal below
         for k in range(start, stop):
             plane = mask[k] if outlined or layers is None else layers[k]
-            shown = outline(plane) if outlined else pixels_of(plane)
-            shown = shown * (*pixel_mm, pixel_mm[0])[: shown.shape[1]]
+            shown = _shown(plane, pixel_mm, outlined=outlined)
             pixels[k] = len(shown)
             if len(shown) >= len(graph):
-                rng = np.random.default_rng([seed, k])
-                chosen = (
-                    _from_neighbor(shown, graph, settings, pixel_area, begun=bool(before)) if followed else settings
-                )
-                found, kept = train(
-                    shown, graph, chosen, rng, pixel_area=pixel_area, start=before.pop() if before else None
-                )
-                before.extend([found] if followed else [])
-                found = np.ascontiguousarray(found[:, :2])
-                gaps = bridged_edges(found, graph, settings.bridge)
-                if settings.even:
-                    found, gaps = even_spacing(found, graph, gaps)
-                codebooks[k], bridged[k], strays[k] = found / pixel_mm, gaps, (~kept).sum()
+                fitted = _fitted(shown, graph, settings, np.random.default_rng([seed, k]), pixel_mm, below)
+                below = fitted.codebook if followed else None
+                codebooks[k], bridged[k] = _spaced(fitted.codebook[:, :2], graph, settings, pixel_mm)
+                strays[k] = (~fitted.kept).sum()
 
     workers = 1 if followed else threads
     in_blocks(work, count, block=1, threads=workers, done=lambda done: progress("networks", done, count))
@@ -119,29 +110,49 @@ def train_study(
     )
 
 
-def _from_neighbor(
-    shown: NDArray[np.float64], graph: Lattice, settings: NetworkSettings, pixel_area: float, *, begun: bool
-) -> NetworkSettings:
-    """Return the settings of a slice that follows another, near whose result its own will be; or of the first."""
-    if not begun or settings.radius is not None:
-        return settings
-    _, last = radii(shown, graph, settings, pixel_area)
-    return replace(settings, radius=(max(NEAR, last), last))
+def _shown(plane: NDArray[np.bool_], pixel_mm: tuple[float, float], *, outlined: bool) -> NDArray[np.float64]:
+    """Return what the network of a slice sees, in millimeters."""
+    shown = outline(plane) if outlined else pixels_of(plane)
+    return shown * (*pixel_mm, pixel_mm[0])[: shown.shape[1]]
+
+
+def _fitted(
+    shown: NDArray[np.float64], graph: Lattice, settings: NetworkSettings, rng: np.random.Generator,
+    pixel_mm: tuple[float, float], below: NDArray[np.float64] | None,
+) -> Fitted:  # fmt: skip
+    """Train the network of a slice; one that follows another has its own place near the other's."""
+    pixel_area = pixel_mm[0] * pixel_mm[1]
+    if below is not None and settings.radius is None:
+        _, last = radii(shown, graph, settings, pixel_area)
+        settings = replace(settings, radius=(max(NEAR, last), last))
+    return fit(shown, graph, settings, rng, pixel_area=pixel_area, start=below)
+
+
+def _spaced(
+    codebook: NDArray[np.float64], graph: Lattice, settings: NetworkSettings, pixel_mm: tuple[float, float]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the neurons in pixels, evenly spaced where that is asked for, and which edges bridge gaps."""
+    codebook = np.ascontiguousarray(codebook)
+    gaps = bridged_edges(codebook, graph, settings.bridge)
+    if settings.even:
+        codebook, gaps = even_spacing(codebook, graph, gaps)
+    return codebook / pixel_mm, gaps
 
 
 def regions(
     mask: NDArray[np.bool_],
-    networks: Networks,
+    found: Networks | Contours,
     *,
     pixel_mm: tuple[float, float] = (1.0, 1.0),
     threads: int = 0,
 ) -> NDArray[np.uint16]:
-    """Compare the networks with the image: give every window pixel its winner's label (Fig. 5).
+    """Compare networks with the image: give every window pixel its winner's label (Fig. 5).
 
     Parameters
     ----------
     mask : (K, J, I) bool array
-    networks : Networks
+    found : Networks or Contours
+        One network a slice, or several.
     pixel_mm : (float, float)
         Distance of the columns and of the rows.
     threads : int
@@ -149,16 +160,17 @@ def regions(
     Returns
     -------
     (K, J, I) uint16 array
-        0 outside the window and on slices without a network, else the neuron's number within its slice plus 1.
+        0 outside the window and on slices without a network, else the neuron's number within its slice plus 1,
+        counted through the rings of the slice where there are several.
     """
     labels = np.zeros(mask.shape, np.uint16)
 
     def work(start: int, stop: int) -> None:
-        for n in range(start, stop):
-            plane = networks.slices[n]
-            by_axis = np.ascontiguousarray((pixels_of(mask[plane]) * pixel_mm).T)
-            winners, _ = match(np.ascontiguousarray((networks.codebooks[n] * pixel_mm).T), by_axis)
-            labels[plane][mask[plane]] = winners + 1
+        for k in found.slices[start:stop]:
+            codebook = found.codebook_on(int(k)) * pixel_mm
+            by_axis = np.ascontiguousarray((pixels_of(mask[k]) * pixel_mm).T)
+            winners, _ = match(np.ascontiguousarray(codebook.T), by_axis)
+            labels[k][mask[k]] = winners + 1
 
-    in_blocks(work, len(networks.slices), block=1, threads=threads)
+    in_blocks(work, len(found.slices), block=1, threads=threads)
     return labels

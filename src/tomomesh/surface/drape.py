@@ -11,17 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.feet import (
-    SIGHT,
-    advance,
-    average,
-    first_feet,
-    list_neighbors,
-    nearest_places,
-    quad_normals,
-    renew_feet,
-    split_quads,
-)
+from ..kernels.feet import first_feet, nearest_places, renew_feet
+from ..kernels.quads import quad_normals, split_quads
+from ..kernels.samples import SIGHT
+from ..kernels.springs import advance, average, list_neighbors
 from ..kernels.threads import in_blocks
 from ..model.columns import any_of
 from ..model.trace import Trace

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..even import along, even_arcs, evenly
-from ..som.fit import train
+from ..som.fit import fit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -66,7 +66,7 @@ def unshrunk(
     ring = codebook
     for _ in range(TIMES):
         shown = finely(ring)[~gaps].reshape(-1, 2)
-        again, _ = train(shown, lattice, once, np.random.default_rng(0), start=ring)
+        again = fit(shown, lattice, once, np.random.default_rng(0), start=ring).codebook
         ring = ring + codebook - again
     return ring
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from scipy import ndimage
-from scipy.spatial import cKDTree
 
 from ...errors import EmptyError
 from ...kernels.threads import in_blocks
@@ -15,8 +14,7 @@ from ...model.contours import Contour, Contours
 from ...model.lattice import lattice
 from ...progress import Progress, silent
 from ..even import bridged_edges, evenly
-from ..signal import pixels_of
-from ..som.fit import radii, train
+from ..som.fit import fit, radii
 from .curved import evened, unshrunk
 from .looks import SHORTEST, Look, components_of, looks_at_loops, solids
 from .tracking import track
@@ -154,20 +152,21 @@ def _trained(
     graph, shown = lattice("ring", neurons), look.shown * pixel_mm
     rng, pixel_area = np.random.default_rng(place), pixel_mm[0] * pixel_mm[1]
     if look.line is None:
-        found, kept = train(shown, graph, settings, rng, pixel_area=pixel_area)
+        fitted = fit(shown, graph, settings, rng, pixel_area=pixel_area)
         _, last = radii(shown, graph, settings, pixel_area)
     else:
         start = drawn(look.line * pixel_mm, neurons, None if first is None else first * pixel_mm)
         refined = replace(settings, radius=settings.radius or REFINED, trim=0.0 if look.outlined else settings.trim)
-        found, kept = train(shown, graph, refined, rng, pixel_area=pixel_area, start=start)
+        fitted = fit(shown, graph, refined, rng, pixel_area=pixel_area, start=start)
         _, last = refined.radius or REFINED
+    found = fitted.codebook
     gaps = bridged_edges(found, graph, settings.bridge)
     if settings.training == "batch":
         found = unshrunk(found, graph, settings, gaps, last)
     if settings.even:
         found, gaps = evened(found, gaps)
     return Contour(
-        place[1], place[2], look.side, -1, found / pixel_mm, gaps, look.outlined, len(shown), int((~kept).sum())
+        place[1], place[2], look.side, -1, found / pixel_mm, gaps, look.outlined, len(shown), int((~fitted.kept).sum())
     )  # fmt: skip
 
 
@@ -182,33 +181,3 @@ def drawn(line: Floats, count: int, first: Floats | None = None) -> Floats:
     closed = np.roll(line, -int(np.argmin(away)), axis=0)
     closed = np.concatenate([closed, closed[:1]])
     return evenly(closed, count + 1)[:-1]
-
-
-def regions_of(
-    mask: NDArray[np.bool_], contours: Contours, *, pixel_mm: tuple[float, float] = (1.0, 1.0), threads: int = 0
-) -> NDArray[np.uint16]:
-    """Give every window pixel the label of the nearest neuron of its slice.
-
-    Parameters
-    ----------
-    mask : (K, J, I) bool array
-    contours : Contours
-    pixel_mm : (float, float)
-    threads : int
-
-    Returns
-    -------
-    (K, J, I) uint16 array
-        0 outside the window and on slices without a contour, else the neuron's number plus 1, counted through the
-        rings of its slice.
-    """
-    labels = np.zeros(mask.shape, np.uint16)
-
-    def work(start: int, stop: int) -> None:
-        for plane in contours.slices[start:stop]:
-            neurons = np.concatenate([one.codebook for one in contours.on(int(plane))]) * pixel_mm
-            _, nearest = cKDTree(neurons).query(pixels_of(mask[plane]) * pixel_mm)
-            labels[plane][mask[plane]] = nearest + 1
-
-    in_blocks(work, len(contours.slices), block=1, threads=threads)
-    return labels

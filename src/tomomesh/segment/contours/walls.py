@@ -11,7 +11,7 @@ from ...model.contours import WALL_INNER, WALL_OUTER
 from ...model.lattice import lattice
 from ..polygon import area, distance, inside
 from ..signal import closed, pixels_of
-from ..som.fit import train
+from ..som.fit import fit
 from .looks import SHORTEST, TOUCHING, Look, look_at_loop
 from .loops import Loop, trace
 
@@ -80,7 +80,7 @@ def _two_sides(
     """Part a wall by the ring in its middle; where that follows no wall, take the borders as they are."""
     pixels = pixels_of(wall)
     graph = lattice("ring", min(settings.neuron_count, len(pixels)))
-    middle, _ = train(pixels * pixel_mm, graph, settings, rng, pixel_area=pixel_mm[0] * pixel_mm[1])
+    middle = fit(pixels * pixel_mm, graph, settings, rng, pixel_area=pixel_mm[0] * pixel_mm[1]).codebook
     column, row = np.rint(middle / pixel_mm).astype(int).T
     massive = bool(wall[row.clip(0, len(wall) - 1), column.clip(0, wall.shape[1] - 1)].mean() > 0.5)
     shown = (_borders(wall) if massive else pixels) * pixel_mm

@@ -182,7 +182,7 @@ class SOM(Parametrized):
         fitted = fit(
             inputs, self.lattice_, settings, np.random.default_rng(self.seed_), pixel_area=self.pixel_area,
             weights=weights, start=start, callback=self.callback,
-            alpha_fall=alpha_fall, radius_fall=radius_fall,
+            alpha_fall=alpha_fall, radius_fall=radius_fall, record=True,
         )  # fmt: skip
         dropped = ~fitted.kept if weights is None else ~fitted.kept & (weights > 0)
         self.history_, self.strays_ = fitted.history, int(dropped.sum())
@@ -204,7 +204,7 @@ class SOM(Parametrized):
         )  # fmt: skip
         fitted = fit(
             inputs, self.lattice_, settings, np.random.default_rng([self.seed_, self.n_iter_]), weights=weights,
-            start=self.codebook_, callback=self.callback,
+            start=self.codebook_, callback=self.callback, record=True,
         )  # fmt: skip
         self.history_ = self.history_.then(fitted.history)
         return self._settle(fitted.codebook, inputs, weights)

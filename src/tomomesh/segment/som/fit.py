@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...settings import NetworkSettings
     from .history import History
 
-__all__ = ["Fitted", "fit", "match", "radii", "shape_of", "start_positions", "train"]
+__all__ = ["Fitted", "fit", "match", "radii", "shape_of", "start_positions"]
 
 Callback = Callable[["NDArray[np.float64]", int], None]
 
@@ -55,25 +55,6 @@ class Fitted:
     history: History
 
 
-def train(
-    inputs: NDArray[np.float64],
-    lattice: Lattice,
-    settings: NetworkSettings,
-    rng: np.random.Generator,
-    *,
-    pixel_area: float = 1.0,
-    weights: NDArray[np.float64] | None = None,
-    start: NDArray[np.float64] | None = None,
-    callback: Callback | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Do what `fit` does, without a history; return the codebook (u, d) and the inputs kept (n,)."""
-    fitted = fit(
-        inputs, lattice, settings, rng, pixel_area=pixel_area, weights=weights, start=start, callback=callback,
-        record=False,
-    )  # fmt: skip
-    return fitted.codebook, fitted.kept
-
-
 def fit(
     inputs: NDArray[np.float64],
     lattice: Lattice,
@@ -86,7 +67,7 @@ def fit(
     callback: Callback | None = None,
     alpha_fall: Fall | None = None,
     radius_fall: Fall | None = None,
-    record: bool = True,
+    record: bool = False,
 ) -> Fitted:
     """Fit a network to inputs.
 
@@ -111,7 +92,7 @@ def fit(
         How the learning rate and the radius fall, in place of the settings': from the time (t,), 0 to 1, to what
         is left, 1 to 0.
     record : bool
-        Whether every epoch of online training is measured; in batch that costs nothing.
+        Whether the history holds the error of every epoch of online training, too; in batch that costs nothing.
 
     Returns
     -------

@@ -112,7 +112,7 @@ def _online(
                         trim=settings.trim if stop == count else 0.0)  # fmt: skip
         fitted = fit(
             inputs, lattice, piece, rng, pixel_area=pixel_area, start=seen[-1] if seen else None,
-            alpha_fall=_piece(rate_left, first, stop), radius_fall=_piece(reach_left, first, stop), record=False,
+            alpha_fall=_piece(rate_left, first, stop), radius_fall=_piece(reach_left, first, stop),
         )  # fmt: skip
         seen.append(fitted.codebook)
     return stops.tolist(), seen
