@@ -77,8 +77,8 @@ def segment_in_space(
         voxels = stack.to_mm(np.argwhere(mask)[:, ::-1].astype(np.float64))
         outlined, places = _outlined(mask, settings), voxels
         if outlined:
-            limits = {"lower": lower, "upper": upper, "layers": layers}
-            places = boundary(stack, mask, surface="outer", threads=threads, **limits).points.positions  # type: ignore[arg-type]
+            found = boundary(stack, mask, lower=lower, upper=upper, layers=layers, surface="outer", threads=threads)
+            places = found.points.positions
     with account.timed("networks"):
         progress("networks", 0, 1)
         network = train_space(places, settings.network, outlined=outlined, seed=settings.run.seed)
@@ -90,8 +90,8 @@ def segment_in_space(
     account.space(network, pieces, int(np.count_nonzero(whole) - np.count_nonzero(mask)))
     sampling = _sampled(network)
     account.points(sampling.points, sampling.spacing_mm)
-    found = SpaceFound(network, places)
-    return Segmentation(stack, mask, NO_NETWORKS, labels, sampling.points, sampling, account.report, space=found)
+    space = SpaceFound(network, places)
+    return Segmentation(stack, mask, NO_NETWORKS, labels, sampling.points, sampling, account.report, space=space)
 
 
 def _outlined(mask: NDArray[np.bool_], settings: Settings) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -91,7 +92,7 @@ class Blocks:
         """Add every cube within some steps of a cube, corners included: one axis after the other."""
         for axis in (0, 1, 2) * steps:
             before, board = board, board.copy()
-            self.each(lambda start, stop, b=before, g=board, a=axis: grow_along(b, self.table, a, g, start, stop))  # type: ignore[misc]
+            self.each(partial(grow_along, before, self.table, axis, board))
         return board
 
     def spread(self, board: Board, within: Board, steps: int) -> Board:

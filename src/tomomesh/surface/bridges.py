@@ -82,15 +82,8 @@ def bridges(
             places = np.empty((room, 3))
         found[start] = places[:room].copy()
 
-    for stage, work in enumerate((look, lay)):
-        done = stage * count
-        in_blocks(
-            work,
-            count,
-            block=BLOCK,
-            threads=threads,
-            done=lambda n, d=done: progress("bridges", d + n, 2 * count),  # type: ignore[misc]
-        )
+    in_blocks(look, count, block=BLOCK, threads=threads, done=lambda n: progress("bridges", n, 2 * count))
+    in_blocks(lay, count, block=BLOCK, threads=threads, done=lambda n: progress("bridges", count + n, 2 * count))
     back = np.empty(count, np.int64)
     back[index.order] = sectors
     return Bridges(np.concatenate([np.empty((0, 3)), *(found[start] for start in sorted(found))]), back)

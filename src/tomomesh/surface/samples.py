@@ -7,6 +7,7 @@ surface that its neighbors describe, with a normal there of either sign.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -181,7 +182,7 @@ class _Cloud:
         planes, width = np.zeros((len(self.points), 5)), FIRST * spacing
         used = width
         for stage in (1, 2):
-            self._run(stage, lambda a, b, w=width: fit_planes(self.points, *self._cells, w, planes, a, b))  # type: ignore[misc]
+            self._run(stage, partial(fit_planes, self.points, *self._cells, width, planes))
             used = np.where(width > 0, width, used)
             noise = self.regions.median(_noise(planes[:, 4], used))
             wide = _width(noise, spacing)
