@@ -13,7 +13,7 @@ from tomomesh import assess, phantom, read_volume, window
 from tomomesh.measure.report import compare
 from tomomesh.measure.topology import check_promise
 from tomomesh.model.mesh import TriMesh
-from tomomesh.segment.window import otsu_threshold
+from tomomesh.segment.otsu import otsu_threshold
 from tomomesh.settings import FitSettings
 from tomomesh.surface.voxels import boundary, voxel_surface
 

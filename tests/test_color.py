@@ -15,9 +15,10 @@ from PIL import Image
 from tomomesh import Settings, Volume, reconstruct, window
 from tomomesh.cli import main
 from tomomesh.errors import EmptyError, UsageError
+from tomomesh.segment.otsu import otsu_threshold
 from tomomesh.segment.study import train_study
 from tomomesh.segment.survey import survey
-from tomomesh.segment.window import by_layer, choose_window, otsu_threshold
+from tomomesh.segment.window import by_layer, choose_window
 from tomomesh.settings import NetworkSettings, WindowSettings
 from tomomesh.surface.voxels import boundary
 
@@ -178,8 +179,8 @@ class TestEndToEnd:
     def test_inspect_tells_the_window_of_each_layer(self) -> None:
         voxels = ball()
         voxels[..., 1] = 7
-        windows = survey(volume_of(voxels))["windows"]["otsu"]
-        assert windows == [[otsu_threshold(voxels[..., 0]), None, otsu_threshold(voxels[..., 2])], None]
+        windows = survey(volume_of(voxels))["windows"]["otsu"]["lower"]
+        assert windows == [otsu_threshold(voxels[..., 0]), None, otsu_threshold(voxels[..., 2])]
 
 
 class TestCommandLine:

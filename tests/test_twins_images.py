@@ -9,16 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
-from skimage.filters import threshold_otsu
+from skimage.filters import threshold_multiotsu, threshold_otsu
 from skimage.measure import find_contours
 from skimage.segmentation import find_boundaries
 
 from conftest import law, seeds
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.model.volume import Volume
+from tomomesh.segment.otsu import histogram, otsu_levels, otsu_threshold
 from tomomesh.segment.polygon import distance
 from tomomesh.segment.signal import fills_most, outline
-from tomomesh.segment.window import choose_window, histogram, otsu_threshold, window
+from tomomesh.segment.window import choose_window, window
 from tomomesh.settings import WindowSettings
 
 if TYPE_CHECKING:
@@ -50,6 +51,17 @@ class TestOtsu:
         wanted = threshold_otsu(np.asarray(levels, np.float64), nbins=256)
         one_bin = np.ptp(np.asarray(levels, np.float64)) / 256
         assert otsu_threshold(levels) == pytest.approx(wanted, abs=one_bin * 1.001)
+
+    @pytest.mark.parametrize("classes", [3, 4])
+    @pytest.mark.parametrize("seed", range(5))
+    def test_of_several_classes_is_scikit_image_s(self, classes: int, seed: int) -> None:
+        draw = np.random.default_rng(seed)
+        levels = np.concatenate([draw.normal(at, draw.uniform(1, 30), 3000) for at in draw.uniform(-500, 500, 4)])
+        wanted = threshold_multiotsu(levels, classes, nbins=64)
+        assert otsu_levels(levels, classes, bins=64) == pytest.approx(tuple(wanted))
+
+    def test_has_no_more_classes_than_levels(self) -> None:
+        assert otsu_levels(np.array([1, 1, 5, 9]), 6) == pytest.approx((1, 5), abs=0.05)
 
     @law(60)
     @given(levels=grays())

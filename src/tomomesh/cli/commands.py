@@ -155,10 +155,11 @@ def _window_of_picture(path: str, settings: Settings) -> NDArray[np.float64]:
 
 def _inspect(chosen: Namespace) -> None:
     from ..segment.survey import survey
+    from . import findings
 
     volume = io.read_volume(chosen.study, settings=settings_of(chosen).read)
     found = survey(volume)
-    print(json.dumps(found, indent=2) if chosen.json else "\n".join(summary.of_study(found)))
+    print(json.dumps(found, indent=2) if chosen.json else "\n".join(findings.of_study(found, chosen.study)))
 
 
 def _check(chosen: Namespace) -> None:

@@ -6,7 +6,6 @@ from typing import Any
 
 from ..measure.topology import FAULTS
 
-BARS = " ▁▂▃▄▅▆▇█"
 LARGEST = 3
 """Components that are described one by one."""
 
@@ -52,28 +51,6 @@ def of_network(report: dict[str, Any], output: str) -> list[str]:
         f"          quantization error {network['quantization_error']:.4g}, dead neurons {network['dead_neurons']}, "
         f"longest edge {network['longest_over_median_edge']:.2f} medians",
         f"written   {output}",
-    ]
-
-
-def of_study(found: dict[str, Any]) -> list[str]:
-    """Say what is in a study."""
-    slices, rows, columns = found["slices_rows_columns"]
-    x, y, z = found["spacing_mm"]
-    tallest = max(max(found["histogram"]), 1)
-    bars = "".join(BARS[round((len(BARS) - 1) * (count / tallest) ** 0.5)] for count in found["histogram"])
-    windows = [f"{name}: k > {_limit(lower)}" for name, (lower, _) in found["windows"].items()]
-    return [
-        f"size      {slices} slices x {rows} rows x {columns} columns (S x P x L), "
-        f"{found['layers']} layer(s) of {found['type']}",
-        f"spacing   {x:g} x {y:g} x {z:g} mm (L, P, S)",
-        f"extent    {' x '.join(f'{side:.1f}' for side in found['size_mm'])} mm, first voxel at "
-        f"({', '.join(f'{c:.1f}' for c in found['corner_mm'])}) mm LPS",
-        f"slices    stored {found['stored_plane']}, columns-rows-slices run {found['stored_axes']}; "
-        f"taken {found['default_plane']} by default",
-        f"levels    {found['lowest']:g} to {found['highest']:g} ({found['gray_unit']})",
-        f"          {bars}",
-        f"windows   {'; '.join(windows)}",
-        *(f"note      {note}" for note in found["notes"]),
     ]
 
 
@@ -130,7 +107,7 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
     if "study" not in report:
         return []
     study, window = report["study"], report["window"]
-    lower, upper = _limit(window["lower"]), _limit(window["upper"])
+    lower, upper = limit_in_words(window["lower"]), limit_in_words(window["upper"])
     joined = f", in {window['joined_by']} of {window['layers']} layers" if window["joined_by"] else ""
     chosen = {"otsu": "Otsu's, as no window was given", "preset": "the preset", "given": "as given", "labels": ""}
     lines = [
@@ -164,7 +141,7 @@ def _of_space(report: dict[str, Any]) -> str:
     )
 
 
-def _limit(limit: float | list[float | None] | None) -> str:
+def limit_in_words(limit: float | list[float | None] | None) -> str:
     """Name a limit, or one a layer."""
     each = limit if isinstance(limit, list) else [limit]
     return ", ".join("any" if one is None else f"{one:g}" for one in each)

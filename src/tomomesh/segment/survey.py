@@ -1,4 +1,4 @@
-"""What is in a study: the answer to ``tomomesh inspect``."""
+"""What is in a study, and what to do with it: the answer to ``tomomesh inspect``."""
 
 from __future__ import annotations
 
@@ -7,15 +7,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.volume import AXES
-from .window import PRESETS_HU, histogram, otsu_thresholds
+from .otsu import histogram, otsu_levels
+from .window import PRESETS_HU, otsu_thresholds
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ..model.volume import Volume
 
 BARS = 32
 """Bars of the printed histogram."""
 LETTERS = (("R", "L"), ("A", "P"), ("I", "S"))
 """Ends of the patient axes, the negative first."""
+HIGHEST_LABEL = 2**16
+"""A volume with higher levels is no label map."""
+FLAT = 0.8
+"""Share of equal neighbors, among those that are both over 0, from which levels are labels."""
 
 
 def survey(volume: Volume) -> dict[str, Any]:
@@ -28,35 +35,77 @@ def survey(volume: Volume) -> dict[str, Any]:
     Returns
     -------
     dict
-        Size, spacing, frame, the range and histogram of the gray levels, suggested windows, the reader's notes.
+        Size, spacing, frame, tilt, the range and histogram of the gray levels, suggested windows and the share of the
+        voxels in each, the labels of a label map, the reader's notes.
     """
     voxels = volume.voxels
     low, high = float(voxels.min()), float(voxels.max())
-    otsu = np.asarray(otsu_thresholds(volume)).tolist()
-    windows = {"otsu": [otsu if volume.layers == 1 else [_finite(one) for one in otsu], None]}
-    if low < 0:
-        windows |= {name: [lower, None] for name, (lower, _) in PRESETS_HU.items()}
     return {
         "slices_rows_columns": list(volume.shape),
         "layers": volume.layers,
         "spacing_mm": list(volume.spacing_mm),
+        "slice_distance_mm": volume.slice_distance_mm,
+        "tilt_deg": _tilt(volume),
         "stored_plane": AXES[volume.stored_axis],
         "default_plane": AXES[volume.thickest_axis()],
         "stored_axes": _stored_axes(volume),
         "corner_mm": volume.affine[:3, 3].tolist(),
+        "affine": volume.affine.tolist(),
         "size_mm": (np.array(volume.spacing_mm) * volume.shape[::-1]).tolist(),
         "type": str(voxels.dtype),
         "gray_unit": volume.unit,
         "lowest": low,
         "highest": high,
         "histogram": histogram(voxels, low, high, BARS).tolist() if high > low else [voxels.size],
-        "windows": windows,
+        "windows": _windows(volume, low),
+        "labels": _labels(voxels),
         "notes": list(volume.notes),
     }
 
 
-def _finite(limit: float) -> float | None:
-    return limit if np.isfinite(limit) else None
+def _tilt(volume: Volume) -> float:
+    """Return the angle between the way from slice to slice, as they are stored, and their normal."""
+    columns, rows, step = volume.grid.affine[:3, :3].T
+    normal = np.cross(columns, rows)
+    cosine = abs(step @ normal) / np.linalg.norm(step) / np.linalg.norm(normal)
+    return float(np.degrees(np.arccos(min(1.0, cosine))))
+
+
+def _windows(volume: Volume, low: float) -> dict[str, dict[str, Any]]:
+    """Suggest lower limits: Otsu's, those between three and four classes, and for CT those of the presets."""
+    limits: dict[str, Any] = {"otsu": otsu_thresholds(volume)}
+    if volume.layers == 1:
+        upper = {f"otsu of {classes}": otsu_levels(volume.voxels, classes)[-1] for classes in (3, 4)}
+        limits |= {name: limit for name, limit in upper.items() if limit not in limits.values()}
+    if low < 0:
+        limits |= {name: lower for name, (lower, _) in PRESETS_HU.items()}
+    return {
+        name: {"lower": _finite(limit), "share": float(np.mean(volume.voxels > limit))}
+        for name, limit in limits.items()
+    }
+
+
+def _finite(limit: Any) -> Any:
+    """Return a limit, or one a layer, with None where there is none."""
+    found = [value if np.isfinite(value) else None for value in np.ravel(limit).tolist()]
+    return found if np.ndim(limit) else found[0]
+
+
+def _labels(voxels: NDArray[Any]) -> dict[str, int]:
+    """Count the voxels of each label; nothing where the levels do not look like labels.
+
+    Labels are whole numbers in flat regions: neighbors over 0 are mostly equal, which those of an image are not.
+    """
+    whole = voxels.ndim == 3 and voxels.min() >= 0 and voxels.max() < HIGHEST_LABEL
+    if not whole or not np.array_equal(voxels, np.rint(voxels)):
+        return {}
+    left, right = voxels[..., :-1], voxels[..., 1:]
+    inside = (left > 0) & (right > 0)
+    pairs = int(np.count_nonzero(inside))
+    if np.count_nonzero((left == right) & inside) < FLAT * pairs:
+        return {}
+    counts = np.bincount(voxels.ravel().astype(np.int64))
+    return {str(label): int(counts[label]) for label in np.flatnonzero(counts) if label > 0}
 
 
 def _stored_axes(volume: Volume) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import EmptyError, UsageError
+from .otsu import otsu_threshold
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
 
 PRESETS_HU = {"bone": (300.0, np.inf), "skin": (-300.0, np.inf)}
 """Windows for CT, Hounsfield units."""
-PILED, SPAN = 0.999, (0.01, 99.99)
-"""Share of the levels in one bin over which a histogram tells nothing, and the percentiles that it then spans."""
 
 
 def window(volume: Volume, *, lower: Limit = -np.inf, upper: Limit = np.inf, layers: str = "all") -> NDArray[np.bool_]:
@@ -122,49 +121,3 @@ def otsu_thresholds(volume: Volume) -> Limit:
         return otsu_threshold(levels)
     layers = [levels[..., n] for n in range(levels.shape[3])]
     return np.array([otsu_threshold(one) if one.min() < one.max() else -np.inf for one in layers])
-
-
-def otsu_threshold(levels: NDArray[Any], *, bins: int = 256) -> float:
-    """Return the gray level that splits a histogram into two classes most unlike each other (Otsu 1979).
-
-    Parameters
-    ----------
-    levels : array
-        Gray levels of any shape; those that are not finite do not count.
-    bins : int
-        Bins of the histogram between the lowest and the highest level; between the percentiles `SPAN` where a
-        few far levels pile all others up in one bin.
-
-    Returns
-    -------
-    float
-        Middle of the last bin of the lower class; the level itself where there is only one.
-    """
-    levels = levels[np.isfinite(levels)] if levels.dtype.kind == "f" else levels
-    low, high = float(levels.min()), float(levels.max())
-    if low == high:
-        return low
-    counts = histogram(levels, low, high, bins)
-    if counts.max() > PILED * counts.sum():
-        inner = np.percentile(levels, SPAN)
-        low, high = inner if inner[0] < inner[1] else (low, high)
-        counts = histogram(levels, low, high, bins)
-    middles = low + (np.arange(bins) + 0.5) * (high - low) / bins
-    below = np.cumsum(counts)[:-1]
-    above = counts.sum() - below
-    mass = np.cumsum(counts * middles)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        apart = mass[:-1] / below - (mass[-1] - mass[:-1]) / above
-        between = np.nan_to_num(below * above * apart**2)
-    return float(middles[np.argmax(between)])
-
-
-def histogram(levels: NDArray[Any], low: float, high: float, bins: int) -> NDArray[np.int64]:
-    """Count gray levels in equal bins; exact and quick for small integers, which most studies hold."""
-    levels = levels.view(np.uint8) if levels.dtype.kind == "b" else levels
-    if levels.dtype.kind in "iu" and levels.dtype.itemsize <= 2:
-        base = int(np.iinfo(levels.dtype).min)
-        counts = np.bincount(levels.ravel().astype(np.int64) - base)
-        present = np.flatnonzero(counts)
-        return np.histogram(present + base, bins, (low, high), weights=counts[present])[0].astype(np.int64)
-    return np.histogram(levels, bins, (low, high))[0].astype(np.int64)
