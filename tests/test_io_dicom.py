@@ -343,8 +343,8 @@ class TestGeometry:
             return
         with pytest.raises(GeometryError, match="varies"):
             read_volume(folder)
-        volume = read_volume(folder, settings=ReadSettings(fill_gaps=True))
-        assert "interpolated" in volume.notes[0]
+        volume = read_volume(folder, settings=ReadSettings(resample_slices=True))
+        assert "resampled" in volume.notes[0]
         assert volume.shape == SHAPE
         np.testing.assert_array_equal(volume.voxels[[0, -1]], STORED[[0, -1]])
 
@@ -578,7 +578,7 @@ class TestSharedData:
         folder = shared("dcm_qa_ct/In/GE")
         with pytest.raises(GeometryError, match=r"varies.*1\.081 to 6\.999 mm"):
             read_volume(folder)
-        volume = read_volume(folder, settings=ReadSettings(fill_gaps=True))
+        volume = read_volume(folder, settings=ReadSettings(resample_slices=True))
         assert any("18.5 degrees" in note for note in volume.notes)
 
     @pytest.mark.parametrize(

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from ..errors import FormatError, UnreadableError
 from ..settings import ReadSettings
-from .dicom import is_dicom, read_dicom
+from .archive import unpacked_zip
+from .dicom import dicom_among, index_in, is_dicom, is_index, read_dicom, read_index
 from .freesurfer import read_mgh
 from .images import FAMILIES, read_images
 from .metaimage import read_metaimage
@@ -28,6 +29,15 @@ def _read_one_dicom(path: Path, settings: ReadSettings) -> Volume:
     return read_dicom([path], settings, study=str(path))
 
 
+def _read_zip(path: Path, settings: ReadSettings) -> Volume:
+    """Read the slices in an archive, or the only volume; archives inside it are not opened."""
+    with unpacked_zip(path) as folder:
+        files, _ = regular_files(folder, deep=True)
+        whole = [file for file in files if suffix_of(file) in VOLUME_READERS.keys() - {".zip"}]
+        one = len(whole) == 1 and not any(map(is_dicom, files))
+        return read_volume(whole[0] if one else folder, settings=settings)
+
+
 VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
     ".nii": read_nifti,
     ".nii.gz": read_nifti,
@@ -42,6 +52,7 @@ VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
     ".tiff": read_tiff,
     ".dcm": _read_one_dicom,
     ".ima": _read_one_dicom,
+    ".zip": _read_zip,
 }
 """Suffix of a single file to its reader; folders, and DICOM of any name, are known by their content."""
 
@@ -56,8 +67,8 @@ def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Vo
     Parameters
     ----------
     path : path
-        A DICOM, NIfTI, NRRD, MetaImage, MGH, NPY or multi-page TIFF file, or a folder of DICOM, PNG, TIFF or JPEG
-        slices.
+        A DICOM, NIfTI, NRRD, MetaImage, MGH, NPY or multi-page TIFF file, a folder of DICOM, PNG, TIFF or JPEG
+        slices, a DICOMDIR, or a zip file of one of these.
     settings : ReadSettings, optional
         What to do where the files leave a choice.
 
@@ -84,6 +95,8 @@ def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Vo
     if path.is_dir():
         return _read_folder(path, settings)
     existing_file(path)
+    if is_index(path):
+        return read_index(path, settings, study=str(path))
     reader = VOLUME_READERS.get(suffix_of(path))
     if reader is None and is_dicom(path):
         reader = _read_one_dicom
@@ -99,7 +112,9 @@ def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Vo
 
 
 def _read_folder(folder: Path, settings: ReadSettings) -> Volume:
-    """Read the images of a folder; where it holds none, those of its sub-folders."""
+    """Read what its DICOMDIR names, or the images of a folder; where it holds none, those of its sub-folders."""
+    if (index := index_in(folder)) is not None:
+        return read_index(index, settings, study=str(folder))
     for deep in (False, True):
         files, others = regular_files(folder, deep=deep)
         volume = _read_images(files, others, folder, settings)
@@ -118,7 +133,7 @@ def _read_folder(folder: Path, settings: ReadSettings) -> Volume:
 
 def _read_images(files: list[Path], others: Counter[str], folder: Path, settings: ReadSettings) -> Volume | None:
     """Read DICOM where there is any, else PNG, TIFF or JPEG slices."""
-    dicom = [path for path in files if is_dicom(path)]
+    dicom = dicom_among(files)
     if dicom:
         others = others + Counter({"not DICOM": len(files) - len(dicom)})
         return read_dicom(dicom, settings, study=str(folder), others=others)

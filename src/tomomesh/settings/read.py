@@ -23,3 +23,9 @@ class ReadSettings(Group):
         None, "distance of the slices, for one slice or slices without positions", unit="mm", above=0
     )
     fill_gaps: bool = param(False, "interpolate the slices that are missing from a regular stack")
+    resample_slices: bool = param(
+        False, "interpolate an even stack where the distance of the slices varies by more than 1 %"
+    )
+    skip_bad: bool = param(
+        False, "go on without the files of a series that cannot be read, where the others still make a regular stack"
+    )

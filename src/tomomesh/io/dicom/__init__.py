@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .header import is_dicom
+from .directory import index_in, is_index, read_index
+from .files import dicom_among, is_dicom
 from .read import read_dicom
 
-__all__ = ["is_dicom", "read_dicom"]
+__all__ = ["dicom_among", "index_in", "is_dicom", "is_index", "read_dicom", "read_index"]

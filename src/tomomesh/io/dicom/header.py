@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,8 @@ import numpy as np
 
 from ...errors import FormatError
 from ..gray import check_scale
-from ..source import first_bytes, third_party
+from ..limits import require_rows
+from ..source import third_party
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,25 +23,11 @@ GROUPS = {
     "PixelSpacing": "PixelMeasuresSequence",
     "RescaleSlope": "PixelValueTransformationSequence",
     "RescaleIntercept": "PixelValueTransformationSequence",
+    "StackID": "FrameContentSequence",
 }
 """The functional group of an enhanced file that holds each field of a plain one."""
 
-FIELDS = (
-    "ImageOrientationPatient", "ImagePositionPatient", "ImageType", "InstanceNumber", "Modality",
-    "NumberOfFrames", "PhotometricInterpretation", "PixelSpacing", "RescaleIntercept", "RescaleSlope",
-    "SeriesDescription", "SeriesInstanceUID", "SeriesNumber",
-)  # fmt: skip
-"""Fields that are read later on."""
-
-TELLING = (
-    "EchoTime", "EchoNumbers", "TemporalPositionIdentifier", "AcquisitionNumber", "TriggerTime",
-    "DiffusionBValue", "InversionTime", "FlipAngle", "KVP", "ConvolutionKernel", "ImageType",
-    "InstanceNumber",
-)  # fmt: skip
-"""Fields that tell apart images at one position, the most telling first; none of them is personal."""
-
-NOT_DICOM = "not DICOM"
-WITHOUT_PIXELS = "DICOM without pixels"
+PER_FRAME, SHARED = "PerFrameFunctionalGroupsSequence", "SharedFunctionalGroupsSequence"
 
 
 @dataclass(frozen=True)
@@ -66,6 +52,8 @@ class Frame:
         Distance of the columns and of the rows, mm.
     scale : (slope, intercept)
         Of the gray levels.
+    stack : str
+        Which of the stacks of an enhanced file it belongs to.
     """
 
     path: Path
@@ -76,6 +64,7 @@ class Frame:
     axes: NDArray[np.float64] | None
     spacing: NDArray[np.float64] | None
     scale: tuple[float, float]
+    stack: str = ""
 
     @property
     def instance(self) -> int | None:
@@ -84,60 +73,6 @@ class Frame:
         if value is None:
             return self.number if "NumberOfFrames" in self.header else None
         return int(value[0]) + self.number
-
-
-def is_dicom(path: Path) -> bool:
-    """Tell from a file's first bytes whether it is DICOM, with or without its preamble."""
-    start = first_bytes(path, 132)
-    return start[128:] == b"DICM" or (
-        start[:2] in (b"\x02\x00", b"\x08\x00") and start[3:4] == b"\0" and len(start) == 132
-    )
-
-
-def read_headers(paths: list[Path]) -> tuple[list[tuple[Path, Any]], Counter[str]]:
-    """Read the headers of the images among some files.
-
-    Returns
-    -------
-    headers : list of (path, pydicom Dataset)
-        Those that describe an image.
-    others : Counter
-        How many files are none, by reason.
-
-    Raises
-    ------
-    FormatError
-        For a DICOM file that is broken.
-    """
-    headers: list[tuple[Path, Any]] = []
-    others: Counter[str] = Counter()
-    for path in paths:
-        header = _read_header(path) if is_dicom(path) else None
-        if header is not None and "Rows" in header and "Columns" in header:
-            headers.append((path, header))
-        else:
-            others[NOT_DICOM if header is None else WITHOUT_PIXELS] += 1
-    return headers, others
-
-
-def _read_header(path: Path) -> Any:
-    import pydicom
-
-    with third_party("pydicom", path.name):
-        header = pydicom.dcmread(path, force=True, stop_before_pixels=True)
-        for keyword in FIELDS + TELLING:  # values are converted when they are first asked for, and may fail then
-            header.get(keyword)
-        kind = header.get("SOPClassUID") or header.file_meta.get("MediaStorageSOPClassUID")
-    promises_image = kind is not None and "Image Storage" in str(getattr(kind, "name", ""))
-    if promises_image and not ("Rows" in header and "Columns" in header):
-        raise FormatError(
-            "the DICOM file is cut off",
-            file=path.name,
-            found="Rows, Columns = missing",
-            expected="a whole header",
-            hint="the folder without this file, or a fresh copy",
-        )
-    return header
 
 
 def frames_of(path: Path, header: Any) -> list[Frame]:
@@ -150,21 +85,23 @@ def frames_of(path: Path, header: Any) -> list[Frame]:
     """
     with third_party("pydicom", path.name):
         count = _count(header, "NumberOfFrames", path.name, missing=1)
-        per_frame = header.get("PerFrameFunctionalGroupsSequence") or []
+        require_rows(count, path.stat().st_size, "frames of a byte", file=path.name)
+        per_frame, shared = header.get(PER_FRAME) or [], header.get(SHARED) or []
         if len(per_frame) not in (0, count):
             raise FormatError(
                 "the frames do not match their descriptions",
                 file=path.name,
                 found=f"NumberOfFrames = {count}, descriptions = {len(per_frame)}",
             )
-        return [_frame(path, header, number) for number in range(count)]
+        groups = [[*per_frame[number : number + 1], *shared[:1]] for number in range(count)]
+        return [_frame(path, header, number, groups[number]) for number in range(count)]
 
 
-def _frame(path: Path, header: Any, number: int) -> Frame:
+def _frame(path: Path, header: Any, number: int, groups: list[Any]) -> Frame:
     name = path.name
 
     def field(keyword: str, count: int) -> NDArray[np.float64] | None:
-        return numbers(_find(header, keyword, number), count, keyword, name)
+        return numbers(_find(header, groups, keyword), count, keyword, name)
 
     axes, spacing = field("ImageOrientationPatient", 6), field("PixelSpacing", 2)
     slope, intercept = field("RescaleSlope", 1), field("RescaleIntercept", 1)
@@ -179,16 +116,14 @@ def _frame(path: Path, header: Any, number: int) -> Frame:
         None if axes is None else axes.reshape(2, 3),
         None if spacing is None else spacing[::-1],  # stored: rows first
         scale,
+        str(_find(header, groups, "StackID") or ""),
     )
 
 
-def _find(header: Any, keyword: str, number: int) -> Any:
-    for groups, place in (
-        ("PerFrameFunctionalGroupsSequence", number),
-        ("SharedFunctionalGroupsSequence", 0),
-    ):
-        sequence = header.get(groups)
-        items = sequence[place].get(GROUPS[keyword]) if sequence else None
+def _find(header: Any, groups: list[Any], keyword: str) -> Any:
+    """Return a field of a frame: from its own functional groups, those of all frames, or the header."""
+    for group in groups:
+        items = group.get(GROUPS[keyword])
         if items and keyword in items[0]:
             return items[0].get(keyword)
     return header.get(keyword)
@@ -197,7 +132,7 @@ def _find(header: Any, keyword: str, number: int) -> Any:
 def _stacked_without_place(header: Any) -> bool:
     """Tell whether a file holds several frames but one position at most: it is the first frame's only."""
     frames = header.get("NumberOfFrames")
-    return frames is not None and int(frames) > 1 and "PerFrameFunctionalGroupsSequence" not in header
+    return frames is not None and int(frames) > 1 and PER_FRAME not in header
 
 
 def _count(header: Any, keyword: str, name: str, missing: int = 0) -> int:

@@ -82,11 +82,12 @@ def _is_localizer(frame: Frame) -> bool:
 
 
 def _grouped(frames: list[Frame]) -> list[list[Frame]]:
-    """Sort frames into series, by series number and then by identifier."""
-    groups: dict[tuple[float, str], list[Frame]] = {}
+    """Sort frames into series: by series number, identifier, and stack within an enhanced file."""
+    groups: dict[tuple[float, str, str], list[Frame]] = {}
     for frame in frames:
         number = numbers(frame.header.get("SeriesNumber"), 1, "SeriesNumber", frame.path.name)
-        key = (LAST if number is None else float(number[0]), str(frame.header.get("SeriesInstanceUID", "")))
+        place = LAST if number is None else float(number[0])
+        key = (place, str(frame.header.get("SeriesInstanceUID", "")), frame.stack)
         groups.setdefault(key, []).append(frame)
     return [groups[key] for key in sorted(groups)]
 
@@ -100,6 +101,7 @@ def _row(members: list[Frame]) -> str:
     first = members[0]
     description = str(first.header.get("SeriesDescription") or "no description")
     spacing = "unknown" if first.spacing is None else " x ".join(f"{mm:.4g}" for mm in first.spacing)
+    description += f", stack {first.stack}" if first.stack else ""
     return f"{description}, slices {len(members)}, {spacing}{_distance(members)} mm"
 
 

@@ -68,7 +68,8 @@ def stacked(frames: list[Frame], settings: ReadSettings, *, study: str) -> Stack
     frames : list of Frame
         Of one series.
     settings : ReadSettings
-        `spacing_z` stands in for positions, `spacing` for all distances, `fill_gaps` allows gaps.
+        `spacing_z` stands in for positions, `spacing` for all distances; `fill_gaps` and
+        `resample_slices` allow gaps and other distances.
     study : str
         The path as the user typed it.
 
@@ -80,18 +81,22 @@ def stacked(frames: list[Frame], settings: ReadSettings, *, study: str) -> Stack
     check_alike(frames)
     pixel, axes = _pixel(frames[0], settings), _axes(frames[0])
     normal = np.cross(axes[0], axes[1])
-    distance = settings.spacing_z or (settings.spacing[2] if settings.spacing else None)
     lost = [frame for frame in frames if frame.position is None]
     if lost:
         places = _numbered(frames)
-        course = _along(normal, np.zeros(3), distance, len(places), lost[0])
+        course = _along(normal, np.zeros(3), _given(settings), len(places), lost[0])
     else:
         places = _placed(frames, normal, SAME_PLACE * min(pixel))
-        course = _course(places, normal, distance, settings.fill_gaps, ON_LINE * min(pixel), study)
+        course = _course(places, normal, settings, min(pixel), study)
     affine = np.eye(4)
     affine[:3] = np.column_stack([axes[0] * pixel[0], axes[1] * pixel[1], course.step, course.origin])
     check_affine(affine, file=study, hint="a series with a valid geometry")
     return Stack(places, course.levels, affine, course.notes)
+
+
+def _given(settings: ReadSettings) -> float | None:
+    """Return the distance of the slices that the user gave."""
+    return settings.spacing_z or (settings.spacing[2] if settings.spacing else None)
 
 
 def _pixel(frame: Frame, settings: ReadSettings) -> tuple[float, float]:
@@ -181,26 +186,25 @@ def _placed(frames: list[Frame], normal: NDArray[np.float64], nearest: float) ->
 def _course(
     places: list[list[Frame]],
     normal: NDArray[np.float64],
-    distance: float | None,
-    fill: bool,
-    off_line: float,
+    settings: ReadSettings,
+    pixel: float,
     study: str,
 ) -> Course:
     """Follow the positions of the slices: the step keeps the shear of a tilted gantry."""
-    origins = np.array([place[0].position for place in places])
+    origins, distance = np.array([place[0].position for place in places]), _given(settings)
     if len(places) == 1:
         return _along(normal, origins[0], distance, 1, places[0][0])
     heights = origins @ normal
-    levels, notes = regular(heights, fill=fill, study=study)
+    levels, notes = regular(heights, settings, pixel=pixel, study=study)
     way = origins[-1] - origins[0]
     share = (heights - heights[0]) / (heights[-1] - heights[0])
     off = np.abs(origins - origins[0] - share[:, None] * way).max(axis=1)
-    if off.max() > off_line:
+    if off.max() > ON_LINE * pixel:
         raise GeometryError(
             "the slices do not lie on a straight line",
             file=places[int(off.argmax())][0].path.name,
             found=f"off the line = {off.max():.3g} mm",
-            expected=f"at most {off_line:.3g} mm",
+            expected=f"at most {ON_LINE * pixel:.3g} mm",
         )
     tilt = float(np.degrees(np.arccos(min(1.0, way @ normal / np.linalg.norm(way)))))
     notes += (f"gantry tilt of {tilt:.1f} degrees: the axes are sheared",) if tilt > TILTED else ()

@@ -1,0 +1,35 @@
+"""A folder for what nobody else may see, gone when the work ends, however it ends."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+GUARD = "import shutil, sys; sys.stdin.read(); shutil.rmtree(sys.argv[1], ignore_errors=True)"
+"""What the guard runs: its input ends when this process does, be it by kill -9."""
+
+
+@contextmanager
+def private_folder() -> Iterator[Path]:
+    """Make a temporary folder that only this user may enter, and remove it afterwards.
+
+    A second, small process removes it where this one is killed and cannot.
+    """
+    with tempfile.TemporaryDirectory(prefix="tomomesh-", ignore_cleanup_errors=True) as folder:
+        command = [sys.executable, "-I", "-S", "-c", GUARD, folder]
+        # a session of its own: a signal to the whole group of processes does not end it
+        with subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        ):
+            yield Path(folder)
