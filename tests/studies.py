@@ -198,3 +198,23 @@ def _group(sequence: str, **fields: Any) -> Dataset:
         setattr(item, keyword, value)
     setattr(groups, sequence, Sequence([item]))
     return groups
+
+
+def setting(**fields: Any) -> Callable[[Dataset, int], None]:
+    """Return an edit that sets fields of every slice; a list holds one value a slice."""
+
+    def edit(data: Dataset, k: int) -> None:
+        for keyword, value in fields.items():
+            setattr(data, keyword, value[k] if isinstance(value, tuple) else value)
+
+    return edit
+
+
+def without(*keywords: str) -> Callable[[Dataset, int], None]:
+    """Return an edit that takes fields out of every slice."""
+
+    def edit(data: Dataset, k: int) -> None:
+        for keyword in keywords:
+            delattr(data, keyword)
+
+    return edit

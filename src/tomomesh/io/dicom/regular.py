@@ -49,9 +49,9 @@ def regular(
         Where slices are missing or unevenly spaced, and the setting for that is not on.
     """
     gaps = np.diff(heights)
-    steps = np.round(gaps / gaps.min())
-    off = np.abs(gaps / (gaps.sum() / steps.sum()) - steps)
-    if (off > np.minimum(EVEN * steps, WHOLE)).any():
+    steps = np.round(gaps / np.sort(gaps)[(len(gaps) - 1) // 2])
+    off = np.abs(gaps * (steps.sum() / gaps.sum()) - steps)
+    if steps.min() < 1 or (off > np.minimum(EVEN * steps, WHOLE)).any():
         if not settings.resample_slices:
             raise _uneven(heights, gaps, study)
         return _resampled(heights, gaps, pixel)
