@@ -81,3 +81,10 @@ class TestSeries:
             path.unlink()
         with pytest.raises(FormatError, match="0 of 2 files are images"):
             read_volume(folder)
+
+    def test_series_in_sub_folders_are_listed_beside_those_in_the_folder(self, tmp_path: Path) -> None:
+        write_series(tmp_path / "s", STORED, AXIAL)
+        write_series(tmp_path / "s" / "more", STORED + 1, AXIAL, setting(SeriesInstanceUID="1.9", SeriesNumber=9))
+        with pytest.raises(GeometryError, match="2 series"):
+            read_volume(tmp_path / "s")
+        assert_in_place(read_volume(tmp_path / "s", settings=ReadSettings(series=1)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,10 +58,10 @@ class TestFlags:
             data = slice_dataset(np.full((3, 4), n, np.int16), affine, 0)
             data.ImagePositionPatient = [0, 0, round(place * 0.37, 6)]
             save(data, tmp_path / f"{n}.dcm")
-        for settings in (ReadSettings(), ReadSettings(**{other: True})):
+        for settings in (ReadSettings(), replace(ReadSettings(), **{other: True})):
             with pytest.raises(GeometryError, match=f"--{flag.replace('_', '-')}"):
                 read_volume(tmp_path, settings=settings)
-        assert read_volume(tmp_path, settings=ReadSettings(**{flag: True})).notes
+        assert read_volume(tmp_path, settings=replace(ReadSettings(), **{flag: True})).notes
 
     def test_filled_gaps_keep_every_slice(self) -> None:
         levels, notes = regular(np.array([1.0, 3, 5, 11, 13]), ReadSettings(fill_gaps=True), pixel=1, study="s")
@@ -184,4 +185,4 @@ class TestHead:
 
 def near(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the pixels of a mask and their neighbors."""
-    return np.asarray(binary_dilation(mask, np.ones((3, 3))))
+    return np.asarray(binary_dilation(mask, np.ones((3, 3), bool)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import stat
 import struct
@@ -186,7 +187,7 @@ class TestHostile:
             read_volume(zipped(tmp_path / "s.zip", series(tmp_path)))
 
     def test_more_than_the_disk_is_refused(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(archive.shutil, "disk_usage", lambda folder: SimpleNamespace(free=10))
+        monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=10))
         with pytest.raises(ResourceError, match="free space"):
             read_volume(zipped(tmp_path / "s.zip", series(tmp_path)))
 

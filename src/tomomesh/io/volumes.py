@@ -112,11 +112,13 @@ def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Vo
 
 
 def _read_folder(folder: Path, settings: ReadSettings) -> Volume:
-    """Read what its DICOMDIR names, or the images of a folder; where it holds none, those of its sub-folders."""
+    """Read what its DICOMDIR names, all DICOM below it, or its images; where it holds none, those of sub-folders."""
     if (index := index_in(folder)) is not None:
         return read_index(index, settings, study=str(folder))
     for deep in (False, True):
         files, others = regular_files(folder, deep=deep)
+        if not deep and dicom_among(files):
+            continue  # further series may be in sub-folders
         volume = _read_images(files, others, folder, settings)
         if volume is not None:
             return volume

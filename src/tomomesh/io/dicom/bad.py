@@ -43,7 +43,7 @@ def leave_out(bad: Mapping[Path, TomomeshError], good: int, *, skip: bool, study
     if not good:
         raise first
     if len(bad) == 1:  # its own error says more than a list
-        first.args = (f"{first} Or: --skip-bad to go on without it.",)
+        first.args = (f"{first} {'Or' if 'Try: ' in str(first) else 'Try'}: --skip-bad to go on without it.",)
         raise first
     raise FormatError(
         f"{len(bad)} of {len(bad) + good} files cannot be read",
