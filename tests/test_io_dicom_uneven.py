@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,47 +38,50 @@ def write_uneven(folder: Path, fine: NDArray[np.int16], affine: NDArray[np.float
     return folder
 
 
+FILL, RESAMPLE = ReadSettings(fill_gaps=True), ReadSettings(resample_slices=True)
+
+
 class TestFlags:
     """Each flag is for its own fault, and the error names it."""
 
-    MISSING = (0, 4, 8, 16)
-    UNEVEN = (0, 4, 5, 12, 19)
-
     @pytest.mark.parametrize(
-        ("slices", "flag", "other"),
-        [(MISSING, "fill_gaps", "resample_slices"), ((*UNEVEN[:3], 7, 12), "resample_slices", "fill_gaps")],
+        ("steps", "flag", "helps", "other"),
+        [
+            ((0, 4, 8, 16), "--fill-gaps", FILL, RESAMPLE),
+            ((0, 4, 5, 7, 12.3), "--resample-slices", RESAMPLE, FILL),
+            ((0, 4, 8, 12.2), "--resample-slices", RESAMPLE, FILL),
+        ],
     )
     def test_the_error_names_the_flag_that_helps(
-        self, tmp_path: Path, slices: tuple[int, ...], flag: str, other: str
+        self, tmp_path: Path, steps: tuple[float, ...], flag: str, helps: ReadSettings, other: ReadSettings
     ) -> None:
         affine = affine_of(np.eye(3), (0.5, 0.7, 0.37))
-        places = [k + (0.3 if flag == "resample_slices" and k == 12 else 0) for k in slices]
-        for n, place in enumerate(places):
+        for n, step in enumerate(steps):
             data = slice_dataset(np.full((3, 4), n, np.int16), affine, 0)
-            data.ImagePositionPatient = [0, 0, round(place * 0.37, 6)]
+            data.ImagePositionPatient = [0, 0, round(step * 0.37, 6)]
             save(data, tmp_path / f"{n}.dcm")
-        for settings in (ReadSettings(), replace(ReadSettings(), **{other: True})):
-            with pytest.raises(GeometryError, match=f"--{flag.replace('_', '-')}"):
+        for settings in (ReadSettings(), other):
+            with pytest.raises(GeometryError, match=flag):
                 read_volume(tmp_path, settings=settings)
-        assert read_volume(tmp_path, settings=replace(ReadSettings(), **{flag: True})).notes
+        assert "linearly" in read_volume(tmp_path, settings=helps).notes[0]
 
     def test_filled_gaps_keep_every_slice(self) -> None:
-        levels, notes = regular(np.array([1.0, 3, 5, 11, 13]), ReadSettings(fill_gaps=True), pixel=1, study="s")
+        levels, notes = regular(np.array([1.0, 3, 5, 11, 13]), FILL, pixel=1, study="s")
         assert levels.tolist() == [0, 1, 2, 5, 6]
         assert notes == ("slices interpolated linearly: 2 of 7",)
 
     def test_a_slice_between_others_is_kept(self) -> None:
-        levels, _ = regular(np.array([0.0, 4, 8, 10, 14]), ReadSettings(resample_slices=True), pixel=1, study="s")
+        levels, _ = regular(np.array([0.0, 4, 8, 10, 14]), RESAMPLE, pixel=1, study="s")
         assert levels.tolist() == [0, 2, 4, 5, 7]
 
     def test_two_slices_that_nearly_touch_do_not_ask_for_thousands(self) -> None:
         heights = np.array([0.0, 5, 5.02, 10, 15])
-        levels, _ = regular(heights, ReadSettings(resample_slices=True), pixel=0.5, study="s")
+        levels, _ = regular(heights, RESAMPLE, pixel=0.5, study="s")
         assert levels[-1] == 30
 
     def test_slices_nearer_than_a_pixel_are_not_thinned_out(self) -> None:
         heights = np.array([0.0, 0.5, 0.97, 1.5, 2.0])
-        levels, _ = regular(heights, ReadSettings(resample_slices=True), pixel=3, study="s")
+        levels, _ = regular(heights, RESAMPLE, pixel=3, study="s")
         assert levels[-1] == 4
 
     @given(st.lists(st.floats(0.6, 9), min_size=2, max_size=20))
@@ -100,7 +102,7 @@ class TestSynthetic:
     def test_gray_levels_lie_on_the_line_between_slices(self, tmp_path: Path) -> None:
         affine = affine_of(np.eye(3), (0.5, 0.7, 0.4))
         folder = write_uneven(tmp_path, sampled(affine, (31, 7, 9)), affine, [0, 10, 13, 30])
-        volume = read_volume(folder, settings=ReadSettings(resample_slices=True))
+        volume = read_volume(folder, settings=RESAMPLE)
         assert_in_place(volume, 1.01)
         assert volume.spacing_mm[2] == pytest.approx(1.2)
         assert volume.notes == ("slices resampled linearly: 11, 1.2 mm apart, from 4 that were 1.2 to 6.8 mm apart",)
@@ -110,7 +112,7 @@ class TestSynthetic:
         places = indices_of(shape) @ TILTED[:3, :3].T + TILTED[:3, 3]
         rod = (1000 * (np.hypot(places[:, 0], places[:, 1]) < 5)).reshape(shape).astype(np.int16)
         folder = write_uneven(tmp_path, rod, TILTED, [0, 7, 9, 20, 39])
-        volume = read_volume(folder, settings=ReadSettings(resample_slices=True))
+        volume = read_volume(folder, settings=RESAMPLE)
         assert np.abs(middles(volume)[:, :2]).max() < 0.25
         assert any("18.5 degrees" in note for note in volume.notes)
 
@@ -124,7 +126,7 @@ def middles(volume: Volume) -> NDArray[np.float64]:
 
 @pytest.fixture(scope="module")
 def volume() -> Volume:
-    return read_volume(shared(HEAD), settings=ReadSettings(resample_slices=True))
+    return read_volume(shared(HEAD), settings=RESAMPLE)
 
 
 @pytest.fixture(scope="module")
