@@ -111,7 +111,7 @@ def test_links_that_leave_the_disc_are_not_followed(tmp_path: Path) -> None:
     first = images(disc)[0]
     first.rename(tmp_path / "elsewhere")
     first.symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(FormatError, match="outside of its folder"):
+    with pytest.raises(FormatError, match="1 of 5 files that DICOMDIR names are missing"):
         read_volume(disc)
 
 
@@ -120,4 +120,13 @@ def test_an_index_that_is_cut_off_is_refused(tmp_path: Path, left: int) -> None:
     disc = write_disc(tmp_path / "disc")
     (disc / "DICOMDIR").write_bytes((disc / "DICOMDIR").read_bytes()[:left])
     with pytest.raises(FormatError, match="DICOMDIR"):
+        read_volume(disc)
+
+
+def test_a_name_that_no_file_can_have_is_missing(tmp_path: Path) -> None:
+    disc = write_disc(tmp_path / "disc")
+    raw = (disc / "DICOMDIR").read_bytes()
+    name = images(disc)[0].name.encode()
+    (disc / "DICOMDIR").write_bytes(raw.replace(name, b"\0" * len(name)))
+    with pytest.raises(FormatError, match="DICOMDIR names are missing"):
         read_volume(disc)

@@ -7,13 +7,13 @@ import shutil
 import stat
 import zipfile
 from contextlib import contextmanager
-from pathlib import PurePosixPath, PureWindowsPath
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from ..errors import FormatError, ResourceError, TomomeshError
 from .limits import require_memory
 from .private import private_folder
-from .source import third_party
+from .source import leaves_folder, third_party
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -91,8 +91,7 @@ def _check_table(path: Path) -> None:
 def _check_member(member: zipfile.ZipInfo, path: Path) -> None:
     """Refuse what could be written outside of the folder, is no regular file, or cannot be read."""
     name, kind = member.filename, stat.S_IFMT(member.external_attr >> 16)
-    windows = PureWindowsPath(name)
-    if windows.is_absolute() or windows.drive or windows.root or ".." in windows.parts:
+    if leaves_folder(name):
         raise _refused("a member of the archive would leave its folder", "names without .. and without a root", path)
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
         raise _refused("a member of the archive is a link or a device", "files and folders", path)

@@ -6,7 +6,7 @@ import os
 import warnings
 from collections import Counter
 from contextlib import contextmanager
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, TypeVar
 
 from ..errors import FormatError, ResourceError, TomomeshError, UnreadableError
@@ -142,6 +142,12 @@ def regular_files(folder: Path, *, deep: bool = False) -> tuple[list[Path], Coun
             others.update([reason] if reason else [])
             files += [] if reason else [path]
     return files, others
+
+
+def leaves_folder(name: str) -> bool:
+    """Tell whether a name that a file gives, of whatever system, could lead out of that file's folder."""
+    path = PureWindowsPath(name)  # it knows both kinds of separators
+    return bool(path.anchor) or ".." in path.parts
 
 
 def _passed_over(path: Path, folder: Path) -> str:

@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from ...errors import FormatError
-from ..source import regular_files, third_party
+from ..source import leaves_folder, regular_files, third_party
 from .bad import listed
 from .read import read_dicom
 
@@ -51,9 +51,8 @@ def read_index(index: Path, settings: ReadSettings, *, study: str) -> Volume:
         As `read_dicom`.
     """
     named = _named(index)
-    folder = index.parent.resolve()
-    files = {name.lower(): path for path, name in _beside(index)}
-    outside = [name for name in named if not (folder / name).resolve().is_relative_to(folder)]
+    files = _beside(index)
+    outside = [name for name in named if leaves_folder(name)]
     if outside:
         raise FormatError(
             "DICOMDIR names files outside of its folder",
@@ -74,9 +73,10 @@ def read_index(index: Path, settings: ReadSettings, *, study: str) -> Volume:
     return read_dicom(found, settings, study=study, others=Counter({GONE: len(gone)} if gone else {}))
 
 
-def _beside(index: Path) -> list[tuple[Path, str]]:
-    """List the files of the index's folder with their names in it; discs are mounted in capitals or not."""
-    return [(path, path.relative_to(index.parent).as_posix()) for path in regular_files(index.parent, deep=True)[0]]
+def _beside(index: Path) -> dict[str, Path]:
+    """Return the files of the index's folder by their names in it, small: discs are mounted in capitals or not."""
+    files, _ = regular_files(index.parent, deep=True)
+    return {path.relative_to(index.parent).as_posix().lower(): path for path in files}
 
 
 def _named(index: Path) -> list[str]:
