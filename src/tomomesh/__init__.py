@@ -17,6 +17,7 @@ _HOMES = {
     "TriMesh": "model.mesh",
     "Volume": "model.volume",
     "assess": "measure.report",
+    "fill_mesh": "measure.fill",
     "phantom": "phantom",
     "read_mesh": "io",
     "read_points": "io",
@@ -37,6 +38,7 @@ __all__ = [
     "Volume",
     "__version__",
     "assess",
+    "fill_mesh",
     "phantom",
     "read_mesh",
     "read_points",
@@ -51,6 +53,7 @@ __all__ = [
 if TYPE_CHECKING:
     from .errors import TomomeshError
     from .io import read_mesh, read_points, read_volume, write_mesh
+    from .measure.fill import fill_mesh
     from .measure.report import assess
     from .model.mesh import TriMesh
     from .model.points import PointSet

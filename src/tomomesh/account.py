@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .model.points import PointSet
     from .model.trace import Trace
     from .model.volume import Volume
+    from .segment.chosen import Chosen
     from .segment.sample import Sampling
     from .segment.window import Limit
     from .settings import Settings
@@ -105,21 +106,37 @@ class Account:
             "notes": list(volume.notes),
         }
 
-    def window(self, mask: NDArray[np.bool_], lower: Limit, upper: Limit, layers: int = 1) -> None:
-        """Note what the window kept, and the limits of its layers."""
-        asked = self._settings.window
+    def part(self, box: tuple[slice, ...], sizes: tuple[int, int, int]) -> None:
+        """Note which slices, rows and columns of the whole study are left, where it was cropped."""
+        kept = [[int(side.start), int(side.stop) - 1] for side in box]
+        cropped = kept != [[0, size - 1] for size in sizes]
+        names = ("slices", "rows", "columns")
+        self._sections["study"]["part"] = dict(zip(names, kept, strict=True)) if cropped else None
+
+    def window(self, chosen: Chosen) -> None:
+        """Note what the window kept, the limits of its layers, and the components that were left out."""
+        asked, mask, layers = self._settings.window, chosen.mask, chosen.volume.layers
+        limits = (chosen.lower, chosen.upper) if asked.select is None else (-np.inf, np.inf)
         given = asked.lower is not None or asked.upper is not None
         edges = [np.take(mask, end, axis=axis).any() for axis in range(3) for end in (0, -1)]
         self._sections["window"] = {
-            "lower": _limits(lower),
-            "upper": _limits(upper),
+            "lower": _limits(limits[0]),
+            "upper": _limits(limits[1]),
             "layers": layers,
             "joined_by": asked.layers if layers > 1 else None,
             "chosen_by": "labels" if asked.select else "preset" if asked.preset else "given" if given else "otsu",
             "voxels": int(mask.sum()),
             "share": float(mask.mean()),
             "touches_border": bool(any(edges)),
+            "components": chosen.found or None,
+            "dropped_components": chosen.dropped,
+            "dropped_voxels": chosen.dropped_voxels,
         }
+        if chosen.dropped and asked.keep == "auto":
+            self._sections["study"]["notes"].append(
+                f"{chosen.dropped} of {chosen.found} components of the window ({chosen.dropped_voxels} voxels) lie where "
+                "the body is nowhere 12 mm thick, as a scanner's table, and were left out: --keep all keeps them"
+            )
         if any(edges[2:]):
             self.warn("the window touches the border of the slices: the surface is closed along it")
 

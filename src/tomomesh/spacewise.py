@@ -17,7 +17,6 @@ from .model.points import PointSet
 from .results import NO_CUBES, NO_NETWORKS, NO_TRACE, NOTHING, Segmentation, SpaceFound, Surface
 from .segment.sample import Sampling
 from .segment.space import is_wall, pieces_of, regions_in_space, train_space
-from .segment.window import choose_window, window
 from .settings import SURFACES
 from .surface.drape import Ring, drape
 from .surface.dynamics import fit
@@ -34,8 +33,8 @@ if TYPE_CHECKING:
     from .account import Account
     from .model.networks import SpaceNetwork
     from .model.trace import Trace
-    from .model.volume import Volume
     from .progress import Progress
+    from .segment.chosen import Chosen
     from .settings import Settings
 
     Floats = NDArray[np.float64]
@@ -60,24 +59,19 @@ def require_surface(settings: Settings) -> None:
         )  # fmt: skip
 
 
-def segment_in_space(
-    stack: Volume, kept: NDArray[np.bool_] | None, settings: Settings, account: Account, progress: Progress
-) -> Segmentation:
-    """Train one network on a whole window, or on the voxels `kept` (K, J, I) of labels."""
-    if kept is not None:
-        stack, settings = replace(stack, voxels=kept.view(np.uint8)), settings.replace(select=None, lower=0.5)
-    layers, threads = settings.window.layers, settings.run.threads
+def segment_in_space(chosen: Chosen, settings: Settings, account: Account, progress: Progress) -> Segmentation:
+    """Train one network on the whole window."""
+    stack, threads = chosen.volume, settings.run.threads
     with account.timed("window"):
-        lower, upper = choose_window(stack, settings.window)
-        whole = window(stack, lower=lower, upper=upper, layers=layers)
-        mask, pieces = pieces_of(whole)
-    if kept is None:
-        account.window(whole, lower, upper, stack.layers)
+        mask, pieces = pieces_of(chosen.mask)
     with account.timed("points"):
         voxels = stack.to_mm(np.argwhere(mask)[:, ::-1].astype(np.float64))
         outlined, places = _outlined(mask, settings), voxels
         if outlined:
-            found = boundary(stack, mask, lower=lower, upper=upper, layers=layers, surface="outer", threads=threads)
+            found = boundary(
+                stack, mask, lower=chosen.lower, upper=chosen.upper, layers=settings.window.layers, surface="outer",
+                threads=threads,
+            )  # fmt: skip
             places = found.points.positions
     with account.timed("networks"):
         progress("networks", 0, 1)
@@ -87,7 +81,7 @@ def segment_in_space(
         labels = regions_in_space(mask, voxels, network, threads)
     if not outlined and settings.network.network in SURFACES and not is_wall(mask):
         account.warn("the window is a solid, and the surface lies inside of it: --signal boundary lays it around")
-    account.space(network, pieces, int(np.count_nonzero(whole) - np.count_nonzero(mask)))
+    account.space(network, pieces, int(np.count_nonzero(chosen.mask) - np.count_nonzero(mask)))
     sampling = _sampled(network)
     account.points(sampling.points, sampling.spacing_mm)
     space = SpaceFound(network, places)

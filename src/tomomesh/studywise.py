@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .contourwise import find_contours
 from .errors import UsageError
-from .model.volume import AXES, Volume
+from .model.volume import AXES, Volume, order_along
 from .results import NO_NETWORKS, Segmentation
+from .segment.chosen import Chosen, choose
 from .segment.contours.looks import share_of_holes, slices_with_several
+from .segment.crop import crop, inside_roi
 from .segment.sample import sample
-from .segment.select import require_same_grid, select
+from .segment.select import doubted, require_same_grid
 from .segment.study import regions, train_study
-from .segment.window import by_layer, choose_window, window
+from .segment.window import by_layer
 from .spacewise import segment_in_space
 from .voxelwise import find_boundary, sampled
 
@@ -39,21 +40,24 @@ def segment_study(
             expected="read_volume(path) or Volume.from_stored(array, affine)",
         )
     axis = _slice_axis(volume, settings.network.slices)
-    stack = volume.along(axis)
+    part, box = crop(volume, settings.part, axis)
+    stack = part.along(axis)
     account.study(stack, AXES[axis])
-    chosen = _selected(volume, labels, settings, account)
-    kept = None if chosen is None else np.ascontiguousarray(replace(volume, voxels=chosen).along(axis).voxels)
+    account.part(tuple(box[n] for n in order_along(axis)), volume.along(axis).shape)
+    if labels is not None:
+        labels = _fitting(labels, volume, settings).part(box).along(axis)
+    chosen = _chosen(stack, labels, settings, account)
+    mask = chosen.mask
     if settings.network.network == "none":
-        return _segment_voxels(stack, kept, settings, account)
+        return _segment_voxels(stack, chosen, settings, account)
     if settings.network.in_space:
-        return segment_in_space(stack, kept, settings, account, progress)
-    mask, layers = _window(stack, settings, account) if kept is None else (kept, None)
+        return segment_in_space(chosen, settings, account, progress)
     if settings.network.contours != "one":
         contours, regions_, sampling = find_contours(stack, mask, settings, account, progress)
         return Segmentation(
             stack, mask, NO_NETWORKS, regions_, sampling.points, sampling, account.report, contours=contours
         )  # fmt: skip
-    networks = _networks(stack, mask, layers, settings, account, progress)
+    networks = _networks(stack, mask, _layers(chosen, settings), settings, account, progress)
     with account.timed("regions"):
         found = regions(mask, networks, pixel_mm=stack.spacing_mm[:2], threads=settings.run.threads)
     account.networks(networks, mask)
@@ -66,35 +70,32 @@ def segment_study(
     return Segmentation(stack, mask, networks, found, sampling.points, sampling, account.report)
 
 
-def _selected(volume: Volume, labels: Volume | None, settings: Settings, account: Account) -> NDArray[np.bool_] | None:
-    """Return the voxels of the labels that were asked for; None where a window is."""
-    wanted = settings.window.select
-    if wanted is None:
-        if labels is not None:
-            raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
+def _fitting(labels: Volume, volume: Volume, settings: Settings) -> Volume:
+    """Refuse a label map of which no label is asked for, or on another grid."""
+    if settings.window.select is None:
+        raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
+    require_same_grid(labels, volume)
+    return labels
+
+
+def _chosen(stack: Volume, labels: Volume | None, settings: Settings, account: Account) -> Chosen:
+    with account.timed("window"):
+        chosen = choose(stack, labels, settings, inside_roi(stack, settings.part.roi))
+    account.window(chosen)
+    if settings.window.select is not None and (doubt := doubted(stack if labels is None else labels)):
+        account.warn(doubt)
+    return chosen
+
+
+def _layers(chosen: Chosen, settings: Settings) -> NDArray[np.bool_] | None:
+    """Return the window of each layer (K, J, I, L), where networks are shown layers."""
+    if not _presents_layers(chosen.volume, settings):
         return None
-    if labels is not None:
-        require_same_grid(labels, volume)
-    with account.timed("window"):
-        mask = select(volume if labels is None else labels, wanted)
-    account.window(mask, -np.inf, np.inf)
-    return mask
-
-
-def _window(stack: Volume, settings: Settings, account: Account) -> tuple[NDArray[np.bool_], NDArray[np.bool_] | None]:
-    """Return the window (K, J, I), and that of each layer (K, J, I, L) where networks are shown layers."""
-    with account.timed("window"):
-        lower, upper = choose_window(stack, settings.window)
-        mask = window(stack, lower=lower, upper=upper, layers=settings.window.layers)
-        layers = (
-            by_layer(stack, lower=lower, upper=upper) & mask[..., None] if _presents_layers(stack, settings) else None
-        )
-    account.window(mask, lower, upper, stack.layers)
-    return mask, layers
+    return by_layer(chosen.volume, lower=chosen.lower, upper=chosen.upper) & chosen.mask[..., None]
 
 
 def _presents_layers(stack: Volume, settings: Settings) -> bool:
-    return stack.layers > 1 and settings.network.inputs == "layers" and not settings.network.in_space
+    return stack.layers > 1 and settings.network.inputs == "layers"
 
 
 def _networks(
@@ -117,16 +118,13 @@ def _networks(
         )
 
 
-def _segment_voxels(
-    stack: Volume, kept: NDArray[np.bool_] | None, settings: Settings, account: Account
-) -> Segmentation:
+def _segment_voxels(stack: Volume, chosen: Chosen, settings: Settings, account: Account) -> Segmentation:
     """Take the boundary of the window in place of networks."""
-    if kept is not None:
-        stack, settings = replace(stack, voxels=kept.view(np.uint8)), settings.replace(select=None, lower=0.5)
-    mask, found = find_boundary(stack, settings, account)
+    mask, found = chosen.mask, find_boundary(chosen, settings, account)
     return Segmentation(
-        stack, mask, NO_NETWORKS, mask.astype(np.uint16), found.points, sampled(found), account.report, boundary=found
-    )
+        stack, mask, NO_NETWORKS, mask.astype(np.uint16), found.points, sampled(found), account.report,
+        boundary=found,
+    )  # fmt: skip
 
 
 def _slice_axis(volume: Volume, slices: str) -> int:

@@ -7,34 +7,26 @@ from typing import TYPE_CHECKING
 from .measure.topology import check_promise
 from .results import NOTHING
 from .segment.sample import Sampling
-from .segment.window import choose_window, window
 from .surface.voxels import boundary, voxel_surface
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from .account import Account
-    from .model.volume import Volume
     from .progress import Progress
+    from .segment.chosen import Chosen
     from .settings import Settings
     from .surface.voxels import Boundary, VoxelSurface
 
 
-def find_boundary(volume: Volume, settings: Settings, account: Account) -> tuple[NDArray[np.bool_], Boundary]:
-    """Return the window of a study (K, J, I) and its boundary."""
-    layers = settings.window.layers
-    with account.timed("window"):
-        lower, upper = choose_window(volume, settings.window)
-        mask = window(volume, lower=lower, upper=upper, layers=layers)
-    account.window(mask, lower, upper, volume.layers)
+def find_boundary(chosen: Chosen, settings: Settings, account: Account) -> Boundary:
+    """Return the boundary of the voxels that are kept of a study."""
     surface = "outer" if settings.cubes.surface == "outer" else "all"
     with account.timed("points"):
         found = boundary(
-            volume, mask, lower=lower, upper=upper, layers=layers, surface=surface, threads=settings.run.threads
-        )
-    account.points(found.points, max(volume.spacing_mm), found.added)
-    return mask, found
+            chosen.volume, chosen.mask, lower=chosen.lower, upper=chosen.upper, layers=settings.window.layers,
+            surface=surface, threads=settings.run.threads,
+        )  # fmt: skip
+    account.points(found.points, max(chosen.volume.spacing_mm), found.added)
+    return found
 
 
 def sampled(found: Boundary) -> Sampling:

@@ -15,11 +15,12 @@ from .bars import Bars
 from .outputs import (
     check_files,
     check_folder,
+    check_frame,
     check_outputs,
     draw,
-    frame_of,
     make_folder,
     write_documents,
+    write_points,
     write_stage_one,
     write_surface,
 )
@@ -71,6 +72,7 @@ def _demo(chosen: Namespace) -> None:
 def _reconstruct(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     check_outputs(chosen, io.MESH_WRITERS, *sources_of(chosen, settings))
+    check_frame(chosen.output, settings)
     from ..pipeline import reconstruct
 
     with Bars(quiet=chosen.quiet) as progress:
@@ -88,7 +90,7 @@ def _segment(chosen: Namespace) -> None:
     with Bars(quiet=chosen.quiet) as progress:
         volume, labels = read_study(chosen, settings, progress)
         found = segment(volume, settings, labels=labels, progress=progress)
-        io.write_points(found.points, chosen.output, **frame_of(found.report, settings))
+        found.report["written"] = write_points(found.points, found, chosen.output, found.report, settings)
         write_stage_one(chosen, found)
         write_documents(chosen, found.report, settings)
         draw(chosen.figures, found, None, settings, progress)
@@ -97,6 +99,10 @@ def _segment(chosen: Namespace) -> None:
 
 def _surface(chosen: Namespace) -> None:
     settings = settings_of(chosen)
+    if settings.run.frame != "lps":
+        raise UsageError(
+            "a cloud keeps its own frame", found=f"--frame = {settings.run.frame}", expected="a study, for --frame"
+        )
     check_outputs(chosen, io.MESH_WRITERS, chosen.cloud)
     from ..pipeline import reconstruct_points
 
@@ -154,11 +160,13 @@ def _window_of_picture(path: str, settings: Settings) -> NDArray[np.float64]:
 
 
 def _inspect(chosen: Namespace) -> None:
+    from ..segment.crop import crop
     from ..segment.survey import survey
     from . import findings
 
-    volume = io.read_volume(chosen.study, settings=settings_of(chosen).read)
-    found = survey(volume)
+    settings = settings_of(chosen)
+    volume = io.read_volume(chosen.study, settings=settings.read)
+    found = survey(crop(volume, settings.part, volume.thickest_axis())[0])
     print(json.dumps(found, indent=2) if chosen.json else "\n".join(findings.of_study(found, chosen.study)))
 
 

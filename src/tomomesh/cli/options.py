@@ -19,7 +19,7 @@ STUDY = (
 )
 POINTS = "an unoriented cloud: PLY, XYZ, TXT, CSV, NPY, NPZ, PCD, LAS, LAZ or E57, or the vertices of OBJ, OFF or STL"
 MESH = "STL, PLY, OBJ, OFF, VTP, 3MF, GLB or GIFTI"
-STAGE_ONE = ("read", "window", "network")
+STAGE_ONE = ("read", "part", "window", "network")
 STAGE_TWO = ("cubes", "fit")
 ALIASES = {"cell_mm": "--cell"}
 """Second spellings: the numbers of a cloud need not be millimeters."""
@@ -38,6 +38,8 @@ LISTED = tuple(option_of(entry.name) for _, entry in parameters() if entry.metad
 """Options that take one number, or several with commas between."""
 MESH_ONLY = ("local_origin", "target_faces")
 """Parameters of the run that matter to meshes alone."""
+STUDY_ONLY = ("frame",)
+"""Parameters of the run that matter to studies alone."""
 SURFACE_ONLY = (
     "cell_mm", "cell_factor", "closing", "stacks", "largest", "allow_leaks", "surface", "smoothing", *MESH_ONLY,
 )  # fmt: skip
@@ -68,12 +70,12 @@ def build_parser() -> argparse.ArgumentParser:
 
     demo = _command(commands, "demo", "the built-in head, everything it can show")
     demo.add_argument("-o", "--output", default="tomomesh-demo", metavar="FOLDER", help="default: %(default)s")
-    _add_settings(demo, ("network", *STAGE_TWO, "run"))
+    _add_settings(demo, ("network", *STAGE_TWO, "run"), without=STUDY_ONLY)
 
     main = _command(commands, "reconstruct", "a study of slices in, a closed surface out")
     _add_study(main)
     main.add_argument("-o", "--output", required=True, metavar="MESH", help=MESH)
-    _add_outputs(main, "points", "labels", "figures")
+    _add_outputs(main, "points", "labels", "mask_out", "figures")
     _add_settings(main, (*STAGE_ONE, *STAGE_TWO, "run"))
 
     stage_one = _command(commands, "segment", "stage one alone: the neurons of all slices as points")
@@ -86,7 +88,7 @@ def build_parser() -> argparse.ArgumentParser:
     stage_two.add_argument("cloud", metavar="POINTS", help=POINTS)
     stage_two.add_argument("-o", "--output", required=True, metavar="MESH", help=MESH)
     _add_outputs(stage_two, "figures")
-    _add_settings(stage_two, (*STAGE_TWO, "run"))
+    _add_settings(stage_two, (*STAGE_TWO, "run"), without=STUDY_ONLY)
 
     network = _command(commands, "network", "one network on a test region or a picture, as the paper's Fig. 1 and 2")
     network.add_argument("region", metavar="REGION", help="square, triangle, cube, or one picture (PNG or TIFF)")
@@ -96,13 +98,13 @@ def build_parser() -> argparse.ArgumentParser:
     _add_settings(
         network,
         ("window", "network", "run"),
-        without=("slices", "signal", "contours", "space", "select", "units", *MESH_ONLY),
+        without=("slices", "signal", "contours", "space", "select", "keep", "units", *MESH_ONLY, *STUDY_ONLY),
     )
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
     inspect.add_argument("study", metavar="STUDY", help=STUDY)
     inspect.add_argument("--json", action="store_true", help="print the findings as JSON")
-    _add_settings(inspect, ("read",), paper=False)
+    _add_settings(inspect, ("read", "part"), paper=False)
 
     check = _command(commands, "check", "the quality report of any mesh")
     check.add_argument("mesh", metavar="MESH", help="STL, PLY, OBJ or OFF")
@@ -166,12 +168,13 @@ def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
     kinds = {
         "points": ("FILE", "write the points: PLY, XYZ, CSV or NPY"),
         "labels": ("FILE", "write the regions on the study's own grid: NIfTI"),
+        "mask_out": ("FILE", "write the voxels inside the mesh on the study's own grid: NIfTI"),
         "figures": ("FOLDER", "write the pictures"),
     }
     group = parser.add_argument_group("More results")
     for name in files:
         metavar, text = kinds[name]
-        group.add_argument(f"--{name}", metavar=metavar, help=text)
+        group.add_argument(option_of(name), metavar=metavar, help=text)
     group.add_argument("--report", metavar="FILE.json", help="write the report")
     group.add_argument("--save-settings", metavar="FILE.toml", help="write the settings of this run, to repeat it")
 
@@ -231,6 +234,8 @@ def _metavar(name: str, meta: Any) -> Any:
         return "N[,N...]" if meta["length"] == MANY else "X[,X...]"
     if meta["length"] in ((), (1, 3)):
         return "X [Y Z]" if meta["length"] else {int: "N", float: "X"}[meta["kind"]]
+    if meta["metavar"]:
+        return meta["metavar"]
     return (
         tuple(name[0].upper() + str(n) for n in range(meta["length"][0])) if meta["length"] == (2,) else ("X", "Y", "Z")
     )

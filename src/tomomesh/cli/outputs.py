@@ -7,14 +7,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import io
-from ..errors import OutputError
+from ..errors import OutputError, UsageError
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
     from numpy.typing import NDArray
 
+    from ..model.mesh import TriMesh
+    from ..model.points import PointSet
     from ..results import Segmentation, Surface
     from ..settings import Settings
     from .bars import Bars
@@ -45,7 +49,13 @@ def check_outputs(chosen: Namespace, writers: Any, *sources: str) -> None:
 
 def check_files(chosen: Namespace, *taken: str) -> None:
     """Refuse further outputs that could not be written, or that would overwrite another file of this run."""
-    kinds = {"points": io.POINT_WRITERS, "labels": io.LABEL_WRITERS, "report": (".json",), "save_settings": (".toml",)}
+    kinds = {
+        "points": io.POINT_WRITERS,
+        "labels": io.LABEL_WRITERS,
+        "mask_out": io.LABEL_WRITERS,
+        "report": (".json",),
+        "save_settings": (".toml",),
+    }
     names = list(taken)
     for name, suffixes in kinds.items():
         if getattr(chosen, name, None):
@@ -55,26 +65,72 @@ def check_files(chosen: Namespace, *taken: str) -> None:
         check_folder(chosen.figures)
 
 
+def check_frame(output: str | Path, settings: Settings) -> None:
+    """Refuse voxel indices in a format of lengths, before any work is done."""
+    if settings.run.frame == "voxel" and str(output).lower().endswith((".3mf", ".gii")):
+        raise UsageError(
+            "3MF and GIFTI hold lengths, not voxel indices", found=f"--frame = voxel, --output = {output}",
+            expected="--frame lps or ras, or another format",
+        )  # fmt: skip
+
+
 def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> None:
     """Write the mesh, and whatever else was asked for."""
     stage_one = surface.segmentation
-    frame = frame_of(surface.report, settings)
     at_vertices, on_faces = _fields(surface, chosen.output)
-    io.write_mesh(surface.mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces)
+    mesh, frame = _placed(surface, chosen.output, settings)
+    io.write_mesh(mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces)
+    surface.report["written"] = frame
     if getattr(chosen, "points", None):
-        io.write_points(surface.points, chosen.points, **frame)
+        write_points(surface.points, stage_one, chosen.points, surface.report, settings)
     if stage_one is not None:
         write_stage_one(chosen, stage_one)
+    if getattr(chosen, "mask_out", None):
+        surface.report["mask"] = _write_mask(surface, chosen.mask_out, settings)
     write_documents(chosen, surface.report, settings)
     draw(chosen.figures, stage_one, surface, settings, progress)
 
 
-def frame_of(report: dict[str, Any], settings: Settings) -> dict[str, str]:
-    """Name unit and frame: a study is written in patient millimeters, a cloud in whatever its numbers are in."""
-    if "study" in report:
-        return {"unit": "mm", "frame": "LPS"}
-    corner = ",".join(repr(place).removesuffix(".0") for place in report["points"]["origin"])
+def _placed(surface: Surface, output: str | Path, settings: Settings) -> tuple[TriMesh, dict[str, str]]:
+    """Return the mesh in the frame that was asked for, and its unit and frame; GIFTI has a frame of its own."""
+    stage_one = surface.segmentation
+    if stage_one is None:
+        return surface.mesh, _frame_of_cloud(surface.report, settings)
+    asked = "ras" if str(output).lower().endswith(".gii") else settings.run.frame
+    frame = io.frame_of_study(asked, stage_one.volume.grid)
+    return frame.mesh(surface.mesh), {"unit": frame.unit, "frame": frame.name}
+
+
+def write_points(
+    points: PointSet, stage_one: Segmentation | None, path: str | Path, report: dict[str, Any], settings: Settings
+) -> dict[str, str]:
+    """Write the points in the frame that was asked for, and return its unit and name."""
+    named = _frame_of_cloud(report, settings)
+    if stage_one is not None:
+        frame = io.frame_of_study(settings.run.frame, stage_one.volume.grid)
+        points, named = frame.points(points), {"unit": frame.unit, "frame": frame.name}
+    io.write_points(points, path, **named)
+    return named
+
+
+def _frame_of_cloud(report: dict[str, Any], settings: Settings) -> dict[str, str]:
+    """Name unit and frame of a cloud: whatever its numbers are in."""
+    corner = ",".join(repr(place).removesuffix(".0") for place in report["points"].get("origin", ()))
     return {"unit": settings.run.units, "frame": f"local:{corner}" if settings.run.local_origin else "unknown"}
+
+
+def _write_mask(surface: Surface, path: str | Path, settings: Settings) -> dict[str, Any]:
+    """Write the voxels inside the mesh on the study's own grid; return how well they agree with those of the window."""
+    from ..measure.fill import fill_mesh, overlap
+
+    stage_one = surface.segmentation
+    assert stage_one is not None
+    whole = stage_one.volume.grid.blank()
+    inside = fill_mesh(surface.mesh, whole)
+    io.write_labels(inside.view(np.uint8), whole, path)
+    wanted, filled = stage_one.volume.grid.restore(stage_one.mask), whole.grid.restore(inside)
+    against = "window" if settings.window.select is None else "labels"
+    return overlap(filled, wanted, stage_one.volume.voxel_mm3) | {"against": against}
 
 
 def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:

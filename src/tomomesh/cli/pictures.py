@@ -59,6 +59,8 @@ def pictures(
             "trace": surface.trace,
             "view": _view(stage_one, settings),
         }
+    if surface is not None and stage_one is not None:
+        stages["on_slices"] = surface.mesh.moved(stage_one.volume.to_indices(surface.mesh.vertices))
     return draw_all(**stages)
 
 

@@ -28,6 +28,11 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
         f"distance  points to surface: mean {quality['points_to_surface_mean_mm']:.3g}, "
         f"95 % {quality['points_to_surface_p95_mm']:.3g}, largest {quality['points_to_surface_max_mm']:.3g} {unit}",
     ]
+    if "mask" in report:
+        mask = report["mask"]
+        lines.append(
+            f"mask      {mask['voxels']} voxels inside the mesh, Dice {mask['dice']:.4f} with the {mask['against']}"
+        )
     lines += _ending(report, output)
     if "truth" in report:
         truth = report["truth"]
@@ -110,8 +115,9 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
     lower, upper = limit_in_words(window["lower"]), limit_in_words(window["upper"])
     joined = f", in {window['joined_by']} of {window['layers']} layers" if window["joined_by"] else ""
     chosen = {"otsu": "Otsu's, as no window was given", "preset": "the preset", "given": "as given", "labels": ""}
+    part = " of a part of the study" if study["part"] else ""
     lines = [
-        f"study     {study['slices']} {study['plane']} slices of {study['columns']} x {study['rows']}",
+        f"study     {study['slices']} {study['plane']} slices of {study['columns']} x {study['rows']}{part}",
         f"window    {lower} < k <= {upper} ({chosen[window['chosen_by']]}{joined}), "
         f"{100 * window['share']:.1f} % of the voxels",
     ]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from .atomic import check_output, replacing
 from .documents import read_settings, write_document, write_settings
+from .frames import Frame, frame_of_study
 from .images import read_picture
 from .labels import LABEL_WRITERS, write_labels
 from .meshes import MESH_READERS, MESH_WRITERS, keeps, read_mesh, write_mesh
@@ -20,7 +21,9 @@ __all__ = [
     "POINT_READERS",
     "POINT_WRITERS",
     "VOLUME_READERS",
+    "Frame",
     "check_output",
+    "frame_of_study",
     "keeps",
     "read_mesh",
     "read_picture",

@@ -29,16 +29,31 @@ class Grid:
         Which of the canonical axes K, J, I run against the stored direction.
     affine : (4, 4) float array
         Stored index (last, middle, first array axis) to patient millimeters, LPS.
+    shape : tuple of int
+        Sizes of the stored array, slowest axis first; empty where there is no file.
+    corner : tuple of int
+        The lowest stored index of the part of it that a volume holds, slowest axis first.
     """
 
     axes: tuple[int, int, int]
     flipped: tuple[bool, bool, bool]
     affine: NDArray[np.float64]
+    shape: tuple[int, ...] = ()
+    corner: tuple[int, int, int] = (0, 0, 0)
 
     def restore(self, voxels: NDArray[Any]) -> NDArray[Any]:
-        """Bring a canonical (K, J, I) array back into the stored order."""
+        """Bring a canonical (K, J, I) array back into the stored order, with zeros around a part."""
         keep = tuple(slice(None, None, -1 if flip else 1) for flip in self.flipped)
-        return np.transpose(voxels[keep], np.argsort(self.axes))
+        part = np.transpose(voxels[keep], np.argsort(self.axes))
+        if part.shape == (self.shape or part.shape):
+            return part
+        whole = np.zeros(self.shape, part.dtype)
+        whole[tuple(slice(low, low + size) for low, size in zip(self.corner, part.shape, strict=True))] = part
+        return whole
+
+    def blank(self) -> Volume:
+        """Return the whole stored grid in canonical order; its voxels, all 0, take no memory."""
+        return Volume.from_stored(np.broadcast_to(np.zeros((), np.uint8), self.shape), self.affine)
 
 
 @dataclass(frozen=True)
@@ -98,7 +113,7 @@ class Volume:
             canonical[:3, 3] += canonical[:3, 2 - n] * (voxels.shape[n] - 1)
             canonical[:3, 2 - n] *= -1
         voxels = voxels[tuple(slice(None, None, -1 if flip else 1) for flip in flips)]
-        grid = Grid(axes, (flips[0], flips[1], flips[2]), affine)  # type: ignore[arg-type]
+        grid = Grid(axes, (flips[0], flips[1], flips[2]), affine, stored.shape[:3])  # type: ignore[arg-type]
         return cls(voxels, canonical + 0.0, grid, unit, notes)
 
     @property
@@ -125,7 +140,12 @@ class Volume:
     @property
     def slice_distance_mm(self) -> float:
         """Distance of the planes of neighboring slices K; under gantry tilt less than the spacing along K."""
-        return float(abs(np.linalg.det(self.affine[:3, :3])) / self.pixel_area_mm2)
+        return self.voxel_mm3 / self.pixel_area_mm2
+
+    @property
+    def voxel_mm3(self) -> float:
+        """Volume of a voxel."""
+        return float(abs(np.linalg.det(self.affine[:3, :3])))
 
     @property
     def stored_axis(self) -> int:
@@ -151,7 +171,7 @@ class Volume:
 
         Rows and columns keep their order: K before J before I.
         """
-        order = [2 - axis, *(n for n in range(3) if n != 2 - axis)]
+        order = order_along(axis)
         columns = [2 - order[2], 2 - order[1], 2 - order[0], 3]
         axes, flipped = self.grid.axes, self.grid.flipped
         grid = replace(
@@ -162,9 +182,29 @@ class Volume:
         voxels = np.transpose(self.voxels, (*order, *range(3, self.voxels.ndim)))
         return replace(self, voxels=voxels, affine=self.affine[:, columns], grid=grid)
 
+    def part(self, box: tuple[slice, slice, slice]) -> Volume:
+        """Return a view of the voxels from ``start`` to before ``stop`` along K, J and I."""
+        first = np.array([side.start for side in box[::-1]])
+        affine = self.affine.copy()
+        affine[:3, 3] = self.to_mm(first[None].astype(np.float64))[0]
+        corner = list(self.grid.corner)
+        for axis, flip, side, size in zip(self.grid.axes, self.grid.flipped, box, self.shape, strict=True):
+            corner[axis] += size - side.stop if flip else side.start
+        grid = replace(self.grid, corner=(corner[0], corner[1], corner[2]))
+        return replace(self, voxels=self.voxels[box], affine=affine, grid=grid)
+
     def to_mm(self, indices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Carry (n, 3) indices (i, j, k) to patient millimeters (x, y, z)."""
         return indices @ self.affine[:3, :3].T + self.affine[:3, 3]
+
+    def to_indices(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Carry (n, 3) patient millimeters to indices (i, j, k), not rounded."""
+        return np.asarray(np.linalg.solve(self.affine[:3, :3], (positions - self.affine[:3, 3]).T).T, np.float64)
+
+
+def order_along(axis: int) -> tuple[int, int, int]:
+    """Return which of the canonical axes K, J, I become slices, rows and columns along a patient axis."""
+    return ((0, 1, 2), (1, 0, 2), (2, 0, 1))[2 - axis]
 
 
 def _world_axes(columns: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 NAMED = 24
 """Labels that are named where one is missing, at most."""
+MOST = 4096
+"""Labels over which a label map is doubted."""
 NEAR = 0.01
 """Share of a voxel by which two grids may differ."""
 
@@ -56,6 +58,17 @@ def select(labels: Volume, wanted: Sequence[int]) -> NDArray[np.bool_]:
             expected=f"labels among {named}",
         )  # fmt: skip
     return np.ascontiguousarray(np.isin(voxels, wanted))
+
+
+def doubted(labels: Volume) -> str:
+    """Say why a volume may be no label map: a study's gray levels can be taken for labels."""
+    voxels = labels.voxels
+    if labels.unit == "HU":
+        return "labels were chosen in a study in Hounsfield units: --lower and --upper choose gray levels"
+    if voxels.dtype.kind == "f":
+        return f"the label map holds {voxels.dtype} numbers: it may be a study of gray levels"
+    count = len(np.unique(voxels))
+    return f"the label map has {count} labels: it may be a study of gray levels" if count > MOST else ""
 
 
 def require_same_grid(labels: Volume, study: Volume) -> None:

@@ -14,6 +14,7 @@ from .cubes import CubeSettings
 from .fit import FitSettings
 from .network import FALLS, IN_SLICE, IN_SPACE, SURFACES, NetworkSettings
 from .parameter import LAYERS, MANY, UNSET, limits_of, option_of
+from .part import PartSettings
 from .read import ReadSettings
 from .run import RunSettings
 from .window import WindowSettings
@@ -29,6 +30,7 @@ __all__ = [
     "CubeSettings",
     "FitSettings",
     "NetworkSettings",
+    "PartSettings",
     "ReadSettings",
     "RunSettings",
     "Settings",
@@ -44,6 +46,7 @@ class Settings:
     """All parameters of a run, in groups."""
 
     read: ReadSettings = field(default_factory=ReadSettings)
+    part: PartSettings = field(default_factory=PartSettings)
     window: WindowSettings = field(default_factory=WindowSettings)
     network: NetworkSettings = field(default_factory=NetworkSettings)
     cubes: CubeSettings = field(default_factory=CubeSettings)

@@ -30,10 +30,12 @@ def param(
     high: float = math.inf,
     length: tuple[int, ...] = (),
     paper: Any = UNSET,
+    metavar: tuple[str, ...] = (),
 ) -> Any:
     """Declare a parameter: ``low <= value <= high`` and ``value > above``; `length` where it takes several.
 
-    `kind` is the type of one value; it follows from the default, except where that is None or a tuple.
+    `kind` is the type of one value; it follows from the default, except where that is None or a tuple. `metavar`
+    names each of several values.
     """
     kind = kind or (float if default is None or isinstance(default, tuple) else type(default))
     meta = {
@@ -46,6 +48,7 @@ def param(
         "high": high,
         "length": length,
         "paper": paper,
+        "metavar": metavar,
     }
     return field(default=default, metadata=meta)
 

@@ -18,6 +18,13 @@ class RunSettings(Group):
         "unit that the numbers of a cloud are in; studies are always in mm",
         choices=("mm", "cm", "m", "unknown"),
     )
+    frame: str = param(
+        "lps",
+        "what the coordinates of a study's mesh and points are written in: patient millimeters to the left, posterior "
+        "and superior (lps) or to the right, anterior and superior (ras), or the indices (i, j, k) of the file's own "
+        "voxels (voxel)",
+        choices=("lps", "ras", "voxel"),
+    )
     local_origin: bool = param(
         False, "count a cloud's coordinates from its lowest corner, which report and file name: for STL far from 0"
     )

@@ -30,6 +30,12 @@ class WindowSettings(Group):
     select: tuple[int, ...] | None = param(
         None, "labels of a label map whose voxels are the window", kind=int, low=0, length=MANY
     )
+    keep: str = param(
+        "auto",
+        "components of the window that are kept: those of the patient's body, without the scanner's table; the "
+        "largest; or all. auto is body for CT, and all elsewhere and for labels",
+        choices=("auto", "body", "largest", "all"),
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

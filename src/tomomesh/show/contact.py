@@ -72,11 +72,15 @@ def draw_slices(mask: NDArray[np.bool_], found: Networks | Contours, plane: Plan
     nets, note = _nets(found, plane)
     ends = [one.edges.reshape(-1, 2) for row in nets.values() for one in row]
     bounds = _closer(plane.bounds(np.asarray(mask.any(axis=0)), np.concatenate([np.empty((0, 2)), *ends])))
-    every, size = np.arange(inside[0], inside[-1] + 1), COLUMNS * ROWS
-    for first in range(0, len(every), size):
-        part = every[first : first + size]
+    for part in pages(np.arange(inside[0], inside[-1] + 1)):
         which = f"Slices {part[0] + 1} to {part[-1] + 1} of {len(mask)}"
         yield _page(mask, part, nets, plane, bounds, which, note)
+
+
+def pages(slices: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
+    """Yield the slices of each page."""
+    for first in range(0, len(slices), COLUMNS * ROWS):
+        yield slices[first : first + COLUMNS * ROWS]
 
 
 def _closer(bounds: Floats) -> Floats:
@@ -150,7 +154,7 @@ def _page(
         _draw_nets(ax, nets.get(int(k), []), f"{k + 1}", empty=not mask[k].any())
     for ax in axes:
         ax.set_axis_off()
-    _scale_bar(axes[0], bounds, plane)
+    scale_bar(axes[0], bounds, plane)
     figure.suptitle(which, x=0.01, ha="left", fontsize=10, fontweight="bold")
     figure.text(
         0.99,
@@ -170,19 +174,22 @@ def _draw_nets(ax: Axes, nets: list[Net], number: str, *, empty: bool) -> None:
         lines(ax, one.edges[~one.bridged], color=one.color, width=0.9)
         lines(ax, one.edges[one.bridged], color=ACCENT, width=0.9, style="--")
     gaps = sum(one.gaps for one in nets)
-    _write(ax, number, 0, 1.0, color=INK, weight="bold")
+    write_beside(ax, number, 0, 1.0, color=INK, weight="bold")
     if gaps:
-        _write(ax, f"{gaps} gap{'' if gaps == 1 else 's'}", 1, 1.0, color=ACCENT)
+        write_beside(ax, f"{gaps} gap{'' if gaps == 1 else 's'}", 1, 1.0, color=ACCENT)
     words = [(one.words, one.color) for one in nets[:MOST_LINES]]
     if len(nets) > MOST_LINES:
         words.append((f"and {len(nets) - MOST_LINES} more", MUTED))
     if not nets:
         words = [("no pixels" if empty else "no network", MUTED)]
     for n, (text, color) in enumerate(words):
-        _write(ax, text, 0, -0.02, lines_down=n, color=color)
+        write_beside(ax, text, 0, -0.02, lines_down=n, color=color)
 
 
-def _write(ax: Axes, text: str, x: float, y: float, *, lines_down: int = 0, color: str, weight: str = "normal") -> None:
+def write_beside(
+    ax: Axes, text: str, x: float, y: float, *, lines_down: int = 0, color: str, weight: str = "normal"
+) -> None:
+    """Write above or under a slice, at its left or right end."""
     above = y > 0.5
     ax.annotate(
         text, (x, y), xycoords="axes fraction", xytext=(0, 1 if above else -8.5 * lines_down),
@@ -191,10 +198,10 @@ def _write(ax: Axes, text: str, x: float, y: float, *, lines_down: int = 0, colo
     )  # fmt: skip
 
 
-def _scale_bar(ax: Axes, bounds: Floats, plane: Plane) -> None:
+def scale_bar(ax: Axes, bounds: Floats, plane: Plane, color: str = INK) -> None:
     """Put the length that all slices share into a corner of the first."""
     (left, low), (right, high) = bounds
     length = nice_length(float(right - left))
     foot = np.array([left, low if plane.upward else high])
-    lines(ax, np.array([[foot, foot + np.array([length, 0.0])]]), color=INK, width=1.6)
+    lines(ax, np.array([[foot, foot + np.array([length, 0.0])]]), color=color, width=1.6)
     small_print(ax, f"{length:g} {plane.unit}".strip(), foot, (0, 6), align="left")

@@ -8,6 +8,7 @@ import numpy as np
 
 from .contact import draw_slices
 from .fit import draw_fit
+from .outline import draw_outlines
 from .plane import Plane
 from .relief import draw_relief
 from .render import View
@@ -39,6 +40,7 @@ def draw_all(
     triangulated: TriMesh | None = None,
     smoothed: TriMesh | None = None,
     mesh: TriMesh | None = None,
+    on_slices: TriMesh | None = None,
     trace: Trace | None = None,
     plane: Plane = Plane(),  # noqa: B008
     view: View = View(),  # noqa: B008
@@ -60,6 +62,8 @@ def draw_all(
         Several networks a slice, where there are.
     points, cuberille, triangulated, smoothed, mesh, trace
         The later stages.
+    on_slices : TriMesh
+        The mesh in the voxel indices (i, j, k) of the slices.
     plane : Plane
         Spacing and sense of the slices.
     view : View
@@ -88,6 +92,9 @@ def draw_all(
         yield "10-shaded", draw_shaded(mesh, view)
     if trace is not None and len(trace.speed):
         yield "11-fit", draw_fit(trace, tolerance=tolerance, unit=view.unit)
+    if images is not None and on_slices is not None and len(on_slices.faces):
+        drawn = enumerate(draw_outlines(images, on_slices, plane), 1)
+        yield from ((f"12-outlines-{number}", page) for number, page in drawn)
 
 
 def _of_slice(

@@ -1,0 +1,63 @@
+"""The frames in which a study's mesh and points are written: from LPS millimeters at the border, and nowhere else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..model.mesh import TriMesh
+from .nifti import FLIP
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.points import PointSet
+    from ..model.volume import Grid
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame of coordinates that can be written.
+
+    Attributes
+    ----------
+    unit, name : str
+        As files name them.
+    from_lps : (4, 4) float array
+        Patient millimeters, LPS, to its coordinates.
+    """
+
+    unit: str
+    name: str
+    from_lps: NDArray[np.float64]
+
+    def place(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Carry (n, 3) positions from LPS."""
+        return np.asarray(positions @ self.from_lps[:3, :3].T + self.from_lps[:3, 3])
+
+    def mesh(self, mesh: TriMesh) -> TriMesh:
+        """Carry a mesh; where the frame is a mirror, the faces are turned, so that they look outward in it too."""
+        turned = slice(None, None, -1 if np.linalg.det(self.from_lps[:3, :3]) < 0 else 1)
+        return TriMesh(self.place(mesh.vertices), np.ascontiguousarray(mesh.faces[:, turned]))
+
+    def points(self, points: PointSet) -> PointSet:
+        """Carry a cloud."""
+        return replace(points, positions=self.place(points.positions))
+
+
+def frame_of_study(name: str, grid: Grid) -> Frame:
+    """Return a frame of a study by its name.
+
+    Parameters
+    ----------
+    name : {"lps", "ras", "voxel"}
+        Patient millimeters, or indices (i, j, k) of the voxels as the file stores them: i runs fastest, as NIfTI's
+        own; columns, rows and slices of DICOM. A whole index is the center of a voxel.
+    grid : Grid
+        How the file keeps its voxels.
+    """
+    if name == "voxel":
+        return Frame("voxel", "voxel", np.asarray(np.linalg.inv(grid.affine), np.float64))
+    return Frame("mm", name.upper(), FLIP if name == "ras" else np.eye(4))
