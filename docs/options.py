@@ -19,6 +19,7 @@ COUNTS = {
     (1, 3): "one or three: ",
     (2,): "two: ",
     (3,): "three: ",
+    (6,): "six: ",
     MANY: "any number, with commas between: ",
     LAYERS: "one, or one a layer with commas between: ",
 }

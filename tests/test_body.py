@@ -1,0 +1,92 @@
+"""Which components of a CT are the patient: tables go, bones and arms stay."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from studies import shared
+from tomomesh import read_volume, segment
+from tomomesh.errors import UsageError
+from tomomesh.model.volume import Volume
+
+AIR, SKIN, BONE, TABLE = -1000, 40, 900, 500
+
+
+def head(*, table: bool = True, thin: float = 3.0) -> Volume:
+    """A head of skin around a skull whose jaw hangs apart, 10 mm over a curved table; 2 mm voxels."""
+    z, y, x = 2.0 * np.indices((24, 90, 80))
+    x, y = x - 80, y - 70
+    out = np.sqrt((x / 60) ** 2 + (y / 60) ** 2)
+    levels = np.where(out < 1, SKIN, AIR)
+    levels[(out > 0.8) & (out < 0.9) & (y > -20)] = BONE
+    levels[(np.abs(x) < 10) & (np.abs(y + 40) < 6) & (z < 20)] = BONE
+    if table:
+        around = np.sqrt(x**2 + (y + 100) ** 2)
+        levels[(around > 170) & (around < 170 + thin) & (np.abs(x) < 70)] = TABLE
+    return Volume.from_stored(levels.astype(np.int16), np.diag([2.0, 2.0, 2.0, 1.0]), unit="HU")
+
+
+@pytest.mark.parametrize("preset", ["skin", "bone"])
+class TestTable:
+    def test_a_table_is_left_out_and_nothing_else(self, preset: str) -> None:
+        with_table, without = (segment(head(table=table), preset=preset, network="none") for table in (True, False))
+        assert np.array_equal(with_table.mask, without.mask)
+        window = with_table.report["window"]
+        assert window["dropped_components"] == 1
+        assert window["dropped_voxels"] == np.count_nonzero(head().voxels == TABLE)
+        assert "--keep all" in with_table.report["study"]["notes"][-1]
+        assert without.report["window"]["dropped_components"] == 0
+        assert without.report["study"]["notes"] == []
+
+    def test_all_keeps_it(self, preset: str) -> None:
+        found = segment(head(), preset=preset, network="none", keep="all")
+        assert found.mask[head().voxels == TABLE].all()
+        assert found.report["window"]["components"] is None
+
+    def test_what_is_thick_is_a_body_too(self, preset: str) -> None:
+        found = segment(head(thin=24.0), preset=preset, network="none")
+        assert found.report["window"]["dropped_components"] == 0
+
+
+class TestKeep:
+    def test_a_jaw_apart_from_its_skull_stays(self) -> None:
+        found = segment(head(), preset="bone", network="none")
+        assert found.report["window"]["components"] == 3
+        assert np.array_equal(found.mask, head().voxels == BONE)
+
+    def test_the_largest_is_the_one_with_the_most_voxels(self) -> None:
+        found = segment(head(), preset="bone", network="none", keep="largest")
+        _, rows, _ = np.nonzero(found.mask)
+        assert rows.min() > 24
+        assert found.report["window"]["dropped_components"] == 2
+
+    def test_elsewhere_than_in_ct_all_is_kept(self) -> None:
+        levels = np.zeros((9, 20, 20), np.uint8)
+        levels[:, 2:9, 2:9], levels[4, 15, 15] = 100, 100
+        volume = Volume.from_stored(levels, np.eye(4))
+        assert segment(volume, lower=50.0, network="none").mask[4, 15, 15]
+        with pytest.raises(UsageError, match="Hounsfield"):
+            segment(volume, lower=50.0, network="none", keep="body")
+
+    def test_a_small_body_has_thin_limbs(self) -> None:
+        small = head()
+        tiny = Volume.from_stored(small.voxels, np.diag([0.2, 0.2, 0.2, 1.0]), unit="HU")
+        found = segment(tiny, preset="bone", network="none")
+        assert np.array_equal(found.mask, small.voxels == BONE)
+
+    def test_where_there_is_no_air_all_is_kept(self) -> None:
+        levels = np.full((6, 12, 12), SKIN, np.int16)
+        levels[:, 3:6, 3:6], levels[0, 0, 0] = BONE, -5
+        found = segment(Volume.from_stored(levels, np.eye(4), unit="HU"), preset="bone", network="none")
+        assert np.array_equal(found.mask, levels == BONE)
+
+
+def test_a_real_table_is_left_out_and_the_arms_stay() -> None:
+    volume = read_volume(shared("totalsegmentator/example_ct_dicom"))
+    found = segment(volume, preset="skin", network="none")
+    assert found.report["window"]["components"] == 4
+    assert found.report["window"]["dropped_components"] == 2
+    columns = np.flatnonzero(found.mask.any(axis=(0, 1)))
+    assert columns.max() > 500  # an arm that lies apart
+    assert np.flatnonzero(found.mask.any(axis=(0, 2))).max() < 425  # the table lies behind

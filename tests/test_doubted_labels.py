@@ -1,0 +1,35 @@
+"""A study of gray levels that is taken for a label map is warned of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from test_end_to_end import ball
+from tomomesh import segment
+from tomomesh.model.volume import Volume
+
+
+def warnings(volume: Volume, labels: Volume | None = None) -> list[str]:
+    return segment(volume, labels=labels, select=(7,), network="none").report["warnings"]
+
+
+def map_of(dtype: type, unit: str = "stored") -> Volume:
+    return Volume.from_stored(np.where(ball() > 50, 7, 0).astype(dtype), np.eye(4), unit=unit)
+
+
+class TestDoubt:
+    def test_a_label_map_is_not_warned_of(self) -> None:
+        assert not any("label" in warning for warning in warnings(map_of(np.uint8)))
+
+    @pytest.mark.parametrize(("volume", "said"), [
+        (map_of(np.float32), "float32"), (map_of(np.int16, "HU"), "Hounsfield"),
+    ])  # fmt: skip
+    def test_floats_and_studies_are(self, volume: Volume, said: str) -> None:
+        assert any(said in warning for warning in warnings(volume))
+        assert any(said in warning for warning in warnings(map_of(np.uint8), volume))
+
+    def test_many_levels_are(self) -> None:
+        levels = np.zeros((20, 20, 20), np.uint16)
+        levels.flat[:5000] = np.arange(5000)
+        assert any("5000 labels" in warning for warning in warnings(Volume.from_stored(levels, np.eye(4))))
