@@ -16,6 +16,8 @@ from tomomesh.show.plane import Plane
 
 IMAGES = Path(__file__).parent / "images"
 BOX, PAGE = (900, 660), (1000, 1300)
+PAGED = ("06-slices", "12-outlines")
+"""Pictures of several pages, of which the first is kept."""
 FILMED = 10
 """Slice of the head on which a network is filmed."""
 
@@ -32,8 +34,8 @@ def draw() -> None:
         pictures = {path.stem: Image.open(path).convert("RGB") for path in figures}
         (IMAGES / "02-film.gif").write_bytes(Path(triangle, "02-film.gif").read_bytes())
     for name, picture in sorted(pictures.items()):
-        if not name.startswith("06-slices") or name == "06-slices-1":
-            keep(picture, name, box=PAGE if name == "06-slices-1" else BOX)
+        if not name.startswith(PAGED) or name in {f"{page}-1" for page in PAGED}:
+            keep(picture, name, box=PAGE if name.startswith(PAGED) else BOX)
     (IMAGES / "06-film.gif").write_bytes(filmed())
     keep(overview(pictures), "phantom")
 

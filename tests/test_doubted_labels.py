@@ -11,7 +11,8 @@ from tomomesh.model.volume import Volume
 
 
 def warnings(volume: Volume, labels: Volume | None = None) -> list[str]:
-    return segment(volume, labels=labels, select=(7,), network="none").report["warnings"]
+    told: list[str] = segment(volume, labels=labels, select=(7,), network="none").report["warnings"]
+    return told
 
 
 def map_of(dtype: type, unit: str = "stored") -> Volume:

@@ -22,12 +22,13 @@ from tomomesh.model.mesh import TriMesh
 from tomomesh.model.volume import Volume
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
 
-def grid(shape: tuple[int, int, int], affine: NDArray[np.float64] | None = None) -> Volume:
+def grid(shape: Sequence[int], affine: NDArray[np.float64] | None = None) -> Volume:
     return Volume.from_stored(np.zeros(shape, np.uint8), np.eye(4) if affine is None else affine)
 
 
@@ -107,7 +108,7 @@ class TestLaws:
     def test_volume_converges_to_that_of_the_mesh(self) -> None:
         sphere = trimesh.creation.icosphere(subdivisions=size(4, 2), radius=10.0)
         mesh, errors = TriMesh(sphere.vertices, np.asarray(sphere.faces, np.int64)), []
-        for count in size((12, 96), (6, 24)):
+        for count in (12, size(96, 24)):
             affine = affine_of(rotation(0.3, 0.2, 0.1), (30.0 / count,) * 3, (0, 0, 0))
             affine[:3, 3] = -affine[:3, :3] @ np.full(3, count / 2 + 0.1)
             volume = grid((count,) * 3, affine)

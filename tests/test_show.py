@@ -342,12 +342,13 @@ class TestGallery:
                 triangulated=cube.triangulated(),
                 smoothed=ball,
                 mesh=ball,
+                on_slices=ball,
                 trace=trace,
             )
         )
         assert list(drawn) == [
             "03-relief", "04-window", "05-regions", "06-network", "06-slices-1", "07-points",
-            "08-surfaces", "09-wireframe", "10-shaded", "11-fit",
+            "08-surfaces", "09-wireframe", "10-shaded", "11-fit", "12-outlines-1",
         ]  # fmt: skip
         assert all(map(is_drawn, drawn.values()))
 

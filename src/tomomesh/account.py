@@ -134,8 +134,8 @@ class Account:
         }
         if chosen.dropped and asked.keep == "auto":
             self._sections["study"]["notes"].append(
-                f"{chosen.dropped} of {chosen.found} components of the window ({chosen.dropped_voxels} voxels) lie where "
-                "the body is nowhere 12 mm thick, as a scanner's table, and were left out: --keep all keeps them"
+                f"{chosen.dropped} of {chosen.found} components of the window ({chosen.dropped_voxels} voxels) were "
+                "left out, which lie in nothing that is 12 mm thick, as a scanner's table: --keep all keeps them"
             )
         if any(edges[2:]):
             self.warn("the window touches the border of the slices: the surface is closed along it")
