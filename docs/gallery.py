@@ -35,7 +35,7 @@ def draw() -> None:
         (IMAGES / "02-film.gif").write_bytes(Path(triangle, "02-film.gif").read_bytes())
     for name, picture in sorted(pictures.items()):
         if not name.startswith(PAGED) or name in {f"{page}-1" for page in PAGED}:
-            keep(picture, name, box=PAGE if name.startswith(PAGED) else BOX)
+            keep(picture, name, box=PAGE if name == "06-slices-1" else BOX)
     (IMAGES / "06-film.gif").write_bytes(filmed())
     keep(overview(pictures), "phantom")
 

@@ -92,8 +92,8 @@ class TestReconstruct:
         assert (np.delete(labelled, without, axis=2) == np.delete(kept, without, axis=2)).all()
         assert tomllib.loads(Path(out["s.toml"]).read_text()) == Settings().to_dict()
         drawn = {path.stem for path in Path(out["figures"]).glob("*.png")}
-        assert len(drawn) == 10
-        assert "06-slices-1" in drawn
+        assert len(drawn) == 11
+        assert {"06-slices-1", "12-outlines-1"} < drawn
         said = capsys.readouterr().out
         assert "Otsu" in said
         assert len(said.splitlines()) <= 15

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import io
 from ..errors import OutputError, UsageError
+from ..io.source import suffix_of
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from ..results import Segmentation, Surface
     from ..settings import Settings
     from .bars import Bars
+
+RAS_ALONE, LENGTHS = (".gii",), (".gii", ".3mf")
+"""Suffixes of meshes that are in RAS whatever is asked, and of those whose coordinates are lengths."""
 
 
 def check_folder(path: str | Path) -> Path:
@@ -67,7 +71,7 @@ def check_files(chosen: Namespace, *taken: str) -> None:
 
 def check_frame(output: str | Path, settings: Settings) -> None:
     """Refuse voxel indices in a format of lengths, before any work is done."""
-    if settings.run.frame == "voxel" and str(output).lower().endswith((".3mf", ".gii")):
+    if settings.run.frame == "voxel" and suffix_of(output) in LENGTHS:
         raise UsageError(
             "3MF and GIFTI hold lengths, not voxel indices", found=f"--frame = voxel, --output = {output}",
             expected="--frame lps or ras, or another format",
@@ -96,7 +100,7 @@ def _placed(surface: Surface, output: str | Path, settings: Settings) -> tuple[T
     stage_one = surface.segmentation
     if stage_one is None:
         return surface.mesh, _frame_of_cloud(surface.report, settings)
-    asked = "ras" if str(output).lower().endswith(".gii") else settings.run.frame
+    asked = "ras" if suffix_of(output) in RAS_ALONE else settings.run.frame
     frame = io.frame_of_study(asked, stage_one.volume.grid)
     return frame.mesh(surface.mesh), {"unit": frame.unit, "frame": frame.name}
 
