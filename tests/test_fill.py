@@ -12,7 +12,7 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conftest import cuberille_of, law, seeds, size, solids
+from conftest import COMPILED, cuberille_of, law, seeds, size, solids
 from studies import affine_of, indices_of, rotation, write_nifti
 from test_end_to_end import ball
 from tomomesh import fill_mesh, reconstruct
@@ -156,12 +156,17 @@ def test_vtk_fills_the_same_voxels() -> None:
     assert np.array_equal(ours, theirs)
 
 
+def solid() -> NDArray[np.int16]:
+    """A ball, a small one where kernels are slow."""
+    return ball((40, 48, 44)) if COMPILED else ball((17, 19, 18), 7.0)
+
+
 class TestCommand:
     AFFINE = affine_of(rotation(0.3, 0.1, -0.2) @ np.diag([-1.0, 1.0, 1.0]), (1.0, 1.2, 0.9))
 
     def test_the_mask_lies_on_the_study_and_the_report_compares_it(self, tmp_path: Path) -> None:
-        study = write_nifti(tmp_path / "ball.nii", ball(), self.AFFINE)
-        labels = write_nifti(tmp_path / "labels.nii", (ball() > 50).astype(np.uint8) * 7, self.AFFINE)
+        study = write_nifti(tmp_path / "ball.nii", solid(), self.AFFINE)
+        labels = write_nifti(tmp_path / "labels.nii", (solid() > 50).astype(np.uint8) * 7, self.AFFINE)
         mask, report = tmp_path / "mask.nii.gz", tmp_path / "report.json"
         common = ["-o", str(tmp_path / "b.ply"), "--network", "none", "--mask-out", str(mask), "--report", str(report)]
         for given_, against in (
@@ -175,28 +180,28 @@ class TestCommand:
             told = json.loads(report.read_text())["mask"]
             dice = 2 * np.count_nonzero(filled & wanted) / (np.count_nonzero(filled) + np.count_nonzero(wanted))
             assert told["dice"] == pytest.approx(dice)
-            assert dice > 0.97
+            assert dice > size(0.97, 0.9)
             assert told["voxels"] == np.count_nonzero(filled)
             assert told["against"] == against
             assert told["volume_mm3"] == pytest.approx(told["voxels"] * 1.0 * 1.2 * 0.9)
 
     def test_a_part_is_filled_in_its_place(self, tmp_path: Path) -> None:
-        study = write_nifti(tmp_path / "ball.nii", ball(), self.AFFINE)
+        study = write_nifti(tmp_path / "ball.nii", solid(), self.AFFINE)
         mask, report = tmp_path / "mask.nii", tmp_path / "report.json"
         options = ["--lower", "50", "--network", "none", "--slice-range", "2", "-5", "--quiet"]
         files = ["-o", str(tmp_path / "b.ply"), "--mask-out", str(mask), "--report", str(report)]
         assert main(["reconstruct", str(study), *files, *options]) == 0
-        assert json.loads(report.read_text())["mask"]["dice"] > 0.95
+        assert json.loads(report.read_text())["mask"]["dice"] > size(0.95, 0.9)
 
     def test_the_summary_says_how_well_it_agrees(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        study = write_nifti(tmp_path / "ball.nii", ball(), self.AFFINE)
+        study = write_nifti(tmp_path / "ball.nii", solid(), self.AFFINE)
         files = ["-o", str(tmp_path / "b.ply"), "--mask-out", str(tmp_path / "mask.nii")]
         assert main(["reconstruct", str(study), *files, "--lower", "50", "--network", "none"]) == 0
         assert " voxels inside the mesh, Dice " in capsys.readouterr().out
 
     def test_the_solid_of_a_ring_network_is_filled(self) -> None:
-        volume = Volume.from_stored(ball(), self.AFFINE)
+        volume = Volume.from_stored(solid(), self.AFFINE)
         surface = reconstruct(volume, lower=50.0)
         filled = fill_mesh(surface.mesh, volume)
         volume_mm3 = np.count_nonzero(filled) * volume.voxel_mm3
-        assert volume_mm3 == pytest.approx(surface.mesh.face_volumes.sum(), rel=0.02)
+        assert volume_mm3 == pytest.approx(surface.mesh.face_volumes.sum(), rel=size(0.02, 0.1))
