@@ -54,6 +54,22 @@ def of_network(report: dict[str, Any], output: str) -> list[str]:
     ]
 
 
+def of_row(place: str, row: dict[str, Any]) -> str:
+    """Say in one line what became of one study of a batch."""
+    if row["exit_code"]:
+        return f"{place}: failed"
+    if row.get("passed"):
+        return f"{place}: finished before"
+    shape = "sound" if row["sound"] else "NOT sound"
+    return f"{place}: {row['faces']} faces, {row['components']} component(s), {shape}, {row['seconds']:.1f} s"
+
+
+def of_batch(rows: list[dict[str, Any]], output: str) -> str:
+    """Say in one line what became of a batch."""
+    failed, passed = (sum(bool(row.get(name)) for row in rows) for name in ("exit_code", "passed"))
+    return f"written   {output}: {len(rows) - failed - passed} reconstructed, {passed} finished before, {failed} failed"
+
+
 def of_check(report: dict[str, Any]) -> list[str]:
     """Say what a mesh is."""
     faults = [f"{report[name]} {name.replace('_', ' ')}" for name in FAULTS if report[name]]

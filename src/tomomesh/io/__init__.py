@@ -6,11 +6,12 @@ One file a format family; each table leads from a suffix to a reader or a writer
 from __future__ import annotations
 
 from .atomic import check_output, replacing
-from .documents import read_settings, write_document, write_settings
+from .documents import read_settings, write_document, write_settings, write_table
 from .images import read_picture
 from .labels import LABEL_WRITERS, write_labels
 from .meshes import MESH_READERS, MESH_WRITERS, keeps, read_mesh, write_mesh
 from .points import POINT_READERS, POINT_WRITERS, read_points, write_points
+from .studies import Study, find_studies
 from .volumes import VOLUME_READERS, read_volume
 
 __all__ = [
@@ -20,7 +21,9 @@ __all__ = [
     "POINT_READERS",
     "POINT_WRITERS",
     "VOLUME_READERS",
+    "Study",
     "check_output",
+    "find_studies",
     "keeps",
     "read_mesh",
     "read_picture",
@@ -33,4 +36,5 @@ __all__ = [
     "write_mesh",
     "write_points",
     "write_settings",
+    "write_table",
 ]

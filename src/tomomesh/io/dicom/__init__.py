@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from .header import is_dicom
-from .read import read_dicom
+from .read import list_stacks, read_dicom
 
-__all__ = ["is_dicom", "read_dicom"]
+__all__ = ["is_dicom", "list_stacks", "read_dicom"]

@@ -14,7 +14,7 @@ from ..limits import require_memory
 from ..source import counted
 from .header import TELLING, frames_of, read_headers
 from .pixels import Decoder
-from .series import choose
+from .series import choose, stacks_among
 from .stack import Stack, stacked
 
 if TYPE_CHECKING:
@@ -72,6 +72,18 @@ def read_dicom(files: list[Path], settings: ReadSettings, *, study: str, others:
     turned = ("MONOCHROME1: gray levels were inverted" if unit != "HU" else "MONOCHROME1: HU were kept",)
     notes = left + choice.notes + stack.notes + notes + (turned if inverted else ())
     return Volume.from_stored(voxels, stack.affine, unit=unit, notes=notes)
+
+
+def list_stacks(files: list[Path]) -> list[int]:
+    """Return the numbers of the series among some files that could be a study each, for ``ReadSettings.series``.
+
+    Raises
+    ------
+    FormatError
+        For a DICOM file that is broken.
+    """
+    headers, _ = read_headers(files)
+    return stacks_among([frame for path, header in headers for frame in frames_of(path, header)])
 
 
 def _gray(stack: Stack, study: str) -> tuple[NDArray[Any], tuple[str, ...]]:
