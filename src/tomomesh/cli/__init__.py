@@ -8,8 +8,9 @@ import signal
 import sys
 from typing import TYPE_CHECKING
 
+from . import shell
 from .faults import as_error
-from .options import build_parser, joined
+from .options import TOLD, build_parser, joined
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,6 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str]) -> int:
     try:
         chosen = build_parser().parse_args(joined(arguments))
+        if chosen.command in TOLD:
+            shell.tell(chosen)
+            return 0
         from . import commands
 
         commands.run(chosen)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import io
 from ..errors import UnreadableError, UsageError
-from ..settings import Settings, parameters
+from ..settings import Settings, parameters, without_effect
 from . import summary
 from .bars import Bars
 from .batch import reconstruct_each
@@ -152,7 +152,8 @@ def _network(chosen: Namespace) -> None:
     if chosen.film:
         with io.replacing(folder / "02-film.gif") as file:
             file.write(film_of_network(trained, settings, area, title, axes))
-    report = {"network": trained.measures, "settings": settings.to_dict()}
+    warnings = without_effect(settings, given_of(chosen), input="color")  # a picture may be in color
+    report = {"network": trained.measures, "settings": settings.to_dict(), "warnings": warnings}
     write_documents(chosen, report, settings)
     _tell(chosen, report, summary.of_network(report, chosen.output))
 

@@ -31,6 +31,9 @@ STAGE_ONE = ("read", "window", "network")
 STAGE_TWO = ("cubes", "fit")
 ALIASES = {"cell_mm": "--cell"}
 """Second spellings: the numbers of a cloud need not be millimeters."""
+TOLD = ("completion", "man")
+"""Commands that are made from this parser alone, and import nothing heavy either."""
+SHELLS = ("bash", "zsh", "fish", "tcsh")
 
 
 def either(formats: Sequence[str]) -> str:
@@ -82,7 +85,9 @@ def build_parser() -> argparse.ArgumentParser:
         "130 interrupted.",
     )
     parser.add_argument("--version", action="version", version=f"tomomesh {__version__}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+    commands = parser.add_subparsers(
+        title="Commands", dest="command", required=True, metavar="COMMAND", parser_class=_Parser
+    )
 
     demo = _command(commands, "demo", "the built-in head, everything it can show")
     demo.add_argument("-o", "--output", default="tomomesh-demo", metavar="FOLDER", help="default: %(default)s")
@@ -134,6 +139,10 @@ def build_parser() -> argparse.ArgumentParser:
     check.add_argument("--against", metavar="MESH", help="a mesh that it should equal: distances both ways")
     check.add_argument("--report", metavar="FILE.json", help="write the report")
     check.add_argument("--json", action="store_true", help="print the report as JSON")
+
+    completion = _command(commands, "completion", "the script that completes commands and options in a shell")
+    completion.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
+    _command(commands, "man", "the manual page, for man and groff")
     return parser
 
 

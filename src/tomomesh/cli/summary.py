@@ -8,6 +8,8 @@ from ..measure.topology import FAULTS
 
 LARGEST = 3
 """Components that are described one by one."""
+SHOWN = 3
+"""Warnings that are told; the report has all."""
 
 
 def of_surface(report: dict[str, Any], output: str) -> list[str]:
@@ -50,6 +52,7 @@ def of_network(report: dict[str, Any], output: str) -> list[str]:
         f"network   {network['topology']} of {network['neurons']} neurons on {network['inputs']} inputs",
         f"          quantization error {network['quantization_error']:.4g}, dead neurons {network['dead_neurons']}, "
         f"longest edge {network['longest_over_median_edge']:.2f} medians",
+        *(f"warning   {warning}" for warning in report["warnings"][:SHOWN]),
         f"written   {output}",
     ]
 
@@ -235,4 +238,4 @@ def _ending(report: dict[str, Any], output: str) -> list[str]:
     warnings = [f"warning   {warning}" for warning in report["warnings"]]
     notes = report.get("study", {}).get("notes", [])
     told = [f"note      {'; '.join(notes)}"] if notes else []
-    return [*told, *warnings[:3], f"written   {output}, computed in {report['timings']['total_s']:.2f} s"]
+    return [*told, *warnings[:SHOWN], f"written   {output}, computed in {report['timings']['total_s']:.2f} s"]
