@@ -37,7 +37,10 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
         For a format that is not named, and where a terminal would get bytes that are no text.
     """
     inside = next((name for name in SOURCES if getattr(chosen, name, None) == STREAM), "")
-    outside = getattr(chosen, "output", None) == STREAM and not getattr(chosen, "each", False)
+    each = getattr(chosen, "each", False)
+    outside = getattr(chosen, "output", None) == STREAM and not each
+    if getattr(chosen, "format", None) and not (outside or each):
+        raise UsageError("a file's suffix tells its format", found=f"--format {chosen.format}", expected="-o -")
     suffix = _suffix(chosen) if outside else ""
     if not inside and not outside:
         yield chosen

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+FORMULA = ("=", "+", "-", "@")
 """What a cell begins with that a spreadsheet may calculate."""
 
 
@@ -47,8 +47,8 @@ def write_document(data: Mapping[str, Any], path: str | Path) -> None:
 def write_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], path: str | Path) -> None:
     """Write rows as CSV with a head, in UTF-8; None and what is not finite become empty cells.
 
-    Texts that a spreadsheet would take for a formula, which begin with ``=``, ``+``, ``-``, ``@``, a tab or a line
-    end, get an apostrophe in front (OWASP, CSV injection).
+    Texts become one line each, and those that a spreadsheet would take for a formula get an apostrophe in front
+    (OWASP, CSV injection).
 
     Raises
     ------
@@ -65,7 +65,8 @@ def write_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], path:
 
 def _cell(value: Any) -> Any:
     if isinstance(value, str):
-        return f"'{value}" if value.startswith(FORMULA) else value
+        line = " ".join(value.split())
+        return f"'{line}" if line.startswith(FORMULA) else line
     return str(value).lower() if isinstance(value, bool) else value
 
 
