@@ -109,14 +109,14 @@ class TestBatch:
         assert "Traceback" not in capsys.readouterr().err
 
     def test_one_study_is_held_at_a_time(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        from tomomesh.cli import commands
+        from tomomesh.cli import commands, sources
 
-        read, held = commands.read_study, []
+        held: list[weakref.ref[Any]] = []
 
         def watched(*arguments: Any) -> Any:
             gc.collect()
             assert not [volume for volume in held if volume() is not None]
-            found = read(*arguments)
+            found = sources.read_study(*arguments)
             held.append(weakref.ref(found[0]))
             return found
 
