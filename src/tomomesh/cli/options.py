@@ -9,24 +9,22 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from .. import __version__
 from ..errors import UsageError
 from ..settings import LAYERS, MANY, Settings, asked_by, limits_of, option_of, parameters
+from .formats import (
+    CHECKED,
+    CLOUD,
+    CLOUD_FORMATS,
+    LABEL,
+    MESH,
+    MESH_FORMATS,
+    POINT,
+    POINT_FORMATS,
+    STUDY,
+    STUDY_FORMATS,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-STUDY = (
-    "a NIfTI, NRRD, MetaImage, MGH, NPY or TIFF file, a folder of DICOM slices, "
-    "or a folder of PNG, TIFF or JPEG slices (with --spacing)"
-)
-POINTS = "an unoriented cloud: PLY, XYZ, TXT, CSV, NPY, NPZ, PCD, LAS, LAZ or E57, or the vertices of OBJ, OFF or STL"
-MESH_FORMATS = ("stl", "ply", "obj", "off", "glb", "vtp", "3mf", "gii")
-POINT_FORMATS = ("ply", "xyz", "csv", "npy", "vtp")
-LABEL_FORMATS = ("nii", "nii.gz")
-CHECKED_FORMATS = ("stl", "ply", "obj", "off")
-CLOUD_FORMATS = ("ply", "xyz", "txt", "csv", "npy", "npz", "pcd", "las", "laz", "e57", "obj", "off", "stl")
-STUDY_FORMATS = ("nii", "nii.gz", "nrrd", "mha", "mgh", "mgz", "npy", "tif", "tiff", "dcm", "ima")
-"""What the tables of `io` read and write, which are not imported here; of studies, single files that hold it all."""
-TEXTS = ("obj", "off", "xyz", "csv")
-"""Formats that a terminal can show."""
 STAGE_ONE = ("read", "window", "network")
 STAGE_TWO = ("cubes", "fit")
 ALIASES = {"cell_mm": "--cell"}
@@ -34,15 +32,6 @@ ALIASES = {"cell_mm": "--cell"}
 TOLD = ("completion", "man")
 """Commands that are made from this parser alone, and import nothing heavy either."""
 SHELLS = ("bash", "zsh", "fish", "tcsh")
-
-
-def either(formats: Sequence[str]) -> str:
-    """Put suffixes into words."""
-    *others, last = (f".{name}" for name in formats)
-    return f"{', '.join(others)} or {last}" if others else last
-
-
-MESH, POINT = either(MESH_FORMATS), either(POINT_FORMATS)
 
 
 def spellings(name: str) -> list[str]:
@@ -111,7 +100,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_settings(stage_one, (*STAGE_ONE, "cubes", "run"), without=SURFACE_ONLY)
 
     stage_two = _command(commands, "surface", "stages two and three alone: points in, a closed surface out")
-    stage_two.add_argument("cloud", metavar="POINTS", help=f"{POINTS}; or - with --input-format")
+    stage_two.add_argument("cloud", metavar="POINTS", help=f"{CLOUD}, or - with --input-format")
     stage_two.add_argument("-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format")
     _add_streams(stage_two, CLOUD_FORMATS, MESH_FORMATS, usual="xyz")
     _add_outputs(stage_two, "figures")
@@ -135,7 +124,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_settings(inspect, ("read",), paper=False)
 
     check = _command(commands, "check", "the quality report of any mesh")
-    check.add_argument("mesh", metavar="MESH", help=either(CHECKED_FORMATS))
+    check.add_argument("mesh", metavar="MESH", help=CHECKED)
     check.add_argument("--against", metavar="MESH", help="a mesh that it should equal: distances both ways")
     check.add_argument("--report", metavar="FILE.json", help="write the report")
     check.add_argument("--json", action="store_true", help="print the report as JSON")
@@ -228,7 +217,7 @@ def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
     """Add the options that name further files; what is shown goes with `_add_settings`."""
     kinds = {
         "points": ("FILE", f"write the points: {POINT}"),
-        "labels": ("FILE", f"write the regions on the study's own grid: {either(LABEL_FORMATS)}"),
+        "labels": ("FILE", f"write the regions on the study's own grid: {LABEL}"),
         "figures": ("FOLDER", "write the pictures"),
     }
     group = parser.add_argument_group("More results")

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import TomomeshError, UsageError
-from .options import TEXTS
+from .formats import TEXTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
