@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import gc
 import json
@@ -16,7 +17,10 @@ from PIL import Image
 
 from studies import write_nifti, write_series
 from tomomesh.cli import main
+from tomomesh.cli.batch import SINGLE
+from tomomesh.cli.options import build_parser
 from tomomesh.io import find_studies, write_table
+from tomomesh.settings import parameters
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -232,6 +236,17 @@ class TestUsage:
         for path, code in (("empty", 3), ("texts", 4), ("nowhere", 3), ("studies/first.nii", 4)):
             assert main(["reconstruct", str(tmp_path / path), "--each", "-o", str(tmp_path / "out")]) == code
         assert not (tmp_path / "out").exists()
+
+
+class TestOptions:
+    def test_each_is_a_parameter_refused_or_without_a_say_in_the_mesh(self) -> None:
+        """A new option must be one of these, or a finished study would be taken for another one."""
+        parameter = {entry.name for _, entry in parameters()}
+        silent = {"help", "study", "output", "input_format", "format", "each", "force", "quiet", "json"}
+        kept_in_settings = {"auto", "paper", "settings", "save_settings"}
+        (commands,) = (one for one in build_parser()._actions if isinstance(one, argparse._SubParsersAction))
+        found = {action.dest for action in commands.choices["reconstruct"]._actions}
+        assert found == parameter | set(SINGLE) | silent | kept_in_settings
 
 
 class TestStudies:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from conftest import COMPILED
 from studies import write_nifti
 from tomomesh import PointSet, Settings, Volume, reconstruct, reconstruct_points
 from tomomesh.cli import main
@@ -82,6 +83,7 @@ class TestTable:
         assert not {"neurons", "lower", "closing", "smoothing", "cell_mm", "seed"} & set(silent({}, "gray"))
 
 
+@pytest.mark.skipif(not COMPILED, reason="some hundred meshes, seconds each without the compiler")
 class TestTruth:
     @pytest.mark.parametrize("way", STUDY)
     def test_what_has_no_effect_on_a_study_leaves_the_mesh_as_it_is(self, way: str) -> None:
@@ -128,5 +130,21 @@ class TestReport:
         assert said not in capsys.readouterr().out
 
     def test_the_network_command_tells_it_too(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
-        assert main(["network", "square", "-o", str(tmp_path / "n"), "--iterations", "50"]) == 0
+        assert (
+            main(
+                [
+                    "network",
+                    "square",
+                    "-o",
+                    str(tmp_path / "n"),
+                    "--iterations",
+                    "50",
+                    "--epochs",
+                    "2",
+                    "--neurons",
+                    "12",
+                ]
+            )
+            == 0
+        )
         assert "warning   --iterations has no effect with --training batch" in capsys.readouterr().out
