@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tomomesh.cli.options import spellings
-from tomomesh.settings import LAYERS, MANY, UNSET, limits_of, option_of, parameters
+from tomomesh.settings import LAYERS, MANY, UNSET, asked_by, limits_of, parameters
 
 if TYPE_CHECKING:
     from dataclasses import Field
@@ -39,9 +39,8 @@ def row(entry: Field[Any]) -> str:
     """Put a parameter into a row."""
     meta = entry.metadata
     switch = meta["kind"] is bool
-    negated = switch and entry.default
-    spelled = [option_of(f"no_{entry.name}")] if negated else spellings(entry.name)
-    what = f"do not {meta['help']}" if negated else meta["help"]
+    spelled = [asked_by(entry)] if switch else spellings(entry.name)
+    what = f"do not {meta['help']}" if switch and entry.default else meta["help"]
     allowed = ", ".join(meta["choices"]) or f"{COUNTS[meta['length']]}{limits_of(entry)}"
     default, paper = _value(entry.default), _value(meta["paper"])
     if switch:

@@ -85,3 +85,9 @@ class InternalCheckError(TomomeshError):
     """A result failed its own check before it was written: a bug in tomomesh."""
 
     exit_code = 9
+
+
+class BatchError(TomomeshError):
+    """Some studies of a batch failed; the others were written."""
+
+    exit_code = 10

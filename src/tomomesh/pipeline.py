@@ -18,7 +18,7 @@ from .model.points import PointSet
 from .networkwise import surface_of_networks
 from .progress import Progress, silent
 from .results import NO_CUBES, NO_TRACE, Segmentation, Surface
-from .settings import Settings
+from .settings import Settings, without_effect
 from .spacewise import require_surface, surface_of_space
 from .studywise import segment_study
 from .surface.partition import sampling_distance
@@ -26,6 +26,8 @@ from .surface.samples import distinct
 from .voxelwise import mesh_boundary
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from .model.mesh import TriMesh
@@ -56,7 +58,8 @@ def reconstruct(
     progress : callable
         Called as ``progress(stage, done, total)``; raise in it to stop.
     **changes
-        Parameters by their bare names, as ``neurons=80``.
+        Parameters by their bare names, as ``neurons=80``; the report warns of those that have no effect beside the
+        others.
 
     Returns
     -------
@@ -70,7 +73,7 @@ def reconstruct(
     settings = (settings or Settings()).replace(**changes)
     require_decimation(settings.run.target_faces)
     require_surface(settings)
-    account = Account(settings)
+    account = _begun(settings, changes, volume)
     segmentation = segment_study(volume, labels, settings, account, progress)
     sampling = segmentation.sampling
     if segmentation.boundary is not None:
@@ -106,7 +109,7 @@ def segment(
     Parameters and errors are those of `reconstruct`.
     """
     settings = (settings or Settings()).replace(**changes)
-    return segment_study(volume, labels, settings, Account(settings), progress)
+    return segment_study(volume, labels, settings, _begun(settings, changes, volume), progress)
 
 
 def reconstruct_points(
@@ -137,7 +140,7 @@ def reconstruct_points(
     lowest, _ = box(cloud.positions)
     if settings.run.local_origin:
         cloud = replace(cloud, positions=cloud.positions - lowest)
-    account = Account(settings)
+    account = _begun(settings, changes)
     with account.timed("slices"):
         slices = slices_of(cloud, settings)
     if slices is not None and settings.fit.attraction != "nearest":
@@ -151,6 +154,15 @@ def reconstruct_points(
         surface = _surface_of_cloud(cloud, settings, account, progress)
     account.origin(lowest)
     return _coarser(surface, settings, account, progress)
+
+
+def _begun(settings: Settings, changes: Mapping[str, Any], volume: Volume | None = None) -> Account:
+    """Begin the account of a run; warn of what was asked for and changes nothing."""
+    account = Account(settings)
+    kind = "cloud" if volume is None else "color" if getattr(volume, "layers", 1) > 1 else "gray"
+    for message in without_effect(settings, changes, input=kind):
+        account.warn(message)
+    return account
 
 
 def _surface_of_cloud(cloud: PointSet, settings: Settings, account: Account, progress: Progress) -> Surface:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from .. import io
 from ..errors import UnreadableError, UsageError
-from ..settings import Settings, parameters
+from ..settings import Settings, parameters, without_effect
 from . import summary
 from .bars import Bars
+from .batch import reconstruct_each
 from .outputs import (
     check_files,
     check_folder,
@@ -25,15 +26,19 @@ from .outputs import (
     write_surface,
 )
 from .sources import read_study, sources_of
+from .streams import streamed
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from ..results import Surface
+
 
 def run(chosen: Namespace) -> None:
     """Run the command that was parsed."""
-    _COMMANDS[chosen.command](chosen)
+    with streamed(chosen) as named:
+        _COMMANDS[named.command](named)
 
 
 def settings_of(chosen: Namespace) -> Settings:
@@ -41,10 +46,15 @@ def settings_of(chosen: Namespace) -> Settings:
     settings = Settings.for_paper() if getattr(chosen, "paper", False) else Settings()
     if getattr(chosen, "settings", None):
         settings = io.read_settings(chosen.settings, base=settings)
-    given = {entry.name: getattr(chosen, entry.name) for _, entry in parameters() if hasattr(chosen, entry.name)}
+    given = given_of(chosen)
     if getattr(chosen, "auto", False) and {"lower", "upper", "preset"} & set(given):
         raise UsageError("two windows are asked for", found="--auto and a window", expected="one of them")
     return settings.replace(**given)
+
+
+def given_of(chosen: Namespace) -> dict[str, Any]:
+    """Return the parameters that were given as options."""
+    return {entry.name: getattr(chosen, entry.name) for _, entry in parameters() if hasattr(chosen, entry.name)}
 
 
 def _demo(chosen: Namespace) -> None:
@@ -71,15 +81,25 @@ def _demo(chosen: Namespace) -> None:
 
 def _reconstruct(chosen: Namespace) -> None:
     settings = settings_of(chosen)
+    if chosen.each:
+        reconstruct_each(chosen, settings, _reconstruct_one)
+        return
+    if chosen.force:
+        raise UsageError("--force is for a batch", found="--force without --each")
+    surface = _reconstruct_one(chosen, settings)
+    _tell(chosen, surface.report, summary.of_surface(surface.report, _shown(chosen)))
+
+
+def _reconstruct_one(chosen: Namespace, settings: Settings) -> Surface:
     check_outputs(chosen, io.MESH_WRITERS, *sources_of(chosen, settings))
     check_frame(chosen.output, settings)
     from ..pipeline import reconstruct
 
     with Bars(quiet=chosen.quiet) as progress:
         volume, labels = read_study(chosen, settings, progress)
-        surface = reconstruct(volume, settings, labels=labels, progress=progress)
+        surface = reconstruct(volume, settings, labels=labels, progress=progress, **given_of(chosen))
         write_surface(chosen, surface, settings, progress)
-    _tell(chosen, surface.report, summary.of_surface(surface.report, chosen.output))
+    return surface
 
 
 def _segment(chosen: Namespace) -> None:
@@ -89,12 +109,12 @@ def _segment(chosen: Namespace) -> None:
 
     with Bars(quiet=chosen.quiet) as progress:
         volume, labels = read_study(chosen, settings, progress)
-        found = segment(volume, settings, labels=labels, progress=progress)
+        found = segment(volume, settings, labels=labels, progress=progress, **given_of(chosen))
         found.report["written"] = write_points(found.points, found, chosen.output, found.report, settings)
         write_stage_one(chosen, found)
         write_documents(chosen, found.report, settings)
         draw(chosen.figures, found, None, settings, progress)
-    _tell(chosen, found.report, summary.of_points(found.report, chosen.output))
+    _tell(chosen, found.report, summary.of_points(found.report, _shown(chosen)))
 
 
 def _surface(chosen: Namespace) -> None:
@@ -110,9 +130,9 @@ def _surface(chosen: Namespace) -> None:
         progress("read", 0, 1)
         points = io.read_points(chosen.cloud)
         progress("read", 1, 1)
-        surface = reconstruct_points(points, settings, progress=progress)
+        surface = reconstruct_points(points, settings, progress=progress, **given_of(chosen))
         write_surface(chosen, surface, settings, progress)
-    _tell(chosen, surface.report, summary.of_surface(surface.report, chosen.output))
+    _tell(chosen, surface.report, summary.of_surface(surface.report, _shown(chosen)))
 
 
 def _network(chosen: Namespace) -> None:
@@ -138,7 +158,8 @@ def _network(chosen: Namespace) -> None:
     if chosen.film:
         with io.replacing(folder / "02-film.gif") as file:
             file.write(film_of_network(trained, settings, area, title, axes))
-    report = {"network": trained.measures, "settings": settings.to_dict()}
+    warnings = without_effect(settings, given_of(chosen), input="color")  # a picture may be in color
+    report = {"network": trained.measures, "settings": settings.to_dict(), "warnings": warnings}
     write_documents(chosen, report, settings)
     _tell(chosen, report, summary.of_network(report, chosen.output))
 
@@ -191,6 +212,11 @@ _COMMANDS = {
     "inspect": _inspect,
     "check": _check,
 }
+
+
+def _shown(chosen: Namespace) -> str:
+    """Name the output as it was typed."""
+    return getattr(chosen, "shown", None) or str(chosen.output)
 
 
 def _tell(chosen: Namespace, report: dict[str, Any], lines: list[str]) -> None:

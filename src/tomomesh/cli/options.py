@@ -8,21 +8,30 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from .. import __version__
 from ..errors import UsageError
-from ..settings import LAYERS, MANY, Settings, limits_of, option_of, parameters
+from ..settings import LAYERS, MANY, Settings, asked_by, limits_of, option_of, parameters
+from .formats import (
+    CHECKED,
+    CLOUD,
+    CLOUD_FORMATS,
+    LABEL,
+    MESH,
+    MESH_FORMATS,
+    POINT,
+    POINT_FORMATS,
+    STUDY,
+    STUDY_FORMATS,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-STUDY = (
-    "a NIfTI, NRRD, MetaImage, MGH, NPY or TIFF file, a folder of DICOM slices, "
-    "or a folder of PNG, TIFF or JPEG slices (with --spacing)"
-)
-POINTS = "an unoriented cloud: PLY, XYZ, TXT, CSV, NPY, NPZ, PCD, LAS, LAZ or E57, or the vertices of OBJ, OFF or STL"
-MESH = "STL, PLY, OBJ, OFF, VTP, 3MF, GLB or GIFTI"
 STAGE_ONE = ("read", "part", "window", "network")
 STAGE_TWO = ("cubes", "fit")
 ALIASES = {"cell_mm": "--cell"}
 """Second spellings: the numbers of a cloud need not be millimeters."""
+TOLD = ("completion", "man")
+"""Commands that are made from this parser alone, and import nothing heavy either."""
+SHELLS = ("bash", "zsh", "fish", "tcsh")
 
 
 def spellings(name: str) -> list[str]:
@@ -63,10 +72,13 @@ def build_parser() -> argparse.ArgumentParser:
         prog="tomomesh",
         description="Slices or points in, a closed surface mesh with its proof out.",
         epilog="Exit codes: 0 ok, 2 usage, 3 not found, 4 bad file, 5 geometry needs a decision, 6 empty result, "
-        "7 over a limit, 8 output not written, 9 internal check failed, 130 interrupted.",
+        "7 over a limit, 8 output not written, 9 internal check failed, 10 some studies of a batch failed, "
+        "130 interrupted.",
     )
     parser.add_argument("--version", action="version", version=f"tomomesh {__version__}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+    commands = parser.add_subparsers(
+        title="Commands", dest="command", required=True, metavar="COMMAND", parser_class=_Parser
+    )
 
     demo = _command(commands, "demo", "the built-in head, everything it can show")
     demo.add_argument("-o", "--output", default="tomomesh-demo", metavar="FOLDER", help="default: %(default)s")
@@ -74,19 +86,25 @@ def build_parser() -> argparse.ArgumentParser:
 
     main = _command(commands, "reconstruct", "a study of slices in, a closed surface out")
     _add_study(main)
-    main.add_argument("-o", "--output", required=True, metavar="MESH", help=MESH)
+    main.add_argument(
+        "-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format; with --each, a folder"
+    )
+    _add_streams(main, STUDY_FORMATS, MESH_FORMATS)
+    _add_each(main)
     _add_outputs(main, "points", "labels", "mask_out", "figures")
     _add_settings(main, (*STAGE_ONE, *STAGE_TWO, "run"))
 
     stage_one = _command(commands, "segment", "stage one alone: the neurons of all slices as points")
     _add_study(stage_one)
-    stage_one.add_argument("-o", "--output", required=True, metavar="POINTS", help="PLY, XYZ, CSV or NPY")
+    stage_one.add_argument("-o", "--output", required=True, metavar="POINTS", help=f"{POINT}, or - with --format")
+    _add_streams(stage_one, STUDY_FORMATS, POINT_FORMATS)
     _add_outputs(stage_one, "labels", "figures")
     _add_settings(stage_one, (*STAGE_ONE, "cubes", "run"), without=SURFACE_ONLY)
 
     stage_two = _command(commands, "surface", "stages two and three alone: points in, a closed surface out")
-    stage_two.add_argument("cloud", metavar="POINTS", help=POINTS)
-    stage_two.add_argument("-o", "--output", required=True, metavar="MESH", help=MESH)
+    stage_two.add_argument("cloud", metavar="POINTS", help=f"{CLOUD}, or - with --input-format")
+    stage_two.add_argument("-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format")
+    _add_streams(stage_two, CLOUD_FORMATS, MESH_FORMATS, usual="xyz")
     _add_outputs(stage_two, "figures")
     _add_settings(stage_two, (*STAGE_TWO, "run"), without=STUDY_ONLY)
 
@@ -102,15 +120,20 @@ def build_parser() -> argparse.ArgumentParser:
     )
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
-    inspect.add_argument("study", metavar="STUDY", help=STUDY)
+    inspect.add_argument("study", metavar="STUDY", help=f"{STUDY}, or - with --input-format")
+    _add_streams(inspect, STUDY_FORMATS)
     inspect.add_argument("--json", action="store_true", help="print the findings as JSON")
     _add_settings(inspect, ("read", "part"), paper=False)
 
     check = _command(commands, "check", "the quality report of any mesh")
-    check.add_argument("mesh", metavar="MESH", help="STL, PLY, OBJ or OFF")
+    check.add_argument("mesh", metavar="MESH", help=CHECKED)
     check.add_argument("--against", metavar="MESH", help="a mesh that it should equal: distances both ways")
     check.add_argument("--report", metavar="FILE.json", help="write the report")
     check.add_argument("--json", action="store_true", help="print the report as JSON")
+
+    completion = _command(commands, "completion", "the script that completes commands and options in a shell")
+    completion.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
+    _command(commands, "man", "the manual page, for man and groff")
     return parser
 
 
@@ -155,7 +178,12 @@ def _command(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
 
 
 def _add_study(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("study", metavar="STUDY", nargs="?", help=f"{STUDY}; --labels-in may stand in its place")
+    parser.add_argument(
+        "study",
+        metavar="STUDY",
+        nargs="?",
+        help=f"{STUDY}, or - with --input-format; --labels-in may stand in its place",
+    )
     parser.add_argument(
         "--labels-in",
         metavar="FILE",
@@ -163,12 +191,36 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_streams(
+    parser: argparse.ArgumentParser, read: Sequence[str], written: Sequence[str] = (), *, usual: str = "nii"
+) -> None:
+    """Add the options that name formats where no suffix does."""
+    group = parser.add_argument_group("Streams")
+    group.add_argument(
+        "--input-format", choices=read, default=usual, help="what is read from standard input (default %(default)s)"
+    )
+    if written:
+        group.add_argument("--format", choices=written, help="what is written to standard output (-o -)")
+
+
+def _add_each(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a batch."""
+    group = parser.add_argument_group("Many studies")
+    group.add_argument(
+        "--each",
+        action="store_true",
+        help="STUDY is a folder of studies, each reconstructed into the folder MESH: NAME.stl (or --format), its "
+        "report NAME.json, and all in reports.csv; what is finished is passed over",
+    )
+    group.add_argument("--force", action="store_true", help="reconstruct again what is finished")
+
+
 def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
     """Add the options that name further files; what is shown goes with `_add_settings`."""
     kinds = {
-        "points": ("FILE", "write the points: PLY, XYZ, CSV or NPY"),
-        "labels": ("FILE", "write the regions on the study's own grid: NIfTI"),
-        "mask_out": ("FILE", "write the voxels inside the mesh on the study's own grid: NIfTI"),
+        "points": ("FILE", f"write the points: {POINT}"),
+        "labels": ("FILE", f"write the regions on the study's own grid: {LABEL}"),
+        "mask_out": ("FILE", f"write the voxels inside the mesh on the study's own grid: {LABEL}"),
         "figures": ("FOLDER", "write the pictures"),
     }
     group = parser.add_argument_group("More results")
@@ -209,10 +261,9 @@ def _title(section: str) -> str:
 def _add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
     meta, options, name = entry.metadata, spellings(entry.name), entry.name
     if meta["kind"] is bool:
-        negated = option_of(f"no_{name}") if entry.default else option_of(name)
         action = "store_false" if entry.default else "store_true"
-        text = f"do not {meta['help']}" if entry.default else meta["help"]
-        group.add_argument(negated, dest=name, action=action, default=argparse.SUPPRESS, help=text)
+        text = (f"do not {meta['help']}" if entry.default else meta["help"]).replace("%", "%%")
+        group.add_argument(asked_by(entry), dest=name, action=action, default=argparse.SUPPRESS, help=text)
         return
     one_or_three, many = options[0] in SEVERAL, meta["length"] == MANY
     listed = meta["length"] == LAYERS

@@ -8,6 +8,8 @@ from ..measure.topology import FAULTS
 
 LARGEST = 3
 """Components that are described one by one."""
+SHOWN = 3
+"""Warnings that are told; the report has all."""
 
 
 def of_surface(report: dict[str, Any], output: str) -> list[str]:
@@ -55,8 +57,25 @@ def of_network(report: dict[str, Any], output: str) -> list[str]:
         f"network   {network['topology']} of {network['neurons']} neurons on {network['inputs']} inputs",
         f"          quantization error {network['quantization_error']:.4g}, dead neurons {network['dead_neurons']}, "
         f"longest edge {network['longest_over_median_edge']:.2f} medians",
+        *(f"warning   {warning}" for warning in report["warnings"][:SHOWN]),
         f"written   {output}",
     ]
+
+
+def of_row(place: str, row: dict[str, Any]) -> str:
+    """Say in one line what became of one study of a batch."""
+    if row["exit_code"]:
+        return f"{place}: failed"
+    if row.get("passed"):
+        return f"{place}: finished before"
+    shape = "sound" if row["sound"] else "NOT sound"
+    return f"{place}: {row['faces']} faces, {row['components']} component(s), {shape}, {row['seconds']:.1f} s"
+
+
+def of_batch(rows: list[dict[str, Any]], output: str) -> str:
+    """Say in one line what became of a batch."""
+    failed, passed = (sum(bool(row.get(name)) for row in rows) for name in ("exit_code", "passed"))
+    return f"written   {output}: {len(rows) - failed - passed} reconstructed, {passed} finished before, {failed} failed"
 
 
 def of_check(report: dict[str, Any]) -> list[str]:
@@ -225,4 +244,4 @@ def _ending(report: dict[str, Any], output: str) -> list[str]:
     warnings = [f"warning   {warning}" for warning in report["warnings"]]
     notes = report.get("study", {}).get("notes", [])
     told = [f"note      {'; '.join(notes)}"] if notes else []
-    return [*told, *warnings[:3], f"written   {output}, computed in {report['timings']['total_s']:.2f} s"]
+    return [*told, *warnings[:SHOWN], f"written   {output}, computed in {report['timings']['total_s']:.2f} s"]

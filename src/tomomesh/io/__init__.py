@@ -6,12 +6,13 @@ One file a format family; each table leads from a suffix to a reader or a writer
 from __future__ import annotations
 
 from .atomic import check_output, replacing
-from .documents import read_settings, write_document, write_settings
+from .documents import read_settings, write_document, write_settings, write_table
 from .frames import Frame, frame_of_study
 from .images import read_picture
 from .labels import LABEL_WRITERS, write_labels
 from .meshes import MESH_READERS, MESH_WRITERS, keeps, read_mesh, write_mesh
 from .points import POINT_READERS, POINT_WRITERS, read_points, write_points
+from .studies import Study, find_studies
 from .volumes import VOLUME_READERS, read_volume
 
 __all__ = [
@@ -22,7 +23,9 @@ __all__ = [
     "POINT_WRITERS",
     "VOLUME_READERS",
     "Frame",
+    "Study",
     "check_output",
+    "find_studies",
     "frame_of_study",
     "keeps",
     "read_mesh",
@@ -36,4 +39,5 @@ __all__ = [
     "write_mesh",
     "write_points",
     "write_settings",
+    "write_table",
 ]

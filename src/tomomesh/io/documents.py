@@ -1,10 +1,12 @@
-"""Reports as JSON, settings as TOML."""
+"""Reports as JSON and as a table, settings as TOML."""
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +18,10 @@ from .source import whole
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+
+FORMULA = ("=", "+", "-", "@")
+"""What a cell begins with that a spreadsheet may calculate."""
 
 
 def write_document(data: Mapping[str, Any], path: str | Path) -> None:
@@ -36,6 +42,32 @@ def write_document(data: Mapping[str, Any], path: str | Path) -> None:
     text = json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False)
     with replacing(path) as file:
         file.write(f"{text}\n".encode())
+
+
+def write_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], path: str | Path) -> None:
+    """Write rows as CSV with a head, in UTF-8; None and what is not finite become empty cells.
+
+    Texts become one line each, and those that a spreadsheet would take for a formula get an apostrophe in front
+    (OWASP, CSV injection).
+
+    Raises
+    ------
+    OutputError
+        Where the file cannot be written.
+    """
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(columns)
+    table.writerows([_cell(_plain(row.get(name))) for name in columns] for row in rows)
+    with replacing(path) as file:
+        file.write(text.getvalue().encode("utf-8", "replace"))
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, str):
+        line = " ".join(value.split())
+        return f"'{line}" if line.startswith(FORMULA) else line
+    return str(value).lower() if isinstance(value, bool) else value
 
 
 def _plain(value: Any) -> Any:

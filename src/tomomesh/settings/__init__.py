@@ -11,9 +11,10 @@ from typing import Any
 
 from ..errors import UsageError
 from .cubes import CubeSettings
+from .effect import without_effect
 from .fit import FitSettings
 from .network import FALLS, IN_SLICE, IN_SPACE, SURFACES, NetworkSettings
-from .parameter import LAYERS, MANY, UNSET, limits_of, option_of
+from .parameter import LAYERS, MANY, UNSET, asked_by, limits_of, option_of
 from .part import PartSettings
 from .read import ReadSettings
 from .run import RunSettings
@@ -35,9 +36,11 @@ __all__ = [
     "RunSettings",
     "Settings",
     "WindowSettings",
+    "asked_by",
     "limits_of",
     "option_of",
     "parameters",
+    "without_effect",
 ]
 
 

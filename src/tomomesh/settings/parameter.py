@@ -120,3 +120,8 @@ def limits_of(entry: Field[Any]) -> str:
 def option_of(name: str) -> str:
     """Return the command line's spelling of a parameter."""
     return "--" + name.replace("_", "-")
+
+
+def asked_by(entry: Field[Any]) -> str:
+    """Return the option that asks for a parameter: a switch that is on can only be turned off."""
+    return option_of(f"no_{entry.name}" if entry.metadata["kind"] is bool and entry.default else entry.name)

@@ -10,7 +10,7 @@ from ...model.volume import Volume
 from ..source import counted
 from .bad import leave_out
 from .files import read_frames
-from .series import choose
+from .series import choose, stacks_among
 from .stack import Stack, stacked
 from .voxels import Gray, gray
 
@@ -69,6 +69,11 @@ def read_dicom(files: list[Path], settings: ReadSettings, *, study: str, others:
     turned = ("MONOCHROME1: gray levels were inverted" if unit != "HU" else "MONOCHROME1: HU were kept",)
     notes = left + broken + choice.notes + without + stack.notes + levels.notes + (turned if inverted else ())
     return Volume.from_stored(levels.voxels, stack.affine, unit=unit, notes=notes)
+
+
+def list_stacks(files: list[Path]) -> list[int]:
+    """Return the numbers of the series among some files that could be a study each, for ``ReadSettings.series``."""
+    return stacks_among(read_frames(files).frames)
 
 
 def _decoded(frames: list[Frame], settings: ReadSettings, study: str) -> tuple[Stack, Gray, tuple[str, ...]]:

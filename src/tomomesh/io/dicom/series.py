@@ -65,6 +65,12 @@ def choose(frames: list[Frame], wanted: int | None, *, folder: str) -> Choice:
     return Choice(series[0], notes)
 
 
+def stacks_among(frames: list[Frame]) -> list[int]:
+    """Return the numbers, from 1, of the series with more than one slice; localizers are none."""
+    images = [frame for frame in frames if not _is_localizer(frame)] or frames
+    return [number for number, members in enumerate(_grouped(images), 1) if len(members) > 1]
+
+
 def _wanted(series: list[list[Frame]], wanted: int, folder: str) -> list[Frame]:
     if not 1 <= wanted <= len(series):
         raise UsageError(

@@ -1,0 +1,34 @@
+"""The formats that the help names: those of the tables of `io`, which are not imported here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+MESH_FORMATS = ("stl", "ply", "obj", "off", "glb", "vtp", "3mf", "gii")
+POINT_FORMATS = ("ply", "xyz", "csv", "npy", "vtp")
+LABEL_FORMATS = ("nii", "nii.gz")
+CHECKED_FORMATS = ("stl", "ply", "obj", "off")
+CLOUD_FORMATS = ("ply", "xyz", "txt", "csv", "npy", "npz", "pcd", "las", "laz", "e57", "obj", "off", "stl")
+STUDY_FORMATS = ("nii", "nii.gz", "nrrd", "mha", "mgh", "mgz", "npy", "tif", "tiff", "dcm", "ima", "zip")
+"""Single files that hold a whole study."""
+HEADER_FORMATS = ("nhdr", "mhd")
+"""Headers of studies whose voxels lie in another file."""
+TEXTS = ("obj", "off", "xyz", "csv")
+"""Formats that a terminal can show."""
+
+
+def either(formats: Sequence[str]) -> str:
+    """Put suffixes into words."""
+    *others, last = (f".{name}" for name in formats)
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+MESH, POINT, LABEL, CHECKED = map(either, (MESH_FORMATS, POINT_FORMATS, LABEL_FORMATS, CHECKED_FORMATS))
+STUDY = (
+    f"a file ({either(STUDY_FORMATS + HEADER_FORMATS)}), a folder of DICOM slices, "
+    "or a folder of PNG, TIFF or JPEG slices (with --spacing)"
+)
+CLOUD = f"an unoriented cloud ({either(CLOUD_FORMATS)}); of meshes the vertices"

@@ -1,0 +1,150 @@
+"""Options that change nothing are told, and what is told of them is true."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from conftest import COMPILED
+from studies import write_nifti
+from tomomesh import PointSet, Settings, Volume, reconstruct, reconstruct_points
+from tomomesh.cli import main
+from tomomesh.settings import parameters, without_effect
+from tomomesh.settings.effect import MATTERS
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from _pytest.capture import CaptureFixture
+    from numpy.typing import NDArray
+
+NAMES = [entry.name for _, entry in parameters()]
+OTHER: dict[str, Any] = {
+    "layers": "any", "inputs": "layers", "signal": "region", "neurons": 30, "training": "online", "iterations": 77,
+    "epochs": 2, "start": "axes", "neighborhood": "bubble", "alpha": (0.3, 0.1), "alpha_fall": "exponential",
+    "alpha_power": 1.5, "radius": (4.0, 0.9), "radius_fall": "linear", "radius_power": 3.0, "least_move": 0.5,
+    "bridge": 1.1, "even": False, "trim": 1.5, "cell_mm": (1.5,), "cell_factor": 1.7, "caps": False, "closing": 3,
+    "stacks": "none", "allow_leaks": True, "open": True, "smoothing": 0, "attraction": "surface", "stiffness": 0.9,
+    "damping": 0.9, "step": 0.5, "springs": "triangles", "limit": "shorten", "units": "cm", "local_origin": True,
+}  # fmt: skip
+"""Another value of each parameter that may be without effect."""
+STUDY: dict[str, dict[str, Any]] = {
+    "networks": {"neurons": 24},
+    "online": {"neurons": 24, "training": "online", "iterations": 300, "alpha_fall": "linear", "radius_fall": "linear"},
+    "grid": {"neurons": 25, "network": "grid", "allow_leaks": True},
+    "components": {"neurons": 24, "contours": "components"},
+    "loops": {"neurons": 24, "contours": "loops"},
+    "voxels": {"network": "none"},
+    "space": {"network": "sphere", "neurons": 42},
+    "nearest in space": {"network": "sphere", "neurons": 42, "attraction": "nearest"},
+}
+CLOUD: dict[str, dict[str, Any]] = {"cloud": {}, "nearest": {"attraction": "nearest"}}
+
+
+def ball() -> Volume:
+    """Return a ball of radius 6 mm, its gray levels falling outward."""
+    offset = np.indices((16, 16, 16)) - 7.5
+    return Volume.from_stored((100 - 10 * np.sqrt((offset**2).sum(axis=0))).astype(np.float32), np.eye(4))
+
+
+def sphere() -> PointSet:
+    """Return 600 points on a sphere, evenly spread and in no layers."""
+    height = 1 - 2 * (np.arange(600) + 0.5) / 600
+    angle = np.pi * (1 + 5**0.5) * np.arange(600)
+    ring = np.sqrt(1 - height**2)
+    return PointSet.from_positions(10 * np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=1))
+
+
+def silent(settings: dict[str, Any], kind: str) -> list[str]:
+    """Return the parameters that are said to have no effect."""
+    asked = Settings().replace(**settings)
+    return [name for name in NAMES if name not in settings and without_effect(asked, [name], input=kind)]
+
+
+def vertices(settings: dict[str, Any], kind: str) -> NDArray[np.float64]:
+    if kind == "cloud":
+        return reconstruct_points(sphere(), **settings).mesh.vertices
+    return reconstruct(ball(), lower=40.0, **settings).mesh.vertices
+
+
+class TestTable:
+    def test_names_parameters_and_their_values_alone(self) -> None:
+        choices = {entry.name: entry.metadata["choices"] for _, entry in parameters()}
+        assert set(MATTERS) <= set(NAMES)
+        for conditions in MATTERS.values():
+            for key, values in conditions.items():
+                assert key in ("way", "input") or set(values) < set(choices[key])
+
+    def test_the_defaults_have_something_to_say_of_few(self) -> None:
+        assert {"alpha", "iterations"} < set(silent({}, "gray"))
+        assert not {"neurons", "lower", "closing", "smoothing", "cell_mm", "seed"} & set(silent({}, "gray"))
+
+
+@pytest.mark.skipif(not COMPILED, reason="some hundred meshes, seconds each without the compiler")
+class TestTruth:
+    @pytest.mark.parametrize("way", STUDY)
+    def test_what_has_no_effect_on_a_study_leaves_the_mesh_as_it_is(self, way: str) -> None:
+        self.leaves_the_mesh(STUDY[way], "gray")
+
+    @pytest.mark.parametrize("way", CLOUD)
+    def test_what_has_no_effect_on_a_cloud_leaves_the_mesh_as_it_is(self, way: str) -> None:
+        self.leaves_the_mesh(CLOUD[way], "cloud")
+
+    @staticmethod
+    def leaves_the_mesh(settings: dict[str, Any], kind: str) -> None:
+        before, names = vertices(settings, kind), silent(settings, kind)
+        assert names
+        for name in names:
+            np.testing.assert_array_equal(vertices(settings | {name: OTHER[name]}, kind), before, err_msg=name)
+
+    def test_what_has_an_effect_changes_the_mesh(self) -> None:
+        before = vertices(STUDY["networks"], "gray")
+        for name in ("epochs", "radius", "even", "caps", "smoothing", "stiffness", "cell_mm"):
+            assert name not in silent(STUDY["networks"], "gray")
+            after = vertices(STUDY["networks"] | {name: OTHER[name]}, "gray")
+            assert after.shape != before.shape or not np.array_equal(after, before), name
+
+
+class TestReport:
+    def test_what_was_asked_for_is_told_and_nothing_else(self) -> None:
+        settings = Settings().replace(alpha=(0.3, 0.1))
+        assert not any("alpha" in told for told in reconstruct(ball(), settings, lower=40.0).report["warnings"])
+        told = reconstruct(ball(), lower=40.0, alpha=(0.3, 0.1), even=False).report["warnings"]
+        assert told[0] == "--alpha has no effect with --training batch"
+        assert not any("even" in one for one in told)
+
+    def test_the_command_line_tells_options_but_no_settings_file(
+        self, tmp_path: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        study, kept = tmp_path / "s.nii", tmp_path / "s.toml"
+        write_nifti(study, (ball().voxels > 40).astype(np.uint8), np.eye(4))
+        line = ["reconstruct", str(study), "-o", str(tmp_path / "m.ply"), "--report", str(tmp_path / "r.json")]
+        assert main([*line, "--network", "none", "--closing", "2", "--save-settings", str(kept)]) == 0
+        said = "--closing has no effect with --network none"
+        assert f"warning   {said}" in capsys.readouterr().out
+        assert said in json.loads((tmp_path / "r.json").read_text())["warnings"]
+        assert main([*line, "--settings", str(kept)]) == 0
+        assert said not in capsys.readouterr().out
+
+    def test_the_network_command_tells_it_too(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
+        assert (
+            main(
+                [
+                    "network",
+                    "square",
+                    "-o",
+                    str(tmp_path / "n"),
+                    "--iterations",
+                    "50",
+                    "--epochs",
+                    "2",
+                    "--neurons",
+                    "12",
+                ]
+            )
+            == 0
+        )
+        assert "warning   --iterations has no effect with --training batch" in capsys.readouterr().out

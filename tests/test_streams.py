@@ -1,0 +1,178 @@
+"""Standard input and output: the same bytes as files, all or nothing, and nothing else among them."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from studies import write_nifti
+from test_cli import ERROR
+from tomomesh.cli import main
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+OPTIONS = ["--network", "none", "--lower", "50"]
+PROGRAM = "import sys; from tomomesh.cli import main; sys.exit(main(sys.argv[1:]))"
+
+
+class Stream(io.TextIOWrapper):
+    """A standard stream over bytes, which may be a terminal."""
+
+    def __init__(self, data: bytes = b"", *, terminal: bool = False) -> None:
+        super().__init__(io.BytesIO(data), encoding="utf-8")
+        self.terminal = terminal
+
+    def isatty(self) -> bool:
+        return self.terminal
+
+    @property
+    def bytes(self) -> bytes:
+        assert isinstance(self.buffer, io.BytesIO)
+        return self.buffer.getvalue()
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    voxels = np.zeros((8, 9, 10), np.uint8)
+    voxels[2:6, 2:6, 2:7] = 100
+    return write_nifti(tmp_path / "s.nii", voxels, np.eye(4))
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of temporary files."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    return folder
+
+
+def feed(monkeypatch: pytest.MonkeyPatch, data: bytes) -> None:
+    monkeypatch.setattr(sys, "stdin", Stream(data))
+
+
+class TestOut:
+    @pytest.mark.parametrize("kind", ["ply", "stl", "obj"])
+    def test_a_mesh_is_the_one_that_a_file_holds(
+        self, kind: str, study: Path, tmp_path: Path, temporary: Path, capfdbinary: Any
+    ) -> None:
+        line = ["reconstruct", str(study), *OPTIONS]
+        assert main([*line, "-o", str(tmp_path / f"m.{kind}"), "--quiet"]) == 0
+        assert main([*line, "-o", "-", "--format", kind]) == 0
+        written, said = capfdbinary.readouterr()
+        assert written == (tmp_path / f"m.{kind}").read_bytes()
+        assert trimesh.load(io.BytesIO(written), file_type=kind).is_watertight
+        assert list(temporary.iterdir()) == []
+        assert b"written   standard output" in said
+        assert str(temporary).encode() not in said
+
+    def test_points_are_written_too(self, study: Path, capfdbinary: Any) -> None:
+        assert main(["segment", str(study), *OPTIONS, "-o", "-", "--format", "csv"]) == 0
+        assert capfdbinary.readouterr().out.startswith(b"x_mm,y_mm,z_mm")
+
+    def test_the_report_goes_beside_it(self, study: Path, capfdbinary: Any) -> None:
+        assert main(["reconstruct", str(study), *OPTIONS, "-o", "-", "--format", "stl", "--json"]) == 0
+        written, said = capfdbinary.readouterr()
+        assert json.loads(said[said.index(b"{") :])["quality"]["sound"]
+        assert trimesh.load(io.BytesIO(written), file_type="stl").is_watertight
+
+    def test_nothing_is_written_where_something_fails(
+        self, study: Path, monkeypatch: pytest.MonkeyPatch, temporary: Path, capfdbinary: Any
+    ) -> None:
+        monkeypatch.setattr("tomomesh.pipeline.check_promise", lambda *_, **__: 1 / 0)
+        monkeypatch.setattr("tomomesh.voxelwise.check_promise", lambda *_, **__: 1 / 0)
+        assert main(["reconstruct", str(study), *OPTIONS, "-o", "-", "--format", "stl"]) == 9
+        assert capfdbinary.readouterr().out == b""
+        assert list(temporary.iterdir()) == []
+
+    def test_errors_name_the_stream_as_it_was_typed(self, tmp_path: Path, temporary: Path, capfdbinary: Any) -> None:
+        cloud = tmp_path / "far.xyz"
+        rng = np.random.default_rng(0)
+        places = rng.normal(size=(500, 3))
+        np.savetxt(cloud, places / np.linalg.norm(places, axis=1)[:, None] * 1e-3 + 1e9, fmt="%.9f")
+        assert main(["surface", str(cloud), "-o", "-", "--format", "stl"]) == 8
+        written, said = capfdbinary.readouterr()
+        assert b"File: -" in said.splitlines()[-1]
+        assert str(temporary).encode() not in said
+        assert written == b""
+
+    def test_a_terminal_gets_text_alone(self, study: Path, monkeypatch: pytest.MonkeyPatch, capfdbinary: Any) -> None:
+        shown = Stream(terminal=True)
+        monkeypatch.setattr(sys, "stdout", shown)
+        line = ["reconstruct", str(study), *OPTIONS, "-o", "-", "--format"]
+        assert main([*line, "ply"]) == 2
+        assert b"> mesh.ply" in capfdbinary.readouterr().err
+        assert shown.bytes == b""
+        assert main([*line, "obj"]) == 0
+        assert shown.bytes.startswith(b"# tomomesh")
+
+    def test_a_format_is_needed_and_for_streams_alone(self, study: Path, tmp_path: Path, capfdbinary: Any) -> None:
+        assert main(["reconstruct", str(study), "-o", "-"]) == 2
+        assert b"Try: --format" in capfdbinary.readouterr().err
+        assert main(["reconstruct", str(study), "-o", str(tmp_path / "m.stl"), "--format", "ply"]) == 2
+        assert not (tmp_path / "m.stl").exists()
+
+
+class TestIn:
+    def test_a_cloud_is_the_one_that_a_file_holds(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, temporary: Path
+    ) -> None:
+        sphere = trimesh.creation.icosphere(3).vertices
+        np.savetxt(tmp_path / "c.xyz", sphere)
+        feed(monkeypatch, (tmp_path / "c.xyz").read_bytes())
+        assert main(["surface", str(tmp_path / "c.xyz"), "-o", str(tmp_path / "a.ply"), "--quiet"]) == 0
+        assert main(["surface", "-", "-o", str(tmp_path / "b.ply"), "--quiet"]) == 0
+        assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
+        assert list(temporary.iterdir()) == []
+
+    def test_a_study_goes_through_both_streams(
+        self, study: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfdbinary: Any
+    ) -> None:
+        feed(monkeypatch, study.read_bytes())
+        assert main(["reconstruct", "-", *OPTIONS, "-o", "-", "--format", "ply"]) == 0
+        assert main(["reconstruct", str(study), *OPTIONS, "-o", str(tmp_path / "m.ply"), "--quiet"]) == 0
+        assert capfdbinary.readouterr().out == (tmp_path / "m.ply").read_bytes()
+
+    def test_other_formats_are_named(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+        buffer = io.BytesIO()
+        np.save(buffer, trimesh.creation.icosphere(3).vertices)
+        feed(monkeypatch, buffer.getvalue())
+        assert main(["surface", "-", "--input-format", "npy", "-o", str(tmp_path / "m.stl"), "--quiet"]) == 0
+
+    @pytest.mark.parametrize("data", [b"", b"no numbers", b"1 2\n", b"1 2 nan\n"])
+    def test_faults_are_one_line_that_names_no_temporary_file(
+        self, data: bytes, monkeypatch: pytest.MonkeyPatch, temporary: Path, tmp_path: Path, capfdbinary: Any
+    ) -> None:
+        feed(monkeypatch, data)
+        assert main(["surface", "-", "-o", str(tmp_path / "m.stl")]) == 4
+        (said,) = capfdbinary.readouterr().err.decode().splitlines()
+        assert ERROR.match(said)
+        assert "File: -" in said
+        assert str(temporary) not in said
+        assert list(temporary.iterdir()) == []
+
+
+class TestPipes:
+    @pytest.mark.parametrize("line", [["--help"], ["man"], ["inspect", "s.nii", "--json"]])
+    def test_a_reader_that_leaves_is_no_fault(self, line: list[str], study: Path) -> None:
+        inside, outside = os.pipe()
+        os.close(inside)
+        done = subprocess.run(
+            [sys.executable, "-c", PROGRAM, *line], stdout=outside, stderr=subprocess.PIPE, cwd=study.parent
+        )
+        os.close(outside)
+        assert (done.returncode, done.stderr) == (0, b"")
+
+    def test_what_is_inspected_goes_on_as_json(self, study: Path) -> None:
+        line = [sys.executable, "-c", PROGRAM, "inspect", "-", "--json"]
+        done = subprocess.run(line, input=study.read_bytes(), capture_output=True, check=True)
+        assert json.loads(done.stdout)["slices_rows_columns"] == [8, 9, 10]
