@@ -57,10 +57,13 @@ def check_files(chosen: Namespace, *taken: str) -> None:
 
 def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> None:
     """Write the mesh, and whatever else was asked for."""
-    stage_one = surface.segmentation
+    stage_one, part = surface.segmentation, surface.part
     frame = frame_of(surface.report, settings)
     at_vertices, on_faces = _fields(surface, chosen.output)
-    io.write_mesh(surface.mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces)
+    if part is None:
+        io.write_mesh(surface.mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces)
+    else:
+        io.write_mesh(part.mesh, chosen.output, **frame_of_part(frame), vertex_fields=at_vertices, face_fields={})
     if getattr(chosen, "points", None):
         io.write_points(surface.points, chosen.points, **frame)
     if stage_one is not None:
@@ -77,14 +80,22 @@ def frame_of(report: dict[str, Any], settings: Settings) -> dict[str, str]:
     return {"unit": settings.run.units, "frame": f"local:{corner}" if settings.run.local_origin else "unknown"}
 
 
+def frame_of_part(frame: dict[str, str]) -> dict[str, str]:
+    """Name unit and frame of a part of what lies in some frame: a cloud's own is not that of its part."""
+    unit = frame["unit"] if frame["unit"] == "unknown" else "mm"
+    return {"unit": unit, "frame": frame["frame"] if frame["frame"] == "LPS" else "unknown"}
+
+
 def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
     """Return what the format keeps beside the mesh: what is known of the points, and which faces were filled."""
     from ..surface.attributes import carry
 
     points = surface.points
     kept = {name: values for name, values in points.attributes.items() if io.keeps(output, name)}
-    at_vertices = carry(replace(points, attributes=kept), surface.mesh.vertices)
-    if not io.keeps(output, "filled", on_faces=True):
+    part = surface.part
+    places = surface.mesh.vertices if part is None else part.mesh.vertices / part.per_unit
+    at_vertices = carry(replace(points, attributes=kept), places)
+    if part is not None or not io.keeps(output, "filled", on_faces=True):
         return at_vertices, {}
     filled = surface.filled
     if filled is None and surface.segmentation is not None:

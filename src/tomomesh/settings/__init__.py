@@ -14,6 +14,7 @@ from .cubes import CubeSettings
 from .fit import FitSettings
 from .network import FALLS, IN_SLICE, IN_SPACE, SURFACES, NetworkSettings
 from .parameter import LAYERS, MANY, UNSET, limits_of, option_of
+from .printing import PrintSettings
 from .read import ReadSettings
 from .run import RunSettings
 from .window import WindowSettings
@@ -29,6 +30,7 @@ __all__ = [
     "CubeSettings",
     "FitSettings",
     "NetworkSettings",
+    "PrintSettings",
     "ReadSettings",
     "RunSettings",
     "Settings",
@@ -48,6 +50,7 @@ class Settings:
     network: NetworkSettings = field(default_factory=NetworkSettings)
     cubes: CubeSettings = field(default_factory=CubeSettings)
     fit: FitSettings = field(default_factory=FitSettings)
+    printing: PrintSettings = field(default_factory=PrintSettings)
     run: RunSettings = field(default_factory=RunSettings)
 
     @classmethod
