@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from .surface.voxels import Boundary, VoxelSurface
 
 SECTIONS = (
-    "study", "window", "networks", "rings", "points", "cubes", "surface", "fit", "quality", "truth", "timings",
+    "study", "window", "networks", "rings", "points", "cubes", "surface", "fit", "quality", "print", "truth", "timings",
     "settings", "versions", "warnings",
 )  # fmt: skip
 ORDER = (*SECTIONS[: SECTIONS.index("surface")], "stack", "voxels", "space", *SECTIONS[SECTIONS.index("surface") :])
@@ -74,6 +74,7 @@ class Account:
         self._timings: dict[str, float] = {}
         self._warnings: list[str] = []
         self._measure: Callable[[], dict[str, Any]] | None = None
+        self._judge: Callable[[], dict[str, Any]] | None = None
         self._rings_mm3 = 0.0
 
     @contextmanager
@@ -106,7 +107,7 @@ class Account:
             "notes": list(volume.notes),
         }
 
-    def part(self, box: tuple[slice, ...], sizes: tuple[int, int, int]) -> None:
+    def cropped(self, box: tuple[slice, ...], sizes: tuple[int, int, int]) -> None:
         """Note which slices, rows and columns of the whole study are left, where it was cropped."""
         kept = [[int(side.start), int(side.stop) - 1] for side in box]
         cropped = kept != [[0, size - 1] for size in sizes]
@@ -404,6 +405,10 @@ class Account:
         if filled is not None:
             self._sections["fit"]["filled_faces"] = int(filled.sum())
 
+    def printed(self, judge: Callable[[], dict[str, Any]]) -> None:
+        """Have it told whether the part can be printed, once the report is asked for."""
+        self._judge = judge
+
     def volume(self, sampling: Sampling) -> None:
         """Have the volume of the mesh compared with the areas of the rings times the distance of their slices."""
         self._rings_mm3 = sampling.volume_mm3
@@ -416,6 +421,7 @@ class Account:
     def report(self) -> dict[str, Any]:
         """Return the report, its sections in their documented order; measures the mesh the first time."""
         self._measured()
+        self._judged()
         sections: dict[str, Any] = self._sections | {
             "timings": self._timings | {"total_s": sum(self._timings.values())},
             "settings": self._settings.to_dict(),
@@ -443,6 +449,13 @@ class Account:
             )
         if quality["self_intersections"]:
             self.warn(f"{quality['self_intersections']} faces pass through others")
+
+    def _judged(self) -> None:
+        """Tell whether the part can be printed, where there is one that has not been looked at."""
+        if self._judge is not None:
+            with self.timed("print"):
+                self._sections["print"] = self._judge()
+            self._judge = None
 
 
 def _limits(limit: Limit) -> float | list[float | None] | None:

@@ -16,6 +16,7 @@ from .measure.topology import check_promise
 from .model.columns import box
 from .model.points import PointSet
 from .networkwise import surface_of_networks
+from .printing.part import make_part, require_printing
 from .progress import Progress, silent
 from .results import NO_CUBES, NO_TRACE, Segmentation, Surface
 from .settings import Settings, without_effect
@@ -72,6 +73,7 @@ def reconstruct(
     """
     settings = (settings or Settings()).replace(**changes)
     require_decimation(settings.run.target_faces)
+    require_printing(settings)
     require_surface(settings)
     account = _begun(settings, changes, volume)
     segmentation = segment_study(volume, labels, settings, account, progress)
@@ -89,7 +91,7 @@ def reconstruct(
         surface = surface_of_networks(
             sampling.points, sampling.spacing_mm, settings, account, progress, expected_mm3=sampling.volume_mm3
         )
-    surface = _coarser(surface, settings, account, progress)
+    surface = _printed(_coarser(surface, settings, account, progress), settings, account, progress)
     account.volume(sampling)
     if truth is not None:
         account.truth(surface.mesh, surface.cap_faces, truth)
@@ -134,6 +136,7 @@ def reconstruct_points(
     """
     settings = (settings or Settings()).replace(**changes)
     require_decimation(settings.run.target_faces)
+    require_printing(settings)
     cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)
     if len(cloud) == 0:
         raise EmptyError("there are no points", expected="at least one")
@@ -153,7 +156,8 @@ def reconstruct_points(
     else:
         surface = _surface_of_cloud(cloud, settings, account, progress)
     account.origin(lowest)
-    return _coarser(surface, settings, account, progress)
+    surface = _coarser(surface, settings, account, progress)
+    return _printed(surface, settings, account, progress, unit=settings.run.units)
 
 
 def _begun(settings: Settings, changes: Mapping[str, Any], volume: Volume | None = None) -> Account:
@@ -204,6 +208,18 @@ def _coarser(surface: Surface, settings: Settings, account: Account, progress: P
         check_promise(mesh, cavities=account.cavities)
         account.quality(mesh, surface.points, account.cavities, progress)
     return replace(surface, mesh=mesh, filled=filled, nearest=np.empty(0, np.int32))
+
+
+def _printed(
+    surface: Surface, settings: Settings, account: Account, progress: Progress, *, unit: str = "mm"
+) -> Surface:
+    """Make the part to print, where one is asked for; the surface and what is measured of it stay."""
+    if not settings.printing.asked:
+        return surface
+    with account.timed("print"):
+        part = make_part(surface.mesh, settings, unit=unit, progress=progress)
+    account.printed(lambda: part.report)
+    return replace(surface, part=part)
 
 
 def _surface_of_voxels(found: Boundary, settings: Settings, account: Account, progress: Progress) -> Surface:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .model.networks import SpaceNetwork
     from .model.points import PointSet
     from .model.volume import Volume
+    from .printing.part import Part
     from .segment.sample import Sampling
     from .surface.voxels import Boundary
 
@@ -124,6 +125,8 @@ class Surface:
         Stage one, where the points came from a study.
     filled : (m,) bool array or None
         Faces of `mesh` that lie where a cloud has no points: filled, not measured.
+    part : Part or None
+        What is written in place of `mesh`, where printing was asked for.
     """
 
     points: PointSet
@@ -136,6 +139,7 @@ class Surface:
     told: Callable[[], dict[str, Any]]
     segmentation: Segmentation | None = None
     filled: NDArray[np.bool_] | None = None
+    part: Part | None = None
 
     @cached_property
     def report(self) -> dict[str, Any]:

@@ -43,7 +43,7 @@ def segment_study(
     part, box = crop(volume, settings.part, axis)
     stack = part.along(axis)
     account.study(stack, AXES[axis])
-    account.part(tuple(box[n] for n in order_along(axis)), volume.along(axis).shape)
+    account.cropped(tuple(box[n] for n in order_along(axis)), volume.along(axis).shape)
     if labels is not None:
         labels = _fitting(labels, volume, settings).part(box).along(axis)
     chosen = _chosen(stack, labels, settings, account)

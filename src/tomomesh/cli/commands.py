@@ -197,10 +197,29 @@ def _check(chosen: Namespace) -> None:
     from ..measure.report import assess
 
     other = io.read_mesh(chosen.against) if chosen.against else None
-    report = assess(io.read_mesh(chosen.mesh), against=other)
+    mesh = io.read_mesh(chosen.mesh)
+    report = assess(mesh, against=other)
+    if chosen.print_check:
+        from ..printing.verdict import verdict
+
+        report["print"] = verdict(mesh, settings_of(chosen).printing)
     if chosen.report:
         io.write_document(report, chosen.report)
     print(json.dumps(report, indent=2) if chosen.json else "\n".join(summary.of_check(report)))
+
+
+def _print(chosen: Namespace) -> None:
+    settings = settings_of(chosen)
+    check_outputs(chosen, io.MESH_WRITERS, chosen.mesh)
+    from ..printing.part import make_part
+
+    with Bars(quiet=chosen.quiet) as progress:
+        part = make_part(io.read_mesh(chosen.mesh), settings, unit=settings.run.units, progress=progress)
+        io.write_mesh(part.mesh, chosen.output, unit="mm", frame="unknown")
+    report = {"print": part.report, "settings": settings.to_dict()}
+    if chosen.report:
+        io.write_document(report, chosen.report)
+    _tell(chosen, report, summary.of_part(report["print"], chosen.output))
 
 
 _COMMANDS = {
@@ -211,6 +230,7 @@ _COMMANDS = {
     "network": _network,
     "inspect": _inspect,
     "check": _check,
+    "print": _print,
 }
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 STAGE_ONE = ("read", "part", "window", "network")
-STAGE_TWO = ("cubes", "fit")
+STAGE_TWO = ("cubes", "fit", "printing")
 ALIASES = {"cell_mm": "--cell"}
 """Second spellings: the numbers of a cloud need not be millimeters."""
 TOLD = ("completion", "man")
@@ -45,6 +45,8 @@ SEVERAL = tuple(
 """Options that take one number or three."""
 LISTED = tuple(option_of(entry.name) for _, entry in parameters() if entry.metadata["length"] == LAYERS)
 """Options that take one number, or several with commas between."""
+CUTS = ("scale", "flat_base", "hollow", "drain")
+"""Parameters that change a part."""
 MESH_ONLY = ("local_origin", "target_faces")
 """Parameters of the run that matter to meshes alone."""
 STUDY_ONLY = ("frame",)
@@ -130,6 +132,19 @@ def build_parser() -> argparse.ArgumentParser:
     check.add_argument("--against", metavar="MESH", help="a mesh that it should equal: distances both ways")
     check.add_argument("--report", metavar="FILE.json", help="write the report")
     check.add_argument("--json", action="store_true", help="print the report as JSON")
+    check.add_argument("--print", dest="print_check", action="store_true", help="tell whether it can be printed, too")
+    _add_settings(check, ("printing",), without=(*CUTS, "print_check"), paper=False)
+
+    part = _command(commands, "print", "a closed mesh in, a part to print out: scaled, cut flat, hollowed")
+    part.add_argument("mesh", metavar="MESH", help=CHECKED)
+    part.add_argument("-o", "--output", required=True, metavar="MESH", help=MESH)
+    part.add_argument("--report", metavar="FILE.json", help="write the report")
+    part.add_argument("--json", action="store_true", help="print the report as JSON in place of the summary")
+    part.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    _add_settings(
+        part, ("printing", "run"), without=("seed", "local_origin", "target_faces", "print_check", *STUDY_ONLY),
+        paper=False,
+    )  # fmt: skip
 
     completion = _command(commands, "completion", "the script that completes commands and options in a shell")
     completion.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))

@@ -70,7 +70,9 @@ def check_files(chosen: Namespace, *taken: str) -> None:
 
 
 def check_frame(output: str | Path, settings: Settings) -> None:
-    """Refuse voxel indices in a format of lengths, before any work is done."""
+    """Refuse voxel indices of a part to print and in a format of lengths, before any work is done."""
+    if settings.run.frame == "voxel" and settings.printing.asked:
+        raise UsageError("a part to print has no voxels", found="--frame = voxel", expected="--frame lps or ras")
     if settings.run.frame == "voxel" and suffix_of(output) in LENGTHS:
         raise UsageError(
             "3MF and GIFTI hold lengths, not voxel indices", found=f"--frame = voxel, --output = {output}",
@@ -96,13 +98,18 @@ def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progr
 
 
 def _placed(surface: Surface, output: str | Path, settings: Settings) -> tuple[TriMesh, dict[str, str]]:
-    """Return the mesh in the frame that was asked for, and its unit and frame; GIFTI has a frame of its own."""
-    stage_one = surface.segmentation
+    """Return the mesh, or its part to print, in the frame that was asked for, with its unit and name.
+
+    GIFTI has a frame of its own.
+    """
+    stage_one, part = surface.segmentation, surface.part
+    mesh = surface.mesh if part is None else part.mesh
     if stage_one is None:
-        return surface.mesh, _frame_of_cloud(surface.report, settings)
+        frame_of_cloud = _frame_of_cloud(surface.report, settings)
+        return mesh, frame_of_cloud if part is None else frame_of_part(frame_of_cloud)
     asked = "ras" if suffix_of(output) in RAS_ALONE else settings.run.frame
     frame = io.frame_of_study(asked, stage_one.volume.grid)
-    return frame.mesh(surface.mesh), {"unit": frame.unit, "frame": frame.name}
+    return frame.mesh(mesh), {"unit": frame.unit, "frame": frame.name}
 
 
 def write_points(
@@ -121,6 +128,11 @@ def _frame_of_cloud(report: dict[str, Any], settings: Settings) -> dict[str, str
     """Name unit and frame of a cloud: whatever its numbers are in."""
     corner = ",".join(repr(place).removesuffix(".0") for place in report["points"].get("origin", ()))
     return {"unit": settings.run.units, "frame": f"local:{corner}" if settings.run.local_origin else "unknown"}
+
+
+def frame_of_part(frame: dict[str, str]) -> dict[str, str]:
+    """Name unit and frame of a part of a cloud: its own are not those of its part."""
+    return {"unit": frame["unit"] if frame["unit"] == "unknown" else "mm", "frame": "unknown"}
 
 
 def _write_mask(surface: Surface, path: str | Path, settings: Settings) -> dict[str, Any]:
@@ -143,8 +155,10 @@ def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any
 
     points = surface.points
     kept = {name: values for name, values in points.attributes.items() if io.keeps(output, name)}
-    at_vertices = carry(replace(points, attributes=kept), surface.mesh.vertices)
-    if not io.keeps(output, "filled", on_faces=True):
+    part = surface.part
+    places = surface.mesh.vertices if part is None else part.mesh.vertices / part.per_unit
+    at_vertices = carry(replace(points, attributes=kept), places)
+    if part is not None or not io.keeps(output, "filled", on_faces=True):
         return at_vertices, {}
     filled = surface.filled
     if filled is None and surface.segmentation is not None:

@@ -6,6 +6,8 @@ from typing import Any
 
 from ..measure.topology import FAULTS
 
+WIDTHS = ("thinnest_wall_mm", "thinnest_gap_mm")
+"""Keys of the widths that are told of a part."""
 LARGEST = 3
 """Components that are described one by one."""
 SHOWN = 3
@@ -35,7 +37,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
         lines.append(
             f"mask      {mask['voxels']} voxels inside the mesh, Dice {mask['dice']:.4f} with the {mask['against']}"
         )
-    lines += _ending(report, output)
+    lines += _of_print(report) + _ending(report, output)
     if "truth" in report:
         truth = report["truth"]
         lines.append(
@@ -97,6 +99,7 @@ def of_check(report: dict[str, Any]) -> list[str]:
         f"angles    {report['smallest_angle_deg']:.1f} to {report['largest_angle_deg']:.1f} deg, "
         f"mean of the smallest {report['mean_smallest_angle_deg']:.1f} deg",
         *_parts(report),
+        *_of_print(report),
     ]
     if "mean_mm" in report:
         lines += [
@@ -106,6 +109,28 @@ def of_check(report: dict[str, Any]) -> list[str]:
             f"largest {report['back_max_mm']:.4g}",
         ]
     return lines
+
+
+def of_part(told: dict[str, Any], output: str) -> list[str]:
+    """Say what a part is, and whether it can be printed."""
+    return [*_of_print({"print": told}), f"written   {output}"]
+
+
+def _of_print(report: dict[str, Any]) -> list[str]:
+    """Say whether a mesh can be printed, and why not, where that was asked for."""
+    told = report.get("print")
+    if told is None:
+        return []
+    size = " x ".join(f"{side:.4g}" for side in told["size_mm"])
+    widths = [f"{told[key]:.3g} mm" if told.get(key) is not None else "none found" for key in WIDTHS]
+    verdict = "yes" if told["printable"] else f"no: {'; '.join(told['reasons'])}"
+    return [
+        f"part      {size} mm, {told['volume_mm3'] / 1000:.4g} cm^3 of material, "
+        f"{100 * told['overhang_share']:.3g} % of the surface hangs over",
+        f"          thinnest wall {widths[0]}, narrowest gap {widths[1]}",
+        f"printable {verdict}",
+        *(f"note      {note}" for note in told["notes"]),
+    ]
 
 
 def _parts(report: dict[str, Any]) -> list[str]:

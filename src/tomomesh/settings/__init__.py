@@ -16,6 +16,7 @@ from .fit import FitSettings
 from .network import FALLS, IN_SLICE, IN_SPACE, SURFACES, NetworkSettings
 from .parameter import LAYERS, MANY, UNSET, asked_by, limits_of, option_of
 from .part import PartSettings
+from .printing import PrintSettings
 from .read import ReadSettings
 from .run import RunSettings
 from .window import WindowSettings
@@ -32,6 +33,7 @@ __all__ = [
     "FitSettings",
     "NetworkSettings",
     "PartSettings",
+    "PrintSettings",
     "ReadSettings",
     "RunSettings",
     "Settings",
@@ -54,6 +56,7 @@ class Settings:
     network: NetworkSettings = field(default_factory=NetworkSettings)
     cubes: CubeSettings = field(default_factory=CubeSettings)
     fit: FitSettings = field(default_factory=FitSettings)
+    printing: PrintSettings = field(default_factory=PrintSettings)
     run: RunSettings = field(default_factory=RunSettings)
 
     @classmethod

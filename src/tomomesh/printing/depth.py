@@ -1,0 +1,106 @@
+"""How deep inside of a mesh the nodes of a grid lie, known exactly where it matters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import ndimage
+
+from ..errors import ResourceError
+from ..measure.tree import Tree
+from ..measure.winding import winding_number
+from ..model.columns import box
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.mesh import TriMesh
+    from ..progress import Progress
+
+    Floats = NDArray[np.float64]
+
+STEPS = 3
+"""Nodes along the thickness of a wall."""
+COARSEST = 16
+"""Nodes along the blocks that are looked at first; they are halved four times."""
+MOST_NODES = 100_000_000
+"""Nodes over which a grid is refused: it would take some two gigabytes."""
+
+
+@dataclass(frozen=True)
+class Depth:
+    """Distances from the nodes of a grid to the nearest face.
+
+    Attributes
+    ----------
+    low : (3,) float array
+        The node of number 0.
+    step : float
+        Distance of the nodes.
+    values : (X, Y, Z) float32 array
+        Exact near the distance that was asked for; elsewhere on the right side of it.
+    """
+
+    low: Floats
+    step: float
+    values: NDArray[np.float32]
+
+
+def depth_near(mesh: TriMesh, wall: float, *, threads: int, progress: Progress) -> Depth:
+    """Measure the distance to a mesh on a grid, exactly where it is near the thickness of a wall.
+
+    Blocks of nodes are halved where the distance of their middle does not tell that all lie on one side. So the work
+    follows the area of the surface that is looked for, not the volume.
+
+    Raises
+    ------
+    ResourceError
+        Where the grid would be too large; names the thinnest wall that fits.
+    """
+    lowest, highest = box(mesh.vertices)
+    step = wall / STEPS
+    low = lowest - step
+    shape = np.ceil((highest - lowest) / step / COARSEST + 0.5).astype(np.int64)
+    nodes = float(np.prod(shape.astype(np.float64))) * COARSEST**3
+    if nodes > MOST_NODES:
+        raise ResourceError(
+            "so thin a wall takes too fine a grid",
+            found=f"--hollow = {wall:g}",
+            expected=f"about {wall * (nodes / MOST_NODES) ** (1 / 3):.3g} or more",
+        )
+    tree = Tree.of_faces(mesh, threads=threads)
+    values = np.zeros(tuple(shape), np.float32)
+    kept = np.argwhere(values == 0)
+    side, level, levels = COARSEST, 0, COARSEST.bit_length()
+    while True:
+        middles = low + step * ((kept + 0.5) * side - 0.5)
+        found, _ = tree.nearest(middles, threads=threads)
+        values[tuple(kept.T)] = found
+        level += 1
+        progress("hollow", level, levels + 1)
+        if side == 1:
+            return Depth(low, step, values)
+        reach = step * (np.sqrt(3) / 2 * (side - 1) + 1)
+        kept = kept[np.abs(found - wall) <= reach]
+        kept = (2 * kept[:, None] + np.argwhere(np.ones((2, 2, 2)))).reshape(-1, 3)
+        values, side = values.repeat(2, axis=0).repeat(2, axis=1).repeat(2, axis=2), side // 2
+
+
+def deep_inside(depth: Depth, mesh: TriMesh, wall: float, least: float) -> NDArray[np.bool_]:
+    """Return the nodes inside of a mesh that are deeper than its wall, but for cavities of less volume than `least`.
+
+    Two neighbors, both farther from the surface than half of their distance, lie on the same side of it. So one node
+    tells for all that hang together, by how often the mesh goes around it.
+    """
+    pieces, count = ndimage.label(depth.values > wall)
+    sizes = np.bincount(pieces.ravel(), minlength=count + 1)
+    taken = np.zeros(count + 1, np.bool_)
+    boxes = ndimage.find_objects(pieces)
+    for piece in np.flatnonzero(sizes[1:] * depth.step**3 >= least) + 1:
+        where = boxes[piece - 1]
+        own = np.where(pieces[where] == piece, depth.values[where], -1)
+        deepest = np.unravel_index(int(np.argmax(own)), own.shape) + np.array([part.start for part in where])
+        taken[piece] = winding_number(mesh, depth.low + depth.step * deepest) > 0.5
+    return taken[pieces]

@@ -1,0 +1,102 @@
+"""The part to print, one arrow a line: mesh -> scaled -> cut flat -> hollowed -> drained."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from ..errors import GeometryError, UsageError
+from ..measure.topology import check_promise, topology
+from ..measure.winding import linings
+from ..progress import Progress, silent
+from .base import stood
+from .cavity import hollowed
+from .drains import drained
+from .solids import require_solids
+from .verdict import verdict
+
+if TYPE_CHECKING:
+    from ..model.mesh import TriMesh
+    from ..settings import Settings
+
+MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "unknown": 1.0}
+"""Millimeters in the unit of a cloud."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A mesh to print.
+
+    Attributes
+    ----------
+    mesh : TriMesh
+        In printed millimeters.
+    per_unit : float
+        Printed millimeters in a unit of the object's coordinates.
+    settings : Settings
+    """
+
+    mesh: TriMesh
+    per_unit: float
+    settings: Settings
+
+    @cached_property
+    def report(self) -> dict[str, Any]:
+        """Whether it can be printed, key by key in docs/printing.md; measured on first use."""
+        return verdict(self.mesh, self.settings.printing, threads=self.settings.run.threads)
+
+
+def require_printing(settings: Settings) -> None:
+    """Refuse what cannot be printed, and what needs a package that is not installed.
+
+    Raises
+    ------
+    UsageError
+    """
+    if settings.cubes.open and settings.printing.asked:
+        raise UsageError("a sheet encloses nothing to print", found="--open", expected="a closed surface")
+    require_solids(settings.printing)
+
+
+def make_part(mesh: TriMesh, settings: Settings, *, unit: str = "mm", progress: Progress = silent) -> Part:
+    """Make a part to print of a closed mesh: scale it, cut it flat, hollow it, drain it, as far as asked for.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    settings : Settings
+    unit : {"mm", "cm", "m", "unknown"}
+        Of the mesh's coordinates; those of the part are millimeters.
+    progress : callable
+
+    Returns
+    -------
+    Part
+        What is promised of every mesh that is written holds of its mesh.
+
+    Raises
+    ------
+    GeometryError
+        Where the mesh is not closed, manifold and outward.
+    EmptyError
+        Where nothing is left above the base, or there is no room for a cavity.
+    """
+    require_printing(settings)
+    found = topology(mesh, cavities=linings(mesh))
+    if not found.sound:
+        faults = ", ".join(f"{name} = {count}" for name, count in found.faults.items() if count)
+        raise GeometryError(
+            "the mesh encloses no solid", found=faults, expected="a closed, outward 2-manifold", hint="`tomomesh check`"
+        )
+    asked, threads = settings.printing, settings.run.threads
+    per_unit = asked.scale * MM[unit]
+    made = mesh if per_unit == 1 else mesh.moved(per_unit * mesh.vertices)
+    if asked.flat_base is not None:
+        made = stood(made, asked.flat_base, asked.down)
+    if asked.hollow is not None:
+        made = hollowed(made, asked.hollow, threads=threads, progress=progress)
+    if asked.drain is not None:
+        made = drained(made, asked.drain, asked.down)
+    check_promise(made, cavities=linings(made))
+    return Part(made, per_unit, settings)
