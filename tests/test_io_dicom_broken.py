@@ -85,7 +85,7 @@ class TestBrokenFiles:
             read_volume(folder)
         assert "Secr" not in str(caught.value)
 
-    def test_modality_tables_are_refused(self, tmp_path: Path) -> None:
+    def test_empty_modality_tables_are_refused(self, tmp_path: Path) -> None:
         def edit(data: Dataset, k: int) -> None:
             data.ModalityLUTSequence = Sequence([Dataset()])
 

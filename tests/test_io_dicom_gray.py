@@ -1,4 +1,4 @@
-"""Gray levels of DICOM: scales, signs, overlays, colors, compression."""
+"""Gray levels of DICOM: scales, signs, overlays, colors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pydicom
 import pytest
-from pydicom.uid import JPEGLSLossless, RLELossless
 
 from studies import AFFINES, as_ct, assert_in_place, sampled, set_pixels, setting, write_series
 from tomomesh.errors import FormatError
@@ -96,28 +95,7 @@ class TestGrayLevels:
         volume = read_volume(write_series(tmp_path / "s", colors, AXIAL))
         np.testing.assert_array_equal(volume.voxels, colors)
 
-    def test_palette_color_is_refused(self, tmp_path: Path) -> None:
+    def test_palette_color_without_a_palette_is_refused(self, tmp_path: Path) -> None:
         write_series(tmp_path / "s", STORED, AXIAL, setting(PhotometricInterpretation="PALETTE COLOR"))
         with pytest.raises(FormatError, match="PALETTE COLOR"):
             read_volume(tmp_path / "s")
-
-
-class TestCompression:
-    def test_run_lengths_are_decoded(self, tmp_path: Path) -> None:
-        for path in write_series(tmp_path / "s", STORED, AXIAL).iterdir():
-            data = pydicom.dcmread(path)
-            data.compress(RLELossless, generate_instance_uid=False)
-            data.save_as(path)
-        assert_in_place(read_volume(tmp_path / "s"))
-
-    def test_what_cannot_be_decoded_names_the_package(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        from pydicom.pixels.decoders import base
-
-        def edit(data: Dataset, k: int) -> None:
-            data.PixelData = pydicom.encaps.encapsulate([b"\xff\xd8\xff\xf7" + bytes(20)])
-            data["PixelData"].VR, data["PixelData"].is_undefined_length = "OB", True
-            data.file_meta.TransferSyntaxUID = JPEGLSLossless
-
-        monkeypatch.setattr(base.Decoder, "is_available", False)
-        with pytest.raises(FormatError, match=r"JPEG-LS.*python-gdcm"):
-            read_volume(write_series(tmp_path / "s", STORED, AXIAL, edit))

@@ -10,6 +10,7 @@ from ...model.volume import Volume
 from ..source import counted
 from .bad import leave_out
 from .files import read_frames
+from .pixels import Decoder
 from .series import choose, stacks_among
 from .stack import Stack, stacked
 from .voxels import Gray, gray
@@ -49,8 +50,15 @@ def read_dicom(files: list[Path], settings: ReadSettings, *, study: str, others:
     ResourceError
         Where the voxels do not fit into the memory.
     """
+    with Decoder() as decode:
+        for frame in read_frames(files[:1]).frames[:1]:
+            decode.expect(frame)
+        return _read(files, settings, study, others or Counter(), decode)
+
+
+def _read(files: list[Path], settings: ReadSettings, study: str, others: Counter[str], decode: Decoder) -> Volume:
     reading = read_frames(files)
-    passed = (others or Counter()) + reading.others
+    passed = others + reading.others
     good = len({frame.path for frame in reading.frames})
     broken = leave_out(reading.bad, good, skip=settings.skip_bad, study=study)
     if not good:
@@ -62,7 +70,7 @@ def read_dicom(files: list[Path], settings: ReadSettings, *, study: str, others:
         )
     left = (f"left out: {counted(passed)}",) if passed else ()
     choice = choose(reading.frames, settings.series, folder=study)
-    stack, levels, without = _decoded(choice.frames, settings, study)
+    stack, levels, without = _decoded(choice.frames, decode, settings, study)
     header = choice.frames[0].header
     inverted = header.get("PhotometricInterpretation") == "MONOCHROME1"
     unit = "HU" if header.get("Modality") == "CT" else "stored"
@@ -76,7 +84,9 @@ def list_stacks(files: list[Path]) -> list[int]:
     return stacks_among(read_frames(files).frames)
 
 
-def _decoded(frames: list[Frame], settings: ReadSettings, study: str) -> tuple[Stack, Gray, tuple[str, ...]]:
+def _decoded(
+    frames: list[Frame], decode: Decoder, settings: ReadSettings, study: str
+) -> tuple[Stack, Gray, tuple[str, ...]]:
     """Stack and decode slices; those whose pixels turn out to be broken are refused, or left out and the rest stacked.
 
     What is left must be a regular stack by itself.
@@ -84,7 +94,7 @@ def _decoded(frames: list[Frame], settings: ReadSettings, study: str) -> tuple[S
     notes: tuple[str, ...] = ()
     while True:
         stack = stacked(frames, settings, study=study)
-        levels = gray(stack, study=study)
+        levels = gray(stack, decode, study=study)
         if not levels.bad:
             return stack, levels, notes
         frames = [frame for frame in frames if frame.path not in levels.bad]

@@ -10,7 +10,6 @@ import numpy as np
 from ...errors import FormatError, GeometryError, TomomeshError, UnreadableError
 from ..gray import native, scaled, scaled_dtype, without_holes
 from ..limits import require_memory
-from .pixels import Decoder
 from .telling import difference
 
 if TYPE_CHECKING:
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .header import Frame
+    from .pixels import Decoder
     from .stack import Stack
 
 
@@ -31,7 +31,7 @@ class Gray:
     bad: dict[Path, TomomeshError]
 
 
-def gray(stack: Stack, *, study: str) -> Gray:
+def gray(stack: Stack, decode: Decoder, *, study: str) -> Gray:
     """Decode the slices of a stack, and interpolate those between its places.
 
     Raises
@@ -43,7 +43,7 @@ def gray(stack: Stack, *, study: str) -> Gray:
     ResourceError
         Where the voxels do not fit into the memory.
     """
-    slices = _Slices(stack, study)
+    slices = _Slices(stack, decode, study)
     voxels, before = np.empty(0), None
     for level, place in zip(stack.levels, stack.places, strict=True):
         here = slices.at(place)
@@ -65,8 +65,8 @@ def gray(stack: Stack, *, study: str) -> Gray:
 class _Slices:
     """Decoded slices in one type of number, and what was wrong with the others."""
 
-    def __init__(self, stack: Stack, study: str) -> None:
-        self._decode, self._study = Decoder(), study
+    def __init__(self, stack: Stack, decode: Decoder, study: str) -> None:
+        self._decode, self._study = decode, study
         self._count = int(stack.levels[-1]) + 1
         self._frames = [frame for place in stack.places for frame in place]
         self._kind: tuple[Any, ...] = ()

@@ -1,0 +1,71 @@
+"""Files that are packed as a whole (Deflated Explicit VR): pydicom unpacks them at once, whatever they hold."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from typing import TYPE_CHECKING, BinaryIO
+
+from ...errors import FormatError, ResourceError
+from .element import ELEMENTS, WIDE, Element
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+DEFLATED = "1.2.840.10008.1.2.1.99"
+
+LARGEST_BYTES = 2**30
+"""A packed file that holds more is taken for a bomb."""
+
+CHUNK = 2**20
+
+
+def check_deflated(file: BinaryIO, *, name: str) -> None:
+    """Refuse a packed file that holds too much; leave any file at its start.
+
+    Raises
+    ------
+    ResourceError
+        Where it holds more than `LARGEST_BYTES`.
+    """
+    if _is_deflated(file):
+        unpacker, total = zlib.decompressobj(-zlib.MAX_WBITS), 0
+        while packed := unpacker.unconsumed_tail or file.read(CHUNK):
+            total += len(unpacker.decompress(packed, CHUNK))
+            if total > LARGEST_BYTES:
+                raise ResourceError(
+                    "the packed file holds too much", file=name, expected=f"at most {LARGEST_BYTES} bytes"
+                )
+    file.seek(0)
+
+
+def _is_deflated(file: BinaryIO) -> bool:
+    """Look for the transfer syntax among the elements of group 2, and stop behind them."""
+    found = False
+    file.seek(132 if file.read(132)[128:] == b"DICM" else 0)
+    while len(head := file.read(8)) == 8:
+        group, number, kind, length = struct.unpack("<HH2sH", head)
+        if group != 2:
+            file.seek(-8, io.SEEK_CUR)
+            break
+        if kind in WIDE:
+            (length,) = struct.unpack("<I", file.read(4).ljust(4, b"\0"))
+        elif not kind.isalpha():
+            (length,) = struct.unpack("<I", head[4:])
+        end = file.tell() + length
+        found |= number == 0x10 and file.read(min(length, 64)).rstrip(b"\0 ") == DEFLATED.encode()
+        file.seek(end)
+    return found
+
+
+def inflated(path: Path) -> tuple[BinaryIO, Element]:
+    """Return the pixels of a packed file, and where they stand."""
+    import pydicom
+
+    data = pydicom.dcmread(path, force=True)
+    for keyword in ELEMENTS.values():
+        if keyword in data:
+            value = data[keyword].value
+            return io.BytesIO(value), Element(keyword, "OW", 0, len(value), encapsulated=False)
+    raise FormatError("the file holds no pixels", file=path.name, found="PixelData = missing", hint="a fresh copy")
