@@ -113,6 +113,10 @@ class Account:
         names = ("slices", "rows", "columns")
         self._sections["study"]["part"] = dict(zip(names, kept, strict=True)) if cropped else None
 
+    def notes(self, notes: tuple[str, ...]) -> None:
+        """Note what was decided on a label map beside the study."""
+        self._sections["study"]["notes"] += notes
+
     def window(self, chosen: Chosen) -> None:
         """Note what the window kept, the limits of its layers, and the components that were left out."""
         asked, mask, layers = self._settings.window, chosen.mask, chosen.volume.layers
