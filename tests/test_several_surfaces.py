@@ -22,8 +22,8 @@ from tomomesh.model.contours import SIDES
 from tomomesh.model.mesh import TriMesh
 from tomomesh.model.points import RING, SIDE, TRACK
 from tomomesh.model.volume import Volume
+from tomomesh.surface.known import known_slices
 from tomomesh.surface.rings import nested
-from tomomesh.surface.slices import known_slices
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -106,7 +106,7 @@ def build_parser() -> argparse.ArgumentParser:
     stage_two.add_argument("-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format")
     _add_streams(stage_two, CLOUD_FORMATS, MESH_FORMATS, usual="xyz")
     _add_outputs(stage_two, "figures")
-    _add_settings(stage_two, (*STAGE_TWO, "run"), without=STUDY_ONLY)
+    _add_settings(stage_two, ("cloud", *STAGE_TWO, "run"), without=STUDY_ONLY)
 
     network = _command(commands, "network", "one network on a test region or a picture, as the paper's Fig. 1 and 2")
     network.add_argument("region", metavar="REGION", help="square, triangle, cube, or one picture (PNG or TIFF)")
@@ -284,7 +284,7 @@ def _metavar(name: str, meta: Any) -> Any:
     if meta["length"] in (MANY, LAYERS):
         return "N[,N...]" if meta["length"] == MANY else "X[,X...]"
     if meta["length"] in ((), (1, 3)):
-        return "X [Y Z]" if meta["length"] else {int: "N", float: "X"}[meta["kind"]]
+        return "X [Y Z]" if meta["length"] else {int: "N", float: "X", str: "NAME"}[meta["kind"]]
     if meta["metavar"]:
         return meta["metavar"]
     return (

@@ -119,8 +119,10 @@ def write_points(
 
 def _frame_of_cloud(report: dict[str, Any], settings: Settings) -> dict[str, str]:
     """Name unit and frame of a cloud: whatever its numbers are in."""
-    corner = ",".join(repr(place).removesuffix(".0") for place in report["points"].get("origin", ()))
-    return {"unit": settings.run.units, "frame": f"local:{corner}" if settings.run.local_origin else "unknown"}
+    points = report["points"]
+    corner = ",".join(repr(place).removesuffix(".0") for place in points.get("origin", ()))
+    frame = points.get("frame", "unknown")
+    return {"unit": points["unit"], "frame": f"local:{corner}" if settings.run.local_origin else frame}
 
 
 def _write_mask(surface: Surface, path: str | Path, settings: Settings) -> dict[str, Any]:
