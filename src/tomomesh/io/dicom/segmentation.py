@@ -158,12 +158,12 @@ def _paint(
 ) -> tuple[str, ...]:
     """Lay segment over segment, the largest first; return notes on what was decided."""
     wanted = np.flatnonzero(np.isin(found.segments, found.segments if select is None else select))
-    size: Counter[int] = Counter()
-    for n, mask in _masks(found, wanted):
+    decode, size = Decoder(), Counter[int]()
+    for n, mask in _masks(found, wanted.tolist(), decode):
         size[int(found.segments[n])] += int(np.count_nonzero(mask))
     order = sorted(wanted.tolist(), key=lambda n: (-size[int(found.segments[n])], int(found.segments[n])))
     overlaps: Counter[tuple[int, int]] = Counter()
-    for n, mask in _masks(found, order):
+    for n, mask in _masks(found, order, decode):
         plane, number = voxels[levels[n]], int(found.segments[n])
         under, counts = np.unique(plane[mask], return_counts=True)
         overlaps.update({(u, number): c for u, c in zip(under.tolist(), counts.tolist(), strict=True)})
@@ -183,11 +183,10 @@ def _paint(
     return _told(shared, found.labels)
 
 
-def _masks(found: Segmentation, order: Sequence[int] | NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.bool_]]]:
+def _masks(found: Segmentation, order: list[int], decode: Decoder) -> Iterator[tuple[int, NDArray[np.bool_]]]:
     """Yield frames by their numbers, with the pixels that belong to their segments."""
-    decode = Decoder()
     for n in order:
-        yield int(n), decode(found.frames[n]) >= (found.full + 1) // 2
+        yield n, decode(found.frames[n]) >= (found.full + 1) // 2
 
 
 def _told(shared: dict[tuple[int, int], int], labels: dict[int, str]) -> tuple[str, ...]:
