@@ -187,7 +187,8 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--labels-in",
         metavar="FILE",
-        help="a label map on the study's grid or a part of it (a DICOM segmentation too), or alone: its labels of --select are the window",
+        help="a label map or a DICOM segmentation on the study's grid or a part of it, or alone: "
+        "its labels of --select are the window",
     )
 
 
