@@ -99,11 +99,12 @@ def read_structure(path: Path, settings: CloudSettings) -> PointSet:
         corners = corners_of(taken.contours, where=where, file=path.name, skip_flat=settings.skip_flat)
     planes = planes_of(corners, file=str(path))
     points = _points(corners, planes.labels, float(np.median(np.diff(planes.heights))), file=str(path))
-    note = f"structure {taken} of {len(structures)}, {len(corners)} contours on {len(planes.heights)} slices"
-    left = (f"contours that are not closed, left out: {counted(taken.others)}",) if taken.others else ()
-    flat = len(taken.contours) - len(corners)
-    left += (f"contours that enclose nothing, left out: {flat}",) if flat else ()
-    return replace(points, frame="LPS", notes=(note, *left))
+    notes = [f"structure {taken} of {len(structures)}, {len(corners)} contours on {len(planes.heights)} slices"]
+    if taken.others:
+        notes.append(f"contours that are not closed, left out: {counted(taken.others)}")
+    if flat := len(taken.contours) - len(corners):
+        notes.append(f"contours that enclose nothing, left out: {flat}")
+    return replace(points, frame="LPS", notes=tuple(notes))
 
 
 def _listed(path: Path) -> list[Structure]:
