@@ -57,8 +57,9 @@ class TestHelp:
         assert all(name in text for name in (COMMANDS if arguments == ["--help"] else ["usage"]))
 
     def test_every_parameter_has_an_option_with_unit_and_default(self, capsys: CaptureFixture[str]) -> None:
-        with pytest.raises(SystemExit):
-            main(["reconstruct", "--help"])
+        for command in ("reconstruct", "surface"):
+            with pytest.raises(SystemExit):
+                main([command, "--help"])
         text = " ".join(capsys.readouterr().out.split())
         for _, entry in parameters():
             assert option_of(entry.name) in text or option_of(f"no_{entry.name}") in text

@@ -19,8 +19,9 @@ from tomomesh.model.points import PointSet
 from tomomesh.surface.between import ENDS
 from tomomesh.surface.contours import ContourSurface, contour_surface
 from tomomesh.surface.curves import fine_curve, moments_of
+from tomomesh.surface.known import known_slices
 from tomomesh.surface.rings import outline
-from tomomesh.surface.slices import find_slices, known_slices
+from tomomesh.surface.slices import find_slices
 from tomomesh.surface.tracks import Part, link_slices
 
 if TYPE_CHECKING:

@@ -22,8 +22,8 @@ from tomomesh.model.contours import SIDES
 from tomomesh.model.mesh import TriMesh
 from tomomesh.model.points import RING, SIDE, TRACK
 from tomomesh.model.volume import Volume
+from tomomesh.surface.known import known_slices
 from tomomesh.surface.rings import nested
-from tomomesh.surface.slices import known_slices
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -286,10 +286,10 @@ class TestLabels:
         with pytest.raises(EmptyError, match=r"no such label.*7, 9.*0, 4, 515, 516"):
             segment(self.volume(), select=(4, 9, 7))
         with pytest.raises(GeometryError, match="do not fit"):
-            segment(study(np.ones((15, 64, 72), bool)), labels=self.volume(), select=(4,))
+            segment(study(np.ones(SHAPE, bool)), labels=self.volume(np.diag([1.0, 1.0, 4.0, 1.0])), select=(4,))
         moved = np.diag([*SPACING, 1.0])
-        moved[0, 3] = 5
-        with pytest.raises(GeometryError, match=r"corners 5 mm apart"):
+        moved[0, 3] = 5.5 * SPACING[0]
+        with pytest.raises(GeometryError, match=r"mm off its voxels"):
             segment(study(np.ones(SHAPE, bool)), labels=self.volume(moved), select=(4,))
         with pytest.raises(UsageError, match="no label was chosen"):
             segment(study(shell()), labels=self.volume())
@@ -320,8 +320,8 @@ class TestCommandLine:
         labels = TestLabels().labels()
         write_nifti(tmp_path / "labels.nii", labels, affine)
         write_nifti(tmp_path / "gray.nii", (labels > 0).astype(np.int16) * 100, affine)
-        write_nifti(tmp_path / "small.nii", labels[1:], affine)
-        return {name: str(tmp_path / f"{name}.nii") for name in ("labels", "gray", "small")}
+        write_nifti(tmp_path / "thick.nii", labels, affine @ np.diag([1.0, 1.0, 1.5, 1.0]))
+        return {name: str(tmp_path / f"{name}.nii") for name in ("labels", "gray", "thick")}
 
     def test_labels_become_a_surface(self, files: dict[str, str], tmp_path: Path, capsys: CaptureFixture[str]) -> None:
         one, two, report = (str(tmp_path / name) for name in ("one.ply", "two.ply", "report.json"))
@@ -363,7 +363,7 @@ class TestCommandLine:
         assert "two windows" in fails([*line, "--select", "4", "--lower", "3"], 2, capsys)
         assert "--contours" in fails([*line, "--select", "4", "--contours", "all"], 2, capsys)
         assert "rings" in fails([*line, "--select", "4", "--contours", "loops", "--network", "grid"], 2, capsys)
-        beside = ["reconstruct", files["small"], "--labels-in", files["labels"], "--select", "4", "-o", mesh]
+        beside = ["reconstruct", files["thick"], "--labels-in", files["labels"], "--select", "4", "-o", mesh]
         assert "16" in fails(beside, 5, capsys)
         missing = ["reconstruct", files["gray"], "--labels-in", "nowhere.nii", "--select", "4", "-o", mesh]
         assert "nowhere.nii" in fails(missing, 3, capsys)

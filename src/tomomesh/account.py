@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from .surface.drape import Draped
     from .surface.holding import Held
     from .surface.samples import Samples
+    from .surface.slices import Slices
     from .surface.voxels import Boundary, VoxelSurface
 
 SECTIONS = (
@@ -62,6 +63,8 @@ FAR = 2.0
 """Distance of the surface from one point in twenty, slice distances, from which a result is warned of."""
 FILLED = 0.05
 """Share of filled faces over which a result is warned of."""
+APART = 1.5
+"""Distance of two slices of a stack of contours, in median ones, over which a result is warned of."""
 PACKAGES = ("tomomesh", "numpy", "scipy", "numba")
 
 
@@ -113,6 +116,10 @@ class Account:
         cropped = kept != [[0, size - 1] for size in sizes]
         names = ("slices", "rows", "columns")
         self._sections["study"]["part"] = dict(zip(names, kept, strict=True)) if cropped else None
+
+    def notes(self, notes: tuple[str, ...]) -> None:
+        """Note what was decided on a label map beside the study."""
+        self._sections["study"]["notes"] += notes
 
     def window(self, chosen: Chosen) -> None:
         """Note what the window kept, the limits of its layers, and the components that were left out."""
@@ -264,9 +271,10 @@ class Account:
         """The surfaces taken that line a cavity."""
         return int(self._sections["surface"]["cavities"])
 
-    def origin(self, lowest: NDArray[np.float64]) -> None:
-        """Note where the lowest corner of a cloud is."""
-        self._sections["points"]["origin"] = lowest.tolist()
+    def cloud(self, cloud: PointSet, lowest: NDArray[np.float64]) -> None:
+        """Note where the lowest corner of a cloud is, and what its reader says of it."""
+        known = {"origin": lowest.tolist(), "frame": cloud.frame, "notes": list(cloud.notes)}
+        self._sections["points"] |= known
 
     def samples(self, count: int, samples: Samples) -> None:
         """Note how far apart the points of a cloud are, how noisy, and how many are strays."""
@@ -371,18 +379,22 @@ class Account:
         elif rest.steps and not rest.converged:
             self.warn(f"the mesh had not come to rest after {rest.steps} steps")
 
-    def stack(self, made: ContourSurface, distance: float) -> None:
+    def stack(self, made: ContourSurface, slices: Slices) -> None:
         """Note the slices of a stack of contours, and the voxels between them."""
+        widest = float(np.diff(slices.heights).max())
         self._sections["stack"] = {
             "slices": made.slices,
             "contours": made.contours,
             "open": made.open,
-            "slice_distance_mm": distance,
+            "slice_distance_mm": slices.distance,
+            "widest_slice_distance_mm": widest,
             "longest_gap": made.reach,
             "voxel_mm": made.edge,
             "voxels": made.voxels,
         }
         self._sections["fit"]["filled_faces"] = int(made.filled.sum())
+        if "study" not in self._sections and widest > APART * slices.distance:
+            self.warn(f"slices lie up to {widest:.4g} apart, {slices.distance:.4g} as a rule: that is interpolated")
         if made.edge > made.asked_edge:
             self.warn(f"voxels of {made.asked_edge:.4g} would not fit: they are {made.edge:.4g} wide")
 

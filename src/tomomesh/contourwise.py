@@ -11,7 +11,8 @@ from .segment.contours.train import train_contours
 from .segment.sample import sample_contours
 from .segment.study import regions
 from .surface.contours import contour_surface
-from .surface.slices import find_slices, known_slices
+from .surface.known import known_slices
+from .surface.slices import find_slices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -80,5 +81,5 @@ def surface_of_contours(
         )  # fmt: skip
     account.points(cloud, slices.spacing, bridged)
     account.boundary(made.boundary, made.rest)
-    account.stack(made, slices.distance)
+    account.stack(made, slices)
     return made

@@ -141,6 +141,8 @@ def reconstruct_points(
     if len(cloud) == 0:
         raise EmptyError("there are no points", expected="at least one")
     lowest, _ = box(cloud.positions)
+    if cloud.frame == "LPS":
+        settings = settings.replace(units="mm")
     if settings.run.local_origin:
         cloud = replace(cloud, positions=cloud.positions - lowest)
     account = _begun(settings, changes)
@@ -155,7 +157,7 @@ def reconstruct_points(
         surface = surface_of_networks(cloud, spacing, settings, account, progress)
     else:
         surface = _surface_of_cloud(cloud, settings, account, progress)
-    account.origin(lowest)
+    account.cloud(cloud, lowest)
     surface = _coarser(surface, settings, account, progress)
     return _printed(surface, settings, account, progress, unit=settings.run.units)
 

@@ -13,8 +13,9 @@ from .results import NO_NETWORKS, Segmentation
 from .segment.chosen import Chosen, choose
 from .segment.contours.looks import share_of_holes, slices_with_several
 from .segment.crop import crop, inside_roi
+from .segment.grid import onto_grid
 from .segment.sample import sample
-from .segment.select import doubted, require_same_grid
+from .segment.select import doubted
 from .segment.study import regions, train_study
 from .segment.window import by_layer
 from .spacewise import segment_in_space
@@ -46,6 +47,7 @@ def segment_study(
     account.cropped(tuple(box[n] for n in order_along(axis)), volume.along(axis).shape)
     if labels is not None:
         labels = _fitting(labels, volume, settings).part(box).along(axis)
+        account.notes(labels.notes)
     chosen = _chosen(stack, labels, settings, account)
     mask = chosen.mask
     if settings.network.network == "none":
@@ -71,11 +73,10 @@ def segment_study(
 
 
 def _fitting(labels: Volume, volume: Volume, settings: Settings) -> Volume:
-    """Refuse a label map of which no label is asked for, or on another grid."""
+    """Lay a label map onto the study's grid; refuse one of which no label is asked for."""
     if settings.window.select is None:
         raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
-    require_same_grid(labels, volume)
-    return labels
+    return onto_grid(labels, volume)
 
 
 def _chosen(stack: Volume, labels: Volume | None, settings: Settings, account: Account) -> Chosen:

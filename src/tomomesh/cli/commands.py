@@ -128,7 +128,7 @@ def _surface(chosen: Namespace) -> None:
 
     with Bars(quiet=chosen.quiet) as progress:
         progress("read", 0, 1)
-        points = io.read_points(chosen.cloud)
+        points = io.read_points(chosen.cloud, settings=settings.cloud)
         progress("read", 1, 1)
         surface = reconstruct_points(points, settings, progress=progress, **given_of(chosen))
         write_surface(chosen, surface, settings, progress)

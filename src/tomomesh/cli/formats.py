@@ -31,4 +31,6 @@ STUDY = (
     f"a file ({either(STUDY_FORMATS + HEADER_FORMATS)}), a folder of DICOM slices, "
     "or a folder of PNG, TIFF or JPEG slices (with --spacing)"
 )
-CLOUD = f"an unoriented cloud ({either(CLOUD_FORMATS)}); of meshes the vertices"
+CLOUD = (
+    f"an unoriented cloud ({either(CLOUD_FORMATS)}); of meshes the vertices, of a DICOM RT Structure Set the contours"
+)

@@ -108,7 +108,7 @@ def build_parser() -> argparse.ArgumentParser:
     stage_two.add_argument("-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format")
     _add_streams(stage_two, CLOUD_FORMATS, MESH_FORMATS, usual="xyz")
     _add_outputs(stage_two, "figures")
-    _add_settings(stage_two, (*STAGE_TWO, "run"), without=STUDY_ONLY)
+    _add_settings(stage_two, ("cloud", *STAGE_TWO, "run"), without=STUDY_ONLY)
 
     network = _command(commands, "network", "one network on a test region or a picture, as the paper's Fig. 1 and 2")
     network.add_argument("region", metavar="REGION", help="square, triangle, cube, or one picture (PNG or TIFF)")
@@ -202,7 +202,8 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--labels-in",
         metavar="FILE",
-        help="a label map on the study's grid, or alone: its labels of --select are the window",
+        help="a label map or a DICOM segmentation on the study's grid or a part of it, or alone: "
+        "its labels of --select are the window",
     )
 
 
@@ -299,7 +300,7 @@ def _metavar(name: str, meta: Any) -> Any:
     if meta["length"] in (MANY, LAYERS):
         return "N[,N...]" if meta["length"] == MANY else "X[,X...]"
     if meta["length"] in ((), (1, 3)):
-        return "X [Y Z]" if meta["length"] else {int: "N", float: "X"}[meta["kind"]]
+        return "X [Y Z]" if meta["length"] else {int: "N", float: "X", str: "NAME"}[meta["kind"]]
     if meta["metavar"]:
         return meta["metavar"]
     return (

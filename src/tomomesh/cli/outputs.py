@@ -126,13 +126,16 @@ def write_points(
 
 def _frame_of_cloud(report: dict[str, Any], settings: Settings) -> dict[str, str]:
     """Name unit and frame of a cloud: whatever its numbers are in."""
-    corner = ",".join(repr(place).removesuffix(".0") for place in report["points"].get("origin", ()))
-    return {"unit": settings.run.units, "frame": f"local:{corner}" if settings.run.local_origin else "unknown"}
+    points = report["points"]
+    corner = ",".join(repr(place).removesuffix(".0") for place in points.get("origin", ()))
+    frame = points.get("frame", "unknown")
+    return {"unit": points["unit"], "frame": f"local:{corner}" if settings.run.local_origin else frame}
 
 
 def frame_of_part(frame: dict[str, str]) -> dict[str, str]:
-    """Name unit and frame of a part of a cloud: its own are not those of its part."""
-    return {"unit": frame["unit"] if frame["unit"] == "unknown" else "mm", "frame": "unknown"}
+    """Name unit and frame of a part of a cloud, whose own are not those of its part, but for a patient's."""
+    unit = frame["unit"] if frame["unit"] == "unknown" else "mm"
+    return {"unit": unit, "frame": frame["frame"] if frame["frame"] == "LPS" else "unknown"}
 
 
 def _write_mask(surface: Surface, path: str | Path, settings: Settings) -> dict[str, Any]:

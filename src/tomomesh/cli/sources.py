@@ -31,7 +31,8 @@ def read_study(chosen: Namespace, settings: Settings, progress: Bars) -> tuple[V
     """Read the study, and the label map where there is one beside it."""
     total = 2 if chosen.study and chosen.labels_in else 1
     progress("read", 0, total)
-    volume = io.read_volume(chosen.study or chosen.labels_in, settings=settings.read)
-    labels = io.read_volume(chosen.labels_in, settings=settings.read) if total == 2 else None
+    select = settings.window.select
+    volume = io.read_volume(chosen.study or chosen.labels_in, settings=settings.read, select=select)
+    labels = io.read_volume(chosen.labels_in, settings=settings.read, select=select) if total == 2 else None
     progress("read", total, total)
     return volume, labels

@@ -267,6 +267,6 @@ def _edges(cell: list[float]) -> str:
 
 def _ending(report: dict[str, Any], output: str) -> list[str]:
     warnings = [f"warning   {warning}" for warning in report["warnings"]]
-    notes = report.get("study", {}).get("notes", [])
+    notes = report.get("study", report["points"]).get("notes", [])
     told = [f"note      {'; '.join(notes)}"] if notes else []
     return [*told, *warnings[:SHOWN], f"written   {output}, computed in {report['timings']['total_s']:.2f} s"]

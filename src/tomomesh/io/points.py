@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import EmptyError
+from ..settings import CloudSettings
 from .arrays import read_npy, read_npz, write_npy
 from .atomic import check_output
 from .delimited import read_obj, read_text, write_csv, write_xyz
+from .dicom import is_dicom
+from .dicom.structures import read_structure
 from .e57 import read_e57
 from .fields import AXES, IDS, flat_columns, point_set
 from .finite import check_finite
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
     from .fields import Cloud, Fields
 
 
-def read_points(path: str | Path) -> PointSet:
+def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> PointSet:
     """Read a cloud.
 
     Parameters
@@ -40,7 +43,10 @@ def read_points(path: str | Path) -> PointSet:
         ``.ply`` (text or binary); ``.xyz``, ``.txt`` or ``.csv`` (the columns named x, y and z, else the first
         three); ``.npy`` with an (n, 3) array or named fields; ``.npz`` with ``points`` or the like; ``.pcd``;
         ``.las``, ``.laz`` and ``.e57`` (with the extra ``clouds``); or the vertices of ``.obj``, ``.off`` and
-        ``.stl`` (its equal positions become one vertex).
+        ``.stl`` (its equal positions become one vertex); or a DICOM RT Structure Set, of which one structure's
+        contours are taken.
+    settings : CloudSettings, optional
+        What to do where the file leaves a choice.
 
     Returns
     -------
@@ -56,12 +62,16 @@ def read_points(path: str | Path) -> PointSet:
     FormatError
         For text, NaN, ragged rows (it names the row), a count that lies, unknown suffixes, and a format whose
         package is not installed.
+    GeometryError
+        Where a structure must be chosen, or its contours are no stack.
     EmptyError
         For a file without points.
     ResourceError
         For a file that would not fit into the memory.
     """
     path = existing_file(path)
+    if suffix_of(path) not in POINT_READERS and is_dicom(path):
+        return read_structure(path, settings or CloudSettings())
     positions, fields = reader_of(path, POINT_READERS)(path)
     if len(positions) == 0:
         raise EmptyError("the cloud has no points", file=str(path))

@@ -9,6 +9,8 @@ from ..errors import FormatError, UnreadableError
 from ..settings import ReadSettings
 from .archive import unpacked_zip
 from .dicom import dicom_among, index_in, is_dicom, is_index, read_dicom, read_index
+from .dicom.kinds import STRUCTURES, is_segmentation, storage_class
+from .dicom.segmentation import read_segmentation
 from .freesurfer import read_mgh
 from .images import FAMILIES, read_images
 from .metaimage import read_metaimage
@@ -19,23 +21,32 @@ from .source import counted, existing, existing_file, regular_files, suffix_of
 from .tiff import read_tiff
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from ..model.volume import Volume
 
 
-def _read_one_dicom(path: Path, settings: ReadSettings) -> Volume:
+def _read_one_dicom(path: Path, settings: ReadSettings, select: Sequence[int] | None = None) -> Volume:
+    if storage_class(path) == STRUCTURES:
+        raise FormatError(
+            "the file holds contours, no voxels",
+            file=str(path),
+            found="an RT Structure Set",
+            hint="tomomesh surface, which takes one of its structures",
+        )
+    if is_segmentation(path):
+        return read_segmentation(path, settings, study=str(path), select=select)
     return read_dicom([path], settings, study=str(path))
 
 
-def _read_zip(path: Path, settings: ReadSettings) -> Volume:
+def _read_zip(path: Path, settings: ReadSettings, select: Sequence[int] | None = None) -> Volume:
     """Read the slices in an archive, or the only volume; archives inside it are not opened."""
     with unpacked_zip(path) as folder:
         files, _ = regular_files(folder, deep=True)
         whole = [file for file in files if suffix_of(file) in VOLUME_READERS.keys() - {".zip"}]
         one = len(whole) == 1 and not any(map(is_dicom, files))
-        return read_volume(whole[0] if one else folder, settings=settings)
+        return read_volume(whole[0] if one else folder, settings=settings, select=select)
 
 
 VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
@@ -61,7 +72,9 @@ READABLE = "a folder of DICOM, PNG, TIFF or JPEG slices, a DICOM file, " + " | "
 )
 
 
-def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Volume:
+def read_volume(
+    path: str | Path, *, settings: ReadSettings | None = None, select: Sequence[int] | None = None
+) -> Volume:
     """Read a study.
 
     Parameters
@@ -71,6 +84,9 @@ def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Vo
         slices, a DICOMDIR, or a zip file of one of these.
     settings : ReadSettings, optional
         What to do where the files leave a choice.
+    select : sequence of int, optional
+        The labels that are wanted. Of a DICOM segmentation, whose segments may overlap, only these are read; any other
+        label map is read whole.
 
     Returns
     -------
@@ -93,13 +109,15 @@ def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Vo
     """
     path, settings = existing(path), settings or ReadSettings()
     if path.is_dir():
-        return _read_folder(path, settings)
+        return _read_folder(path, settings, select)
     existing_file(path)
     if is_index(path):
         return read_index(path, settings, study=str(path))
     reader = VOLUME_READERS.get(suffix_of(path))
-    if reader is None and is_dicom(path):
-        reader = _read_one_dicom
+    if reader is _read_one_dicom or (reader is None and is_dicom(path)):
+        return _read_one_dicom(path, settings, select)
+    if reader is _read_zip:
+        return _read_zip(path, settings, select)
     if reader is None:
         raise FormatError(
             "the file is of an unknown kind",
@@ -111,7 +129,7 @@ def read_volume(path: str | Path, *, settings: ReadSettings | None = None) -> Vo
     return reader(path, settings)
 
 
-def _read_folder(folder: Path, settings: ReadSettings) -> Volume:
+def _read_folder(folder: Path, settings: ReadSettings, select: Sequence[int] | None) -> Volume:
     """Read what its DICOMDIR names, all DICOM below it, or its images; where it holds none, those of sub-folders."""
     if (index := index_in(folder)) is not None:
         return read_index(index, settings, study=str(folder))
@@ -119,7 +137,7 @@ def _read_folder(folder: Path, settings: ReadSettings) -> Volume:
         files, others = regular_files(folder, deep=deep)
         if not deep and dicom_among(files):
             continue  # further series may be in sub-folders
-        volume = _read_images(files, others, folder, settings)
+        volume = _read_images(files, others, folder, settings, select)
         if volume is not None:
             return volume
     others += Counter(_kind(path) for path in files)
@@ -133,9 +151,13 @@ def _read_folder(folder: Path, settings: ReadSettings) -> Volume:
     )
 
 
-def _read_images(files: list[Path], others: Counter[str], folder: Path, settings: ReadSettings) -> Volume | None:
+def _read_images(
+    files: list[Path], others: Counter[str], folder: Path, settings: ReadSettings, select: Sequence[int] | None
+) -> Volume | None:
     """Read DICOM where there is any, else PNG, TIFF or JPEG slices."""
     dicom = dicom_among(files)
+    if len(dicom) == 1 and is_segmentation(dicom[0]):
+        return read_segmentation(dicom[0], settings, study=str(folder), select=select)
     if dicom:
         others = others + Counter({"not DICOM": len(files) - len(dicom)})
         return read_dicom(dicom, settings, study=str(folder), others=others)

@@ -43,6 +43,10 @@ class PointSet:
         ``NEURON``, ``BRIDGE`` or ``CAP``; measured points of a cloud count as ``NEURON``.
     attributes : mapping of str to (n,) or (n, c) array
         What else is known of each point, by name: `COLORS`, ``intensity`` and the like.
+    frame : str
+        ``"LPS"`` where the file of a cloud says that it is in patient millimeters; else ``"unknown"``.
+    notes : tuple of str
+        What the reader decided or dropped, one line each, without patient data.
     """
 
     positions: NDArray[np.float64]
@@ -50,6 +54,8 @@ class PointSet:
     neurons: NDArray[np.int32]
     kinds: NDArray[np.uint8]
     attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    frame: str = "unknown"
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, values in self.attributes.items():
@@ -94,4 +100,6 @@ class PointSet:
             np.concatenate([self.neurons, other.neurons]),
             np.concatenate([self.kinds, other.kinds]),
             both,
+            self.frame,
+            self.notes,
         )

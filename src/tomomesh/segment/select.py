@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import EmptyError, GeometryError, UsageError
+from ..errors import EmptyError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,8 +19,6 @@ NAMED = 24
 """Labels that are named where one is missing, at most."""
 MOST = 4096
 """Labels over which a label map is doubted."""
-NEAR = 0.01
-"""Share of a voxel by which two grids may differ."""
 
 
 def select(labels: Volume, wanted: Sequence[int]) -> NDArray[np.bool_]:
@@ -69,32 +67,3 @@ def doubted(labels: Volume) -> str:
         return f"the label map holds {voxels.dtype} numbers: it may be a study of gray levels"
     count = len(np.unique(voxels))
     return f"the label map has {count} labels: it may be a study of gray levels" if count > MOST else ""
-
-
-def require_same_grid(labels: Volume, study: Volume) -> None:
-    """Refuse labels that are not on the study's own grid.
-
-    Raises
-    ------
-    GeometryError
-        Where sizes or places differ.
-    """
-    if labels.shape != study.shape:
-        raise GeometryError(
-            "the labels do not fit the study", found=f"{_sizes(labels)} voxels",
-            expected=f"{_sizes(study)}, as the study",
-            hint="labels on the study's own grid, or the labels alone as the study",
-        )  # fmt: skip
-    corners = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]) * (
-        np.array(study.shape[::-1]) - 1.0
-    )
-    apart = np.sqrt(((labels.to_mm(corners) - study.to_mm(corners)) ** 2).sum(axis=1)).max()
-    if apart > NEAR * min(study.spacing_mm):
-        raise GeometryError(
-            "the labels lie elsewhere than the study", found=f"corners {apart:.4g} mm apart",
-            expected="the study's own grid", hint="labels on the study's own grid, or the labels alone as the study",
-        )  # fmt: skip
-
-
-def _sizes(volume: Volume) -> str:
-    return " x ".join(map(str, volume.shape[::-1]))

@@ -10,6 +10,7 @@ from dataclasses import Field, asdict, dataclass, field, fields, replace
 from typing import Any
 
 from ..errors import UsageError
+from .cloud import CloudSettings
 from .cubes import CubeSettings
 from .effect import without_effect
 from .fit import FitSettings
@@ -29,6 +30,7 @@ __all__ = [
     "MANY",
     "SURFACES",
     "UNSET",
+    "CloudSettings",
     "CubeSettings",
     "FitSettings",
     "NetworkSettings",
@@ -51,6 +53,7 @@ class Settings:
     """All parameters of a run, in groups."""
 
     read: ReadSettings = field(default_factory=ReadSettings)
+    cloud: CloudSettings = field(default_factory=CloudSettings)
     part: PartSettings = field(default_factory=PartSettings)
     window: WindowSettings = field(default_factory=WindowSettings)
     network: NetworkSettings = field(default_factory=NetworkSettings)

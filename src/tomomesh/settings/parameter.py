@@ -102,6 +102,8 @@ def _said(value: Any) -> str:
 
 
 def _inside(meta: Mapping[str, Any], value: Any) -> bool:
+    if meta["kind"] is str:
+        return isinstance(value, str) and bool(value.strip())
     if isinstance(value, bool) or not isinstance(value, int if meta["kind"] is int else (int, float)):
         return False
     return bool(math.isfinite(value) and meta["low"] <= value <= meta["high"] and value > meta["above"])
@@ -110,7 +112,7 @@ def _inside(meta: Mapping[str, Any], value: Any) -> bool:
 def limits_of(entry: Field[Any]) -> str:
     """Put a parameter's limits into words."""
     meta = entry.metadata
-    words = ["a whole number" if meta["kind"] is int else "a number"]
+    words = [{int: "a whole number", str: "text"}.get(meta["kind"], "a number")]
     words += [f"over {meta['above']:g}"] if math.isfinite(meta["above"]) else []
     words += [f"at least {meta['low']:g}"] if math.isfinite(meta["low"]) else []
     words += [f"at most {meta['high']:g}"] if math.isfinite(meta["high"]) else []

@@ -122,6 +122,12 @@ def nested(curves: Sequence[NDArray[np.float64]]) -> Outline:
     return Outline(rings, parts, [], 0.0)
 
 
+def holes(curves: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
+    """Tell which closed curves (u, 2) are holes: those within an odd number of others."""
+    areas = np.array([abs(signed_area(curve)) for curve in curves])
+    return np.asarray(_within(curves, areas).sum(axis=1) % 2 == 1)
+
+
 def signed_area(curve: NDArray[np.float64]) -> float:
     """Return the area of a closed polygon (u, 2); below 0 where the inside is on its right."""
     x, y = (curve - curve[0]).T

@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..model.points import NEURON, RING, SIDE
 from .rings import outline
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
-
-    from ..model.points import PointSet
 
     Floats = NDArray[np.float64]
 
@@ -126,62 +123,6 @@ def find_slices(positions: Floats) -> Slices | None:
     return replace(found, origin=origin, labels=labels)
 
 
-def known_slices(points: PointSet) -> Slices | None:
-    """Take the slices and rings of points that know them, as the neurons of ring networks do.
-
-    Parameters
-    ----------
-    points : PointSet
-        Of several rings in a slice, the attributes `RING` and `SIDE` tell which each point is on, and whether the
-        ring is around the inside or around a hole.
-
-    Returns
-    -------
-    Slices or None
-        None where the points do not know, or where their slices are not parallel planes.
-    """
-    neuron = (points.slices >= 0) & (points.neurons >= 0) & (points.kinds == NEURON)
-    ring = np.asarray(points.attributes.get(RING, np.zeros(len(points), np.int64)))
-    order = np.lexsort((points.neurons, ring, points.slices))
-    order = order[neuron[order]]
-    numbers = np.unique(points.slices[neuron])
-    grouped = _grouped(order, points.slices, ring)
-    if len(numbers) < 2 or min(map(len, grouped)) < FEWEST:
-        return None
-    rings = [points.positions[one] for one in grouped]
-    origin = np.mean([corner for one in rings for corner in (one.min(axis=0), one.max(axis=0))], axis=0)
-    labels = np.where(neuron, np.searchsorted(numbers, points.slices), -1).astype(np.int32)
-    local = points.positions - origin
-    normal = _common_normal(local[order], labels[order], rings[-1].mean(axis=0) - rings[0].mean(axis=0))
-    height = local[order] @ normal
-    heights = np.bincount(labels[order], height) / np.bincount(labels[order])
-    gaps = np.diff(heights)
-    if gaps.min() <= 0 or np.abs(height - heights[labels[order]]).max() > PARTED * gaps.min():
-        return None
-    sides = np.concatenate([np.roll(one, -1, axis=0) - one for one in rings])
-    spacing = min(float(np.median(np.sqrt((sides**2).sum(axis=1)))), float(np.median(gaps)))
-    found = Slices(origin, _axes_across(normal), heights, labels, spacing)
-    return replace(found, rings=_oriented(points, grouped, found))
-
-
-def _grouped(order: NDArray[np.int64], slices: NDArray[np.int32], ring: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Split points in order where the slice or the ring changes."""
-    changes = (np.diff(slices[order]) != 0) | (np.diff(ring[order]) != 0)
-    return np.split(order, np.flatnonzero(changes) + 1)
-
-
-def _oriented(points: PointSet, grouped: list[NDArray[np.int64]], found: Slices) -> tuple[tuple[Floats, ...], ...]:
-    """Turn each ring so that the inside is on its left, and gather those of each plane."""
-    side = points.attributes.get(SIDE)
-    planes: list[list[Floats]] = [[] for _ in found.heights]
-    for one in grouped:
-        x, y, _ = found.placed(points.positions[one]).T
-        area = float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
-        hole = side is not None and bool(side[one[0]] % 2)
-        planes[found.labels[one[0]]].append(points.positions[one if (area > 0) != hole else one[::-1]])
-    return tuple(map(tuple, planes))
-
-
 def _lots(local: Floats) -> Floats:
     """Give each point a number from 0 to 1 that follows from its position: what is drawn by it suits any order."""
     if len(local) <= SAMPLE:
@@ -246,7 +187,7 @@ def _refined(local: Floats, lots: Floats, places: Floats, normal: Floats, spacin
     return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))]))
 
 
-def _axes_across(normal: Floats) -> Floats:
+def axes_across(normal: Floats) -> Floats:
     """Return two directions across a normal, and the normal."""
     first = np.eye(3)[np.argmin(np.abs(normal))]
     first = first - normal * (first @ normal)
@@ -260,8 +201,8 @@ def _planes(local: Floats, normal: Floats, spacing: float) -> Slices | None:
         found = _parted(local @ normal, PARTED * spacing, FEWEST)
         if found is None:
             return None
-        labels, normal = found, _common_normal(local, found, normal)
-    axes = _axes_across(normal)
+        labels, normal = found, common_normal(local, found, normal)
+    axes = axes_across(normal)
     placed = np.stack([(local * axis).sum(axis=1) for axis in axes], axis=1)
     heights = np.bincount(labels[labels >= 0], placed[labels >= 0, 2]) / np.bincount(labels[labels >= 0])
     gaps, looked_at = np.diff(heights), np.unique(np.linspace(0, len(heights) - 1, LOOKED_AT).astype(int))
@@ -283,7 +224,7 @@ def _parted(height: Floats, gap: float, fewest: int) -> NDArray[np.int32] | None
     return labels if full.sum() >= SLICES and np.mean(labels < 0) <= STRAYS else None
 
 
-def _common_normal(local: Floats, labels: NDArray[np.int32], normal: Floats) -> Floats:
+def common_normal(local: Floats, labels: NDArray[np.int32], normal: Floats) -> Floats:
     """Fit the normal of parallel planes to their points."""
     taken, label = local[labels >= 0], labels[labels >= 0]
     means = np.stack([np.bincount(label, column) for column in taken.T], axis=1) / np.bincount(label)[:, None]

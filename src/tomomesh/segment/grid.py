@@ -1,0 +1,114 @@
+"""Labels laid onto the grid of a study."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import GeometryError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.volume import Volume
+
+NEAR = 0.01
+"""Share of a voxel by which labels may lie off the study's voxels."""
+HINT = "labels on the study's own grid, or the labels alone as the study"
+
+
+def onto_grid(labels: Volume, study: Volume) -> Volume:
+    """Lay labels onto a study's grid, background where they hold nothing.
+
+    Parameters
+    ----------
+    labels : Volume
+        On the study's own lattice: the same voxels, up to the order and the direction of their axes, a whole number
+        of voxels away. They may cover a part of it, and reach beyond.
+    study : Volume
+
+    Returns
+    -------
+    Volume
+        Of the study's shape; notes say which part of it is covered, and count the labels beyond it, which are left
+        out.
+
+    Raises
+    ------
+    GeometryError
+        Where the voxels differ, lie between those of the study, or outside of it altogether.
+    """
+    steps, offset = _whole_steps(labels, study)
+    if labels.shape == study.shape and np.array_equal(steps, np.eye(3)) and not offset.any():
+        return labels
+    turned, low = _turned(labels.voxels, steps[::-1, ::-1], offset[::-1])
+    start, stop = np.maximum(low, 0), np.minimum(low + turned.shape[:3], study.shape)
+    if (start >= stop).any():
+        raise GeometryError("the labels lie outside of the study", found=_box(labels), expected=_box(study), hint=HINT)
+    voxels = np.zeros((*study.shape, *turned.shape[3:]), turned.dtype)
+    voxels[_slices(start, stop)] = turned[_slices(start - low, stop - low)]
+    covered = " x ".join(map(str, (stop - start)[::-1]))
+    notes = (
+        *labels.notes,
+        f"the labels cover {covered} of the study's {' x '.join(map(str, study.shape[::-1]))} voxels",
+    )
+    lost = np.count_nonzero(turned) - np.count_nonzero(voxels)
+    beyond = (f"labeled voxels beyond the study, left out: {lost}",) if lost else ()
+    return replace(study, voxels=voxels, unit=labels.unit, notes=notes + beyond)
+
+
+def _whole_steps(labels: Volume, study: Volume) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the axes (3, 3) and the first voxel (3,) of labels in whole voxels (i, j, k) of a study."""
+    ways = np.linalg.solve(study.affine, labels.affine)
+    steps, offset = np.rint(ways[:3, :3]), np.rint(ways[:3, 3])
+    one_each = all((np.abs(steps).sum(axis=axis) == 1).all() for axis in (0, 1))
+    corners = np.array(list(np.ndindex(2, 2, 2))) * (np.array(labels.shape[::-1]) - 1.0)
+    away = labels.to_mm(corners) - study.to_mm(corners @ steps.T + offset)
+    apart = float(np.sqrt((away**2).sum(axis=1)).max())
+    allowed = NEAR * min(study.spacing_mm)
+    if not one_each or np.ptp(away, axis=0).max() > allowed:
+        raise GeometryError(
+            "the labels do not fit the study", found=f"{_sizes(labels)}, axes {_directions(labels)}",
+            expected=f"{_sizes(study)}, axes {_directions(study)}, as the study, or a part of it", hint=HINT,
+        )  # fmt: skip
+    if apart > allowed:
+        raise GeometryError(
+            "the labels lie elsewhere than the study", found=f"{apart:.4g} mm off its voxels",
+            expected="whole voxels of the study's own grid", hint=HINT,
+        )  # fmt: skip
+    return steps.astype(np.int64), offset.astype(np.int64)
+
+
+def _turned(
+    voxels: NDArray[np.generic], steps: NDArray[np.int64], offset: NDArray[np.int64]
+) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
+    """Return voxels with the axes of a study, and where the first of them lies; steps and offset are (K, J, I)."""
+    order = np.abs(steps).argmax(axis=1)
+    backward = steps[np.arange(3), order] < 0
+    turned = np.transpose(voxels, (*order, *range(3, voxels.ndim)))
+    low = offset - np.where(backward, np.array(turned.shape[:3]) - 1, 0)
+    return turned[tuple(slice(None, None, -1 if flip else 1) for flip in backward)], low
+
+
+def _slices(start: NDArray[np.int64], stop: NDArray[np.int64]) -> tuple[slice, ...]:
+    return tuple(slice(a, b) for a, b in zip(start.tolist(), stop.tolist(), strict=True))
+
+
+def _sizes(volume: Volume) -> str:
+    voxels, spacing = (" x ".join(f"{n:.5g}" for n in part) for part in (volume.shape[::-1], volume.spacing_mm))
+    return f"{voxels} voxels of {spacing} mm"
+
+
+def _directions(volume: Volume) -> str:
+    """Put the directions of the axes into words."""
+    columns = volume.affine[:3, :3] / np.array(volume.spacing_mm)
+    return " ".join(f"({', '.join(f'{cosine:.3g}' for cosine in column + 0.0)})" for column in columns.T)
+
+
+def _box(volume: Volume) -> str:
+    """Put the box around the centers of all voxels into words."""
+    corners = volume.to_mm(np.array(list(np.ndindex(2, 2, 2))) * (np.array(volume.shape[::-1]) - 1.0))
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return " x ".join(f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)) + " mm"
