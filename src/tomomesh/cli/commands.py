@@ -20,6 +20,7 @@ from .outputs import (
     draw,
     make_folder,
     write_documents,
+    write_picture,
     write_points,
     write_stage_one,
     write_surface,
@@ -121,7 +122,6 @@ def _network(chosen: Namespace) -> None:
     check_files(chosen)
     from ..segment.region import train_region
     from ..segment.shapes import SHAPES, shape
-    from ..show import save
     from .pictures import film_of_network, pictures_of_network
 
     given = chosen.region in SHAPES
@@ -134,7 +134,7 @@ def _network(chosen: Namespace) -> None:
     title = f"A network over a {chosen.region if given else 'picture'}"
     axes = slice(None if given else 2)  # a neuron's place in a picture is its column and row
     for name, figure in pictures_of_network(trained, title, axes):
-        save(figure, folder / f"{name}.png")
+        write_picture(figure, folder / f"{name}.png")
     if chosen.film:
         with io.replacing(folder / "02-film.gif") as file:
             file.write(film_of_network(trained, settings, area, title, axes))
