@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import io
-from ..errors import UnreadableError, UsageError
+from ..errors import UnreadableError, UsageError, printable
 from ..settings import Settings, parameters
 from . import summary
 from .bars import Bars
@@ -167,7 +167,7 @@ def _inspect(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     volume = io.read_volume(chosen.study, settings=settings.read)
     found = survey(crop(volume, settings.part, volume.thickest_axis())[0])
-    print(json.dumps(found, indent=2) if chosen.json else "\n".join(findings.of_study(found, chosen.study)))
+    _say(found, None if chosen.json else findings.of_study(found, chosen.study))
 
 
 def _check(chosen: Namespace) -> None:
@@ -179,7 +179,7 @@ def _check(chosen: Namespace) -> None:
     report = assess(io.read_mesh(chosen.mesh), against=other)
     if chosen.report:
         io.write_document(report, chosen.report)
-    print(json.dumps(report, indent=2) if chosen.json else "\n".join(summary.of_check(report)))
+    _say(report, None if chosen.json else summary.of_check(report))
 
 
 _COMMANDS = {
@@ -194,7 +194,10 @@ _COMMANDS = {
 
 
 def _tell(chosen: Namespace, report: dict[str, Any], lines: list[str]) -> None:
-    if chosen.json:
-        print(json.dumps(report, indent=2))
-    elif not chosen.quiet:
-        print("\n".join(lines))
+    if chosen.json or not chosen.quiet:
+        _say(report, None if chosen.json else lines)
+
+
+def _say(report: dict[str, Any], lines: list[str] | None) -> None:
+    """Print what was found: as JSON, which has its own escapes, or in words, where names may hold any character."""
+    print(json.dumps(report, indent=2) if lines is None else "\n".join(map(printable, lines)))
