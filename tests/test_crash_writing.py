@@ -83,3 +83,21 @@ def test_killed_at_every_call_the_file_is_the_old_or_the_new_one(tmp_path: Path,
     assert max(left) <= 1
     if way == "nameless" and hasattr(os, "O_TMPFILE"):
         assert sum(left) < 5  # the calls between the hidden name and the last one
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root may mount a small disk")
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path) -> None:
+    from tomomesh.errors import OutputError
+    from tomomesh.io import replacing
+
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", tmp_path], check=False)
+    if mounted.returncode:
+        pytest.skip("no small disk can be mounted here")
+    try:
+        (tmp_path / "m").write_bytes(b"old")
+        with pytest.raises(OutputError, match="no space left"), replacing(tmp_path / "m") as file:
+            file.write(bytes(2**17))
+        assert [path.name for path in tmp_path.iterdir()] == ["m"]
+        assert (tmp_path / "m").read_bytes() == b"old"
+    finally:
+        subprocess.run(["umount", tmp_path], check=True)

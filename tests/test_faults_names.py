@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import locale
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,15 +14,12 @@ import trimesh
 from conftest import sphere
 from doors import as_program, contents, refused
 from studies import write_nifti
-from test_faults_studies import TestSlices, ball
+from test_faults_studies import AFFINE, ball
 from tomomesh.cli import main
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from _pytest.capture import CaptureFixture
 
-AFFINE = TestSlices.affine
 ODD = ["ein Köpfchen", "頭 蓋", "a'b\"c$d", "-o", "%s%n", "x" * 200, "tab\there", "line\nbreak", "\x1b[31mred\x1b[0m"]
 
 
@@ -46,10 +44,11 @@ class TestOutputs:
         refused([command, str(tmp_path / "none.nii"), "-o", str(tmp_path / output)], code, tmp_path, capsys)
 
     def test_the_output_is_never_the_input(self, study: Path, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
+        again = f"{tmp_path}/../{tmp_path.name}/s.nii"
         for line in (
             ["segment", str(study), "-o", str(tmp_path / "p.ply"), "--labels", str(study)],
             ["reconstruct", str(study), "-o", str(tmp_path / "m.ply"), "--points", str(tmp_path / "m.ply")],
-            ["reconstruct", str(study), "-o", str(tmp_path / "m.ply"), "--labels", f"{tmp_path}/../{tmp_path.name}/s.nii"],
+            ["reconstruct", str(study), "-o", str(tmp_path / "m.ply"), "--labels", again],
         ):  # fmt: skip
             refused(line, 2, tmp_path, capsys)
 
@@ -84,18 +83,17 @@ class TestNames:
 
     def test_a_name_that_is_no_text(self, study: Path, tmp_path: Path) -> None:
         """Bytes that are no UTF-8, in a terminal that knows ASCII alone."""
-        folder = os.fsencode(tmp_path) + b"/\xff\xfe \xe9"
+        folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe \xe9"))
         try:
-            os.mkdir(folder)
+            folder.mkdir()
         except OSError:
             pytest.skip("this file system takes no such name")
-        mesh = os.fsdecode(folder + b"/m.ply")
         done = as_program(
-            ["reconstruct", str(study), "-o", mesh, "--lower", "50"],
+            ["reconstruct", str(study), "-o", str(folder / "m.ply"), "--lower", "50"],
             env={"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": "ascii"},
         )
         assert done.returncode == 0, done.stderr
-        assert os.path.exists(mesh)  # noqa: PTH110
+        assert (folder / "m.ply").exists()
 
 
 def test_a_decimal_comma_changes_nothing(study: Path, tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 SHAPE = (12, 34, 48)
 SPACING = (0.5, 0.7, 2.0)
 RADIUS = 8.0
+AFFINE = affine_of(np.eye(3), SPACING)
 WINDOW = ("--lower", "50")
 
 
@@ -62,10 +63,8 @@ def is_the_ball(mesh: trimesh.Trimesh, affine: NDArray[np.float64]) -> None:
 
 
 class TestSlices:
-    affine = affine_of(np.eye(3), SPACING)
-
     def series(self, folder: Path, **more: Any) -> Path:
-        return write_series(folder / "s", ball(self.affine), self.affine, **more)
+        return write_series(folder / "s", ball(AFFINE), AFFINE, **more)
 
     def test_a_missing_slice(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
         """Row 7."""
@@ -74,7 +73,7 @@ class TestSlices:
         assert "--fill-gaps" in said
         assert "gap = 48 to 52 mm" in said
         mesh, report = reconstructed(study, tmp_path / "out", *WINDOW, "--fill-gaps")
-        is_the_ball(mesh, self.affine)
+        is_the_ball(mesh, AFFINE)
         assert "interpolated" in " ".join(report["study"]["notes"])
 
     def test_two_slices_at_one_place(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
@@ -91,7 +90,7 @@ class TestSlices:
             data.PixelData = bytes(len(data.PixelData))
             data.EchoTime = "30"
 
-        write_series(study / "other", ball(self.affine), self.affine, other, slices=[5])
+        write_series(study / "other", ball(AFFINE), AFFINE, other, slices=[5])
         (study / "other").rename(tmp_path / "other")
         next((tmp_path / "other").iterdir()).rename(study / "other.dcm")
         refused(reconstructing(study, tmp_path, *WINDOW), 5, tmp_path, capsys)
@@ -131,11 +130,11 @@ class TestSlices:
         def scaled(data: Dataset, k: int) -> None:
             as_ct(data, k)
             data.RescaleSlope, data.RescaleIntercept = f"{0.5 * (k + 1):g}", f"{k}"
-            pixels = (ball(self.affine)[k] - k) / (0.5 * (k + 1))
+            pixels = (ball(AFFINE)[k] - k) / (0.5 * (k + 1))
             data.PixelData = np.rint(pixels).astype(np.int16).tobytes()
 
         mesh, _ = reconstructed(self.series(tmp_path, edit=scaled), tmp_path / "out")
-        is_the_ball(mesh, self.affine)
+        is_the_ball(mesh, AFFINE)
 
 
 class TestAffines:

@@ -17,7 +17,7 @@ from pydicom.datadict import dictionary_VR, keyword_dict
 
 from doors import contents
 from studies import as_ct, write_series
-from test_faults_studies import TestSlices, ball
+from test_faults_studies import AFFINE, ball
 from tomomesh.cli import main
 from tomomesh.errors import FormatError
 from tomomesh.io import read_points, read_volume
@@ -64,9 +64,8 @@ def with_canaries(data: Dataset, k: int) -> None:
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    affine = TestSlices.affine
     with pydicom.config.disable_value_validation():
-        folder = write_series(tmp_path_factory.mktemp("in") / "s", ball(affine), affine, with_canaries)
+        folder = write_series(tmp_path_factory.mktemp("in") / "s", ball(AFFINE), AFFINE, with_canaries)
     assert HOSTILE[:20].encode() in next(folder.iterdir()).read_bytes()
     return folder
 
