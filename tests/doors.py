@@ -69,11 +69,10 @@ def reconstructing(study: str | Path, folder: Path, *options: str) -> list[str]:
 
 
 def as_program(
-    line: list[str], *, before: str = "", env: dict[str, str] | None = None, **options: object
+    line: list[str], *, before: str = "", env: dict[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Run a command in a process of its own, after some Python of the test's."""
     code = f"import sys\n{before}\nfrom tomomesh.__main__ import main\nsys.argv[1:] = {line!r}\nsys.exit(main())"
     return subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env={**os.environ, **(env or {})},
-        timeout=300, **options,  # type: ignore[call-overload,no-any-return]
-    )  # fmt: skip
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env={**os.environ, **(env or {})}
+    )

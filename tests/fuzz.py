@@ -89,7 +89,9 @@ def _replace_word(raw: bytearray, at: int, word: bytes) -> None:
         raw[found.start() : found.end()] = word
 
 
-def fuzz(read: Callable[[Path], Any], path: Path, *, codes: tuple[int, ...] = EXIT_CODES) -> None:
+def fuzz(
+    read: Callable[[Path], Any], path: Path, *, codes: tuple[int, ...] = EXIT_CODES, most: int = PEAK_BYTES
+) -> None:
     """Read a valid file over and over, damaged: each time a result or one line, and little memory.
 
     Parameters
@@ -100,6 +102,8 @@ def fuzz(read: Callable[[Path], Any], path: Path, *, codes: tuple[int, ...] = EX
         The valid file. Its damaged copies take its place, so that what lies beside it is found.
     codes : tuple of int
         Exit codes that the errors may have.
+    most : int
+        Bytes that may be held at once.
     """
     whole = path.read_bytes()
     read(path)
@@ -115,7 +119,7 @@ def fuzz(read: Callable[[Path], Any], path: Path, *, codes: tuple[int, ...] = EX
             edit(raw)
         path.write_bytes(raw if cut is None else raw[: int(cut * len(raw))])
         fault, peak = _outcome(read, path)
-        assert peak < PEAK_BYTES, f"{peak} bytes"
+        assert peak < most, f"{peak} bytes"
         if fault is not None:
             assert str(fault).isprintable()
             assert fault.exit_code in (*codes, 3)  # 3: what it names beside it is gone

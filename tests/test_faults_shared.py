@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -12,8 +13,6 @@ from studies import shared
 from tomomesh.cli import main
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from _pytest.capture import CaptureFixture
 
 STUDIES = {
@@ -52,7 +51,7 @@ def copied(name: str, folder: Path) -> Path:
     source = shared("malformed") / name
     if not source.exists():
         pytest.skip(f"{name} is not among the public data here")
-    return shutil.copy(source, folder / name)  # type: ignore[no-any-return]
+    return Path(shutil.copy(source, folder / name))
 
 
 @pytest.mark.parametrize("name", STUDIES)

@@ -36,7 +36,7 @@ def ball(affine: NDArray[np.float64], shape: tuple[int, int, int] = SHAPE) -> ND
     k, j, i = np.indices(shape)
     half = np.array(shape[::-1]) / 2 - 0.5
     places = (np.stack([i, j, k], axis=-1) - half) @ affine[:3, :3].T
-    return np.clip(50 + 50 * (RADIUS - np.linalg.norm(places, axis=-1)), 0, 100).astype(np.int16)
+    return np.asarray(np.clip(50 + 50 * (RADIUS - np.linalg.norm(places, axis=-1)), 0, 100), np.int16)
 
 
 def center(affine: NDArray[np.float64]) -> NDArray[np.float64]:
