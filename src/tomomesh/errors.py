@@ -23,10 +23,10 @@ class TomomeshError(Exception):
     exit_code = 1
 
     def __init__(self, what: str, *, file: str = "", found: str = "", expected: str = "", hint: str = "") -> None:
-        where = f" File: {_plain(file)}" if file else ""
-        where += (" " if where else " Found: ") + f"[{_plain(found)}]" if found else ""
+        where = f" File: {printable(file)}" if file else ""
+        where += (" " if where else " Found: ") + f"[{printable(found)}]" if found else ""
         parts = [
-            f"{_plain(what)}.",
+            f"{printable(what)}.",
             f"{where.strip()}." if where else "",
             f"Expected: {expected}." if expected else "",
             f"Try: {hint}." if hint else "",
@@ -34,8 +34,8 @@ class TomomeshError(Exception):
         super().__init__(" ".join(part for part in parts if part))
 
 
-def _plain(text: str) -> str:
-    """Replace control characters, so that no file name or tag can write to a terminal or a log."""
+def printable(text: str) -> str:
+    """Return a text whose control characters are replaced: no file name or tag may steer a terminal or forge a log."""
     return "".join(c if c.isprintable() else "?" for c in text)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import io
-from ..errors import UnreadableError, UsageError
+from ..errors import UnreadableError, UsageError, printable
 from ..settings import Settings, parameters, without_effect
 from . import summary
 from .bars import Bars
@@ -21,6 +21,7 @@ from .outputs import (
     draw,
     make_folder,
     write_documents,
+    write_picture,
     write_points,
     write_stage_one,
     write_surface,
@@ -141,7 +142,6 @@ def _network(chosen: Namespace) -> None:
     check_files(chosen)
     from ..segment.region import train_region
     from ..segment.shapes import SHAPES, shape
-    from ..show import save
     from .pictures import film_of_network, pictures_of_network
 
     given = chosen.region in SHAPES
@@ -154,7 +154,7 @@ def _network(chosen: Namespace) -> None:
     title = f"A network over a {chosen.region if given else 'picture'}"
     axes = slice(None if given else 2)  # a neuron's place in a picture is its column and row
     for name, figure in pictures_of_network(trained, title, axes):
-        save(figure, folder / f"{name}.png")
+        write_picture(figure, folder / f"{name}.png")
     if chosen.film:
         with io.replacing(folder / "02-film.gif") as file:
             file.write(film_of_network(trained, settings, area, title, axes))
@@ -188,7 +188,7 @@ def _inspect(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     volume = io.read_volume(chosen.study, settings=settings.read)
     found = survey(crop(volume, settings.part, volume.thickest_axis())[0])
-    print(json.dumps(found, indent=2) if chosen.json else "\n".join(findings.of_study(found, chosen.study)))
+    _say(found, None if chosen.json else findings.of_study(found, chosen.study))
 
 
 def _check(chosen: Namespace) -> None:
@@ -205,7 +205,7 @@ def _check(chosen: Namespace) -> None:
         report["print"] = verdict(mesh, settings_of(chosen).printing)
     if chosen.report:
         io.write_document(report, chosen.report)
-    print(json.dumps(report, indent=2) if chosen.json else "\n".join(summary.of_check(report)))
+    _say(report, None if chosen.json else summary.of_check(report))
 
 
 def _print(chosen: Namespace) -> None:
@@ -240,7 +240,10 @@ def _shown(chosen: Namespace) -> str:
 
 
 def _tell(chosen: Namespace, report: dict[str, Any], lines: list[str]) -> None:
-    if chosen.json:
-        print(json.dumps(report, indent=2))
-    elif not chosen.quiet:
-        print("\n".join(lines))
+    if chosen.json or not chosen.quiet:
+        _say(report, None if chosen.json else lines)
+
+
+def _say(report: dict[str, Any], lines: list[str] | None) -> None:
+    """Print what was found: as JSON, which has its own escapes, or in words, where names may hold any character."""
+    print(json.dumps(report, indent=2) if lines is None else "\n".join(map(printable, lines)))

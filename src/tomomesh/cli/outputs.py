@@ -16,6 +16,7 @@ from ..io.source import suffix_of
 if TYPE_CHECKING:
     from argparse import Namespace
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from ..model.mesh import TriMesh
@@ -193,7 +194,6 @@ def draw(
     """Draw the paper's figures of whatever stages there are."""
     if folder is None:
         return
-    from ..show import save
     from .pictures import pictures
 
     where = Path(folder)
@@ -201,5 +201,13 @@ def draw(
     done, expected = 0, 10 if surface else 6
     for done, (name, figure) in enumerate(pictures(stage_one, surface, settings), 1):
         progress("pictures", done - 1, max(expected, done))
-        save(figure, where / f"{name}.png")
+        write_picture(figure, where / f"{name}.png")
     progress("pictures", done, done)
+
+
+def write_picture(figure: Figure, path: Path) -> None:
+    """Write a picture, whole or not at all."""
+    from ..show import save
+
+    with io.replacing(path) as file:
+        save(figure, file)

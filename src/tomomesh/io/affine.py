@@ -50,7 +50,8 @@ def check_affine(affine: NDArray[np.float64], *, file: str, hint: str) -> None:
         Where it is singular, or holds NaN or infinite values.
     """
     columns = affine[:3, :3]
-    lengths = np.sqrt((columns**2).sum(axis=0))
+    with np.errstate(over="ignore", invalid="ignore"):  # what is too long for a square is infinite below
+        lengths = np.sqrt((columns**2).sum(axis=0))
     if np.isfinite(affine).all() and lengths.min() >= SMALLEST_SPACING:
         volume = abs(float(np.linalg.det(columns / lengths)))
         if volume >= 1e-3:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import secrets
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from ..errors import OutputError, UsageError
 from .source import suffix_of
+from .unfinished import sweep, unfinished
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
@@ -20,7 +20,8 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
     """Open a temporary file beside `path`, which takes its place once the block ends well.
 
     The file is on the disk before it gets its name, so that at any moment the old output is intact
-    or the new one is whole. Whatever is raised inside removes the temporary file.
+    or the new one is whole. Whatever is raised inside removes the temporary file, and the next output in the
+    same folder what a kill may have left (see `unfinished`).
 
     Raises
     ------
@@ -28,19 +29,13 @@ def replacing(path: str | Path) -> Iterator[IO[bytes]]:
         Where the file cannot be written.
     """
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".tomomesh-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+    sweep(target.parent)
     try:
-        with temporary.open("xb") as file:
+        with unfinished(target) as file:
             yield file
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(target)
-        _sync_folder(target.parent)
     except OSError as fault:
         raise OutputError("the file cannot be written", file=str(path), found=_reason(fault)) from None
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+    _sync_folder(target.parent)
 
 
 def _sync_folder(folder: Path) -> None:

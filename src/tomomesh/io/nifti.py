@@ -141,9 +141,9 @@ def _dtype(header: Any, name: str) -> np.dtype[Any]:
     from nibabel.nifti1 import data_type_codes
 
     code = int(header["datatype"])
-    if code not in data_type_codes.dtype:
+    dtype: np.dtype[Any] = np.dtype(data_type_codes.dtype.get(code, np.void))
+    if not dtype.itemsize:  # 0 and 1, an unknown kind and single bits, have none either
         raise FormatError("the voxels are of an unknown kind", file=name, found=f"datatype = {code}")
-    dtype: np.dtype[Any] = np.dtype(data_type_codes.dtype[code])
     return dtype.newbyteorder(header.endianness)
 
 

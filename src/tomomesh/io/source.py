@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import warnings
 from collections import Counter
@@ -177,12 +178,12 @@ def counted(reasons: Counter[str]) -> str:
 
 @contextmanager
 def third_party(reader: str, file: str) -> Iterator[None]:
-    """Turn whatever a third-party reader raises into one line, and silence its warnings.
+    """Turn whatever a third-party reader raises into one line, and silence its warnings and its log.
 
     Its own words stay out: they may hold patient data or a full path.
     """
     try:
-        with warnings.catch_warnings():
+        with _unheard(logging.getLogger(reader)), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
     except TomomeshError:
@@ -196,3 +197,16 @@ def third_party(reader: str, file: str) -> Iterator[None]:
             found=type(fault).__name__,
             expected="a whole and valid file",
         ) from None
+
+
+@contextmanager
+def _unheard(logger: logging.Logger) -> Iterator[None]:
+    """Keep what a library logs, values of fields and paths among it, from the handlers of others and from stderr."""
+    propagate, nobody = logger.propagate, logging.NullHandler()
+    logger.propagate = False
+    logger.addHandler(nobody)
+    try:
+        yield
+    finally:
+        logger.removeHandler(nobody)
+        logger.propagate = propagate

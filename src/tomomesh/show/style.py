@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import wraps
 from os import PathLike
-from typing import TYPE_CHECKING, Any, BinaryIO, ParamSpec, TypeVar
+from typing import IO, TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -97,7 +97,7 @@ def heading(ax: Axes, title: str, note: str = "") -> None:
         )
 
 
-def save(figure: Figure, file: str | PathLike[str] | BinaryIO) -> None:
+def save(figure: Figure, file: str | PathLike[str] | IO[bytes]) -> None:
     """Write a figure as PNG; the same figure gives the same bytes.
 
     Raises

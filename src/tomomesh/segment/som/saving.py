@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from dataclasses import asdict, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,8 +15,6 @@ from ...model.graph import Lattice
 from .history import History
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
 FORMAT = "tomomesh network 1"
@@ -59,7 +58,7 @@ def save_network(
     graph = {name: getattr(lattice, name) for name in ("edges", "hops", "places", "faces")}
     groups = {"param": large, "array": arrays, "lattice": graph, "history": asdict(history)}
     named = {f"{group}.{name}": value for group, values in groups.items() for name, value in values.items()}
-    with open(path, "wb") as file:  # noqa: PTH123 - a name without .npz stays as it is
+    with Path(path).open("wb") as file:  # a name without .npz stays as it is
         np.savez_compressed(file, allow_pickle=False, head=np.array(json.dumps(head, default=_plain)), **named)
 
 

@@ -1,0 +1,20 @@
+"""The program's first lines: they know what Ctrl-C is before anything else is imported."""
+
+
+def main() -> int:
+    """Run ``tomomesh``: quiet when it is stopped while it still starts, and about what only its authors can mend."""
+    try:
+        import sys
+        import warnings
+
+        from tomomesh.cli import main as run
+
+        if not sys.warnoptions:
+            warnings.simplefilter("ignore")
+        return run()
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
