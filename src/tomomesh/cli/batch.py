@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import io
-from ..errors import BatchError, UsageError
+from ..errors import BatchError, UsageError, printable
 from . import summary
 from .faults import as_error
 from .outputs import check_files, check_folder, make_folder
@@ -54,7 +54,7 @@ def reconstruct_each(chosen: Namespace, settings: Settings, work: Work) -> None:
     rows: list[dict[str, Any]] = []
     try:
         for number, study in enumerate(studies, 1):
-            place = f"{number}/{len(studies)} {study.name}"
+            place = printable(f"{number}/{len(studies)} {study.name}")
             if not chosen.quiet:
                 print(place, file=sys.stderr)
             rows.append(_done(study, chosen, settings, folder, work))
@@ -117,8 +117,8 @@ def _worked(
 def _tell_failures(chosen: Namespace, rows: list[dict[str, Any]]) -> None:
     failed = [row for row in rows if row["exit_code"]]
     if not (chosen.quiet or chosen.json):
-        print(summary.of_batch(rows, chosen.output))
+        print(printable(summary.of_batch(rows, chosen.output)))
     for row in failed:
-        print(f"failed    {row['name']}: {row['error']}", file=sys.stderr)
+        print(printable(f"failed    {row['name']}: {row['error']}"), file=sys.stderr)
     if failed:
         raise BatchError(f"{len(failed)} of {len(rows)} studies failed", file=str(Path(chosen.output, TABLE)))

@@ -11,7 +11,8 @@ def as_error(fault: Exception) -> TomomeshError:
         return fault
     if isinstance(fault, MemoryError):
         return ResourceError("the machine's memory is full", hint="a larger --cell-mm, or fewer slices")
-    return InternalCheckError(f"a bug: {type(fault).__name__} in {_place(fault)}", found=str(fault))
+    # not in its own words: they may quote what a study says of a patient
+    return InternalCheckError(f"a bug: {type(fault).__name__} in {_place(fault)}")
 
 
 def _place(fault: BaseException) -> str:
