@@ -74,5 +74,10 @@ def as_program(
     """Run a command in a process of its own, after some Python of the test's."""
     code = f"import sys\n{before}\nfrom tomomesh.__main__ import main\nsys.argv[1:] = {line!r}\nsys.exit(main())"
     return subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env={**os.environ, **(env or {})}
+        [sys.executable, "-c", code],
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
+        check=False,
+        env={**os.environ, **(env or {})},
     )

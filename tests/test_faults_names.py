@@ -100,6 +100,7 @@ def test_a_decimal_comma_changes_nothing(study: Path, tmp_path: Path) -> None:
     """Row 40: what the locale does to C's numbers must reach neither what is read nor what is written."""
     text = tmp_path / "c.xyz"
     np.savetxt(text, sphere(600) * 0.01 + [1.5, 2.25, 0.125])
+    before = locale.setlocale(locale.LC_ALL)
     for name in ("de_DE.UTF-8", "fr_FR.UTF-8", "de_DE.utf8", "C"):
         try:
             locale.setlocale(locale.LC_ALL, name)
@@ -115,7 +116,7 @@ def test_a_decimal_comma_changes_nothing(study: Path, tmp_path: Path) -> None:
         ]
         assert [main(line) for line in lines] == [0, 0, 0]
     finally:
-        locale.setlocale(locale.LC_ALL, "C")
+        locale.setlocale(locale.LC_ALL, before)
     with_commas = {path: value for path, value in contents(tmp_path).items() if path.endswith((".obj", ".csv", ".off"))}
     assert [main(line) for line in lines] == [0, 0, 0]
     plain = contents(tmp_path)
