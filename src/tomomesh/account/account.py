@@ -24,11 +24,15 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 SECTIONS = (
-    "study", "window", "networks", "rings", "points", "cubes", "surface", "fit", "quality", "print", "truth", "timings",
+    "study", "window", "networks", "rings", "points", "cubes", "surface", "fit", "quality", "truth", "timings",
     "settings", "versions", "warnings",
 )  # fmt: skip
-ORDER = (*SECTIONS[: SECTIONS.index("surface")], "stack", "voxels", "space", *SECTIONS[SECTIONS.index("surface") :])
-"""The same, and what stands in place of cubes: the stack of contours, the voxels, and the network in space."""
+ORDER = (
+    *SECTIONS[: SECTIONS.index("surface")], "stack", "voxels", "space", "surface", "fit", "quality", "print",
+    *SECTIONS[SECTIONS.index("truth") :],
+)  # fmt: skip
+"""The same, what stands in place of cubes (the stack of contours, the voxels, and the network in space), and the part
+to print."""
 PLAUSIBLE = 0.15
 """Difference from the volume of the rings over which a result is warned of."""
 FAR = 2.0
