@@ -5,13 +5,10 @@ from __future__ import annotations
 import io
 import struct
 import zlib
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
-from ...errors import FormatError, ResourceError
-from .element import ELEMENTS, WIDE, Element
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from ...errors import ResourceError
+from .element import WIDE
 
 DEFLATED = "1.2.840.10008.1.2.1.99"
 
@@ -57,15 +54,3 @@ def _is_deflated(file: BinaryIO) -> bool:
         found |= number == 0x10 and file.read(min(length, 64)).rstrip(b"\0 ") == DEFLATED.encode()
         file.seek(end)
     return found
-
-
-def inflated(path: Path) -> tuple[BinaryIO, Element]:
-    """Return the pixels of a packed file, and where they stand."""
-    import pydicom
-
-    data = pydicom.dcmread(path, force=True)
-    for keyword in ELEMENTS.values():
-        if keyword in data:
-            value = data[keyword].value
-            return io.BytesIO(value), Element(keyword, "OW", 0, len(value), encapsulated=False)
-    raise FormatError("the file holds no pixels", file=path.name, found="PixelData = missing", hint="a fresh copy")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ...errors import FormatError
 from ..source import leaves_folder, regular_files, third_party
 from .bad import listed
+from .dataset import read_dataset
 from .read import read_dicom
 
 if TYPE_CHECKING:
@@ -81,10 +82,8 @@ def _beside(index: Path) -> dict[str, Path]:
 
 def _named(index: Path) -> list[str]:
     """Return the names of all files in an index, each once, in its order."""
-    import pydicom
-
     with third_party("pydicom", index.name):
-        header = pydicom.dcmread(index, force=True)
+        header = read_dataset(index)
         records = header.get("DirectoryRecordSequence") or []
         names = [_joined(record.get("ReferencedFileID")) for record in records if "ReferencedFileID" in record]
     if not any(names):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import FormatError, TomomeshError, UnreadableError
 from ..source import first_bytes, third_party
-from .deflated import check_deflated
+from .dataset import read_dataset
 from .header import Frame, frames_of
 
 if TYPE_CHECKING:
@@ -85,12 +85,8 @@ def read_frames(paths: list[Path]) -> Reading:
 
 
 def _read_header(path: Path) -> Any:
-    import pydicom
-
-    with third_party("pydicom", path.name), path.open("rb") as file:
-        check_deflated(file, name=path.name)
-        header = pydicom.dcmread(file, force=True, stop_before_pixels=True)
-        header.pixels_at = file.tell()
+    with third_party("pydicom", path.name):
+        header = read_dataset(path, stop_before_pixels=True)
         for keyword in FIELDS:  # values are converted when they are first asked for, and may fail then
             header.get(keyword)
         kind = header.get("SOPClassUID") or header.file_meta.get("MediaStorageSOPClassUID")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import TomomeshError
 from ..source import third_party
+from .dataset import read_dataset
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,10 +26,8 @@ def storage_class(path: Path) -> str:
     FormatError
         Where the file cannot be read.
     """
-    import pydicom
-
     with third_party("pydicom", path.name):
-        header = pydicom.dcmread(path, force=True, specific_tags=["SOPClassUID"], stop_before_pixels=True)
+        header = read_dataset(path, specific_tags=["SOPClassUID"], stop_before_pixels=True)
         return str(header.get("SOPClassUID") or header.file_meta.get("MediaStorageSOPClassUID") or "")
 
 

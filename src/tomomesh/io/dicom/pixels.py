@@ -10,7 +10,8 @@ from ...errors import TomomeshError
 from ..limits import require_memory
 from ..source import third_party
 from .child import Child
-from .deflated import DEFLATED, inflated
+from .dataset import inflated
+from .deflated import DEFLATED
 from .element import Element, pixel_element
 from .encapsulated import LARGEST_FRAME_BYTES, SYNTAXES, read_encapsulated
 from .layout import Layout, layout_of

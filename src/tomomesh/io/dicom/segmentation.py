@@ -12,6 +12,7 @@ from ...errors import EmptyError, FormatError, GeometryError
 from ...model.volume import Volume
 from ..limits import require_memory
 from ..source import third_party
+from .dataset import read_dataset
 from .header import frames_of, numbers
 from .lattice import lattice_of
 from .names import shown
@@ -109,11 +110,9 @@ def read_segmentation(path: Path, settings: ReadSettings, *, study: str, select:
 
 
 def _header(path: Path) -> Segmentation:
-    import pydicom
-
     name = path.name
     with third_party("pydicom", name):
-        header = pydicom.dcmread(path, force=True, stop_before_pixels=True)
+        header = read_dataset(path, stop_before_pixels=True)
         frames = frames_of(path, header)
         kind = str(header.get("SegmentationType", "")) or "missing"
         if kind not in ("BINARY", "FRACTIONAL", LABELMAP):

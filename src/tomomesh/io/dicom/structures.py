@@ -12,6 +12,7 @@ from ...errors import EmptyError, FormatError, GeometryError, ResourceError, Tom
 from ...model.points import NEURON, RING, PointSet
 from ..source import counted, third_party
 from .contours import CLOSED, corners_of
+from .dataset import read_dataset
 from .kinds import STRUCTURES, storage_class
 from .names import shown
 from .planes import planes_of
@@ -109,10 +110,8 @@ def read_structure(path: Path, settings: CloudSettings) -> PointSet:
 
 def _listed(path: Path) -> list[Structure]:
     """Return the structures in the order of the file."""
-    import pydicom
-
     with third_party("pydicom", path.name):
-        data = pydicom.dcmread(path, force=True)
+        data = read_dataset(path)
         drawn: dict[str, list[Any]] = {}
         for one in data.get("ROIContourSequence") or []:
             drawn.setdefault(str(one.get("ReferencedROINumber")), []).extend(one.get("ContourSequence") or [])
