@@ -52,6 +52,10 @@ def _read_zip(path: Path, settings: ReadSettings, select: Sequence[int] | None =
 VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
     ".nii": read_nifti,
     ".nii.gz": read_nifti,
+    ".hdr": read_nifti,
+    ".hdr.gz": read_nifti,
+    ".img": read_nifti,
+    ".img.gz": read_nifti,
     ".nrrd": read_nrrd,
     ".nhdr": read_nrrd,
     ".mha": read_metaimage,
