@@ -20,6 +20,7 @@ from .gray import native
 from .limits import require_bytes, require_memory
 from .raster import gray_or_color
 from .source import existing_file, third_party
+from .tiff_pages import check_chain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -69,6 +70,7 @@ def read_tiff(path: Path, settings: ReadSettings) -> Volume:
     """
     name = str(existing_file(path))
     tifffile = required("tifffile", file=name)
+    check_chain(path, file=name)
     with _complaints_refused(name), third_party("tifffile", name), tifffile.TiffFile(path, _multifile=False) as pages:
         series = _only(pages.series, name)
         _check_promise(series, path.stat().st_size, name)
