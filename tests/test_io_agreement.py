@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from studies import DATA, shared
+from tomomesh import reconstruct
 from tomomesh.cli import main
-from tomomesh.io import read_mesh, read_volume
+from tomomesh.io import read_mesh, read_volume, write_mesh
 from tomomesh.settings import ReadSettings
 from writers import assert_agrees, needed
 
@@ -22,6 +23,9 @@ STUDIES = sorted(
     for path in DATA.rglob("*")
     if path.name.endswith(SUFFIXES) and "malformed" not in path.parts and not path.is_symlink()
 )
+LEVEL = 40.0
+"""A gray level of the brain."""
+
 ORDERS = [name for name in STUDIES if "nifti_space" in name]
 
 
@@ -52,20 +56,29 @@ class TestOneBrain:
             np.testing.assert_array_equal(volume.affine[:3, :3], volumes[0].affine[:3, :3])
             np.testing.assert_allclose(volume.affine, volumes[0].affine, atol=1e-5)  # the files' own origins
 
-    @pytest.mark.parametrize(("network", "names"), [("none", ORDERS), ("ring", ORDERS[::4])])
-    def test_they_give_one_mesh_up_to_the_files_own_origins(
-        self, tmp_path: Path, network: str, names: list[str]
-    ) -> None:
+    def test_they_give_one_mesh_up_to_the_files_own_origins(self, tmp_path: Path) -> None:
         shared("niivue")
-        level = float(np.percentile(read_volume(shared(names[0])).voxels, 99.5))
+        for number, name in enumerate(ORDERS):
+            write_mesh(
+                reconstruct(read_volume(shared(name)), network="none", lower=LEVEL).mesh, tmp_path / f"{number}.ply"
+            )
+        self.assert_one_mesh(tmp_path, ORDERS)
+
+    @pytest.mark.parametrize("network", ["none", "ring"])
+    def test_the_command_line_gives_one_mesh_too(self, tmp_path: Path, network: str) -> None:
+        shared("niivue")
+        names = [ORDERS[0], ORDERS[-1]]
         for number, name in enumerate(names):
             words = ["reconstruct", str(shared(name)), "-o", str(tmp_path / f"{number}.ply"), "--quiet"]
-            assert main([*words, "--lower", str(level), "--network", network]) == 0
-        first = read_mesh(tmp_path / "0.ply")
+            assert main([*words, "--lower", str(LEVEL), "--network", network]) == 0
+        self.assert_one_mesh(tmp_path, names)
+
+    def assert_one_mesh(self, folder: Path, names: list[str]) -> None:
+        first = read_mesh(folder / "0.ply")
         origins = [read_volume(shared(name)).affine[:3, 3] for name in names]
         for number, origin in enumerate(origins):
-            mesh = read_mesh(tmp_path / f"{number}.ply")
+            mesh = read_mesh(folder / f"{number}.ply")
             np.testing.assert_array_equal(mesh.faces, first.faces)
             np.testing.assert_allclose(mesh.vertices - origin, first.vertices - origins[0], rtol=0, atol=1e-9)
             if (origin == origins[0]).all():
-                assert (tmp_path / f"{number}.ply").read_bytes() == (tmp_path / "0.ply").read_bytes()
+                assert (folder / f"{number}.ply").read_bytes() == (folder / "0.ply").read_bytes()
