@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -132,12 +133,11 @@ def mgz(folder: Path, name: str, voxels: NDArray[Any]) -> Path:
 
 
 def itk(folder: Path, name: str, voxels: NDArray[Any], *, suffix: str, packed: bool = False) -> Path:
-    import SimpleITK
-
+    kit: Any = import_module("SimpleITK")
     path = folder / f"{name}{suffix}"
-    image = SimpleITK.GetImageFromArray(voxels)
+    image = kit.GetImageFromArray(voxels)
     image.SetSpacing((1.0, 1.0, 1.1))
-    SimpleITK.WriteImage(image, str(path), packed)
+    kit.WriteImage(image, str(path), packed)
     return path
 
 
@@ -163,14 +163,13 @@ def png(folder: Path, name: str, voxels: NDArray[Any]) -> Path:
     return folder / name
 
 
-def zarr(folder: Path, name: str, voxels: NDArray[Any], *, zarr_format: int) -> Path:
-    import zarr
-
+def ome_zarr(folder: Path, name: str, voxels: NDArray[Any], *, zarr_format: int) -> Path:
+    library: Any = import_module("zarr")
     path = folder / f"{name}.zarr"
     steps = [{"type": "scale", "scale": [1.0, 1.0, 1.0]}]
     axes = [{"name": axis, "type": "space", "unit": "millimeter"} for axis in "zyx"]
     images = [{"axes": axes, "datasets": [{"path": "0", "coordinateTransformations": steps}]}]
-    group = zarr.open_group(path, mode="w", zarr_format=zarr_format)
+    group = library.open_group(path, mode="w", zarr_format=zarr_format)
     group.attrs.update({"multiscales": images, "ome": {"version": "0.5", "multiscales": images}})
     group.create_array("0", shape=voxels.shape, dtype=voxels.dtype, chunks=(64, 128, 128))[...] = voxels
     return path
@@ -195,8 +194,8 @@ CASES: list[tuple[Any, ...]] = [
     (_named("TIFF, deflate", tiff, packed="zlib"), "tifffile"),
     (_named("NPY", npy), "NumPy"),
     (_named("PNG slices", png), "Pillow"),
-    (_named("OME-Zarr, blosc", zarr, zarr_format=2), "zarr"),
-    (_named("OME-Zarr, zstd", zarr, zarr_format=3), "zarr"),
+    (_named("OME-Zarr, blosc", ome_zarr, zarr_format=2), "zarr"),
+    (_named("OME-Zarr, zstd", ome_zarr, zarr_format=3), "zarr"),
 ]
 """How a volume is written, and who else reads it."""
 

@@ -34,7 +34,7 @@ FORMATS = pytest.mark.parametrize("zarr_format", [2, 3])
 def multiscales(names: str = "zyx", unit: str | None = "millimeter", per_mm: float = 1.0, **more: Any) -> Any:
     """Return the metadata of an image of one level at path 0."""
     kinds = {"t": "time", "c": "channel"}
-    axes = [{"name": name, "type": kinds.get(name, "space")} for name in names]
+    axes: list[dict[str, Any]] = [{"name": name, "type": kinds.get(name, "space")} for name in names]
     for axis in axes if unit else ():
         axis |= {"unit": unit} if axis["type"] == "space" else {}
     steps = [

@@ -6,7 +6,7 @@ import bz2
 import gzip
 import tracemalloc
 import zlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import nibabel
 import numpy as np
@@ -257,7 +257,8 @@ class TestTiff:
         with tifffile.TiffFile(tmp_path / "s.tif") as file:
             layout, pages = file.tiff, [page.offset for page in file.pages]
         for back in range(len(pages)):
-            width, order = layout.offsetsize, "little" if layout.byteorder == "<" else "big"
+            order: Literal["little", "big"] = "little" if layout.byteorder == "<" else "big"
+            width = layout.offsetsize
             count = int.from_bytes(raw[pages[-1] : pages[-1] + layout.tagnosize], order)
             end = pages[-1] + layout.tagnosize + count * layout.tagsize
             raw[end : end + width] = pages[back].to_bytes(width, order)

@@ -51,7 +51,8 @@ def balls(affine: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Return gray levels (K, J, I) that fall by 30 a millimeter through `LEVEL` at the balls' surfaces."""
     places = indices_of(SHAPE) @ affine[:3, :3].T + affine[:3, 3]
     away = np.linalg.norm(places[:, None] - centers_of(affine), axis=2) - RADII
-    return np.rint(LEVEL - 30 * away.min(axis=1)).clip(0, 255).astype(np.uint8).reshape(SHAPE)
+    gray = np.rint(LEVEL - 30 * away.min(axis=1)).clip(0, 255)
+    return np.asarray(gray.astype(np.uint8).reshape(SHAPE))
 
 
 def placed(directions: Any) -> NDArray[np.float64]:
