@@ -15,6 +15,7 @@ from tomomesh.cli import main
 from tomomesh.errors import FormatError, GeometryError, UnreadableError
 from tomomesh.io import read_volume
 from tomomesh.io.nifti import UNPLACED
+from tomomesh.io.studies import find_studies
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:
@@ -56,6 +57,10 @@ class TestPairs:
             (tmp_path / name).unlink()
         for path in sorted(tmp_path.iterdir()):
             assert_in_place(read_volume(path))
+
+    def test_it_is_one_study_of_a_folder(self, tmp_path: Path) -> None:
+        pair(tmp_path)
+        assert [(study.path.name, len(study.files)) for study in find_studies(tmp_path)] == [("s.hdr", 2)]
 
     def test_simpleitk_agrees(self, tmp_path: Path) -> None:
         sitk = pytest.importorskip("SimpleITK", reason="the package SimpleITK is not installed")

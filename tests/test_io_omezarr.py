@@ -16,6 +16,7 @@ from studies import assert_in_place, sampled
 from tomomesh.cli import main
 from tomomesh.errors import FormatError, GeometryError, ResourceError, TomomeshError, UsageError
 from tomomesh.io import limits, read_volume
+from tomomesh.io.studies import find_studies
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:
@@ -106,6 +107,14 @@ class TestPlaces:
         assert volume.spacing_mm == (1.0, 1.4, 4.0)
         with pytest.raises(UsageError, match="0 to 1"):
             read_volume(folder, settings=ReadSettings(level=2))
+
+    def test_it_is_one_study_of_a_folder(self, tmp_path: Path) -> None:
+        folder = write(tmp_path / "s.zarr")
+        (study,) = find_studies(tmp_path)
+        assert study.path == folder
+        before = study.state
+        chunk(folder).write_bytes(chunk(folder).read_bytes() + b"0")
+        assert find_studies(tmp_path)[0].state != before
 
     def test_without_a_unit_a_spacing_is_asked_for(self, tmp_path: Path) -> None:
         folder = write(tmp_path / "s.zarr", images=multiscales(unit=None))
