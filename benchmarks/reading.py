@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SHAPE = (200, 512, 512)
 """Slices, rows and columns: 105 MB of 16 bits."""
 
-REPEATS = 3
+REPEATS = 5
 MOST_TIME, MOST_MEMORY = 1.5, 2.2
 
 IMPORTS = {
