@@ -64,6 +64,14 @@ AFFINES = {
 }
 
 
+TURNED = {
+    **AFFINES,
+    "left-handed": affine_of(rotation(0.2, -0.3, 0.4) @ np.diag([1.0, -1.0, 1.0])),
+    "upside down": affine_of(np.diag([-1.0, 1.0, -1.0])),
+}
+SHEARED = affine_of(rotation(0.1, 0.2, -0.2) @ np.array([[1.0, 0.1, 0], [0, 1, 0.3], [0, 0, 1]]))
+
+
 def gray_at(places: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the gray level at (n, 3) millimeters: no turn, flip or shift leaves it as it is."""
     x, y, z = places.T

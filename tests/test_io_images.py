@@ -133,3 +133,14 @@ class TestSharedData:
         (tmp_path / "a.png").write_bytes((shared("malformed") / "truncated.png").read_bytes())
         with pytest.raises(FormatError, match=r"a\.png"):
             read_volume(tmp_path, settings=SPACING)
+
+
+def test_jpeg_slices(tmp_path: Path) -> None:
+    stored = np.tile(np.arange(5, dtype=np.uint8)[:, None, None] * 50, (1, 16, 24))
+    for suffix in (".jpg", ".jpeg"):
+        (tmp_path / suffix).mkdir()
+        for k, pixels in enumerate(stored):
+            Image.fromarray(pixels).save(tmp_path / suffix / f"s{k + 8}{suffix}", format="JPEG", quality=95)
+        volume = read_volume(tmp_path / suffix, settings=SPACING)
+        assert np.abs(volume.voxels.astype(int) - stored).max() <= 1
+        assert "JPEG slices" in volume.notes[0]

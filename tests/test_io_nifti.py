@@ -140,7 +140,6 @@ FAULTS = {
     "spacing NaN": (field("pixdim", np.nan, 3), GeometryError, "pixdim[3] = nan"),
     "spacing infinite": (field("pixdim", np.inf, 3), GeometryError, "pixdim[3] = inf"),
     "spacing 1e-30": (field("pixdim", 1e-30, 3), GeometryError, "pixdim[3] = 1e-30"),
-    "no forms": (no_forms, GeometryError, "--spacing x y z"),
     "singular": (flat, GeometryError, "singular"),
     "affine NaN": (field("srow_x", np.nan, 1), GeometryError, "singular"),
     "unit": (field("xyzt_units", 5), GeometryError, "xyzt_units = 5"),
@@ -173,9 +172,9 @@ class TestFaults:
         assert word in str(caught.value)
         assert "f.nii" in str(caught.value)
 
-    @pytest.mark.parametrize("fault", ["spacing 0", "spacing NaN", "no forms"])
-    def test_a_given_spacing_stands_in_for_a_missing_frame(self, tmp_path: Path, fault: str) -> None:
-        path = write_nifti(tmp_path / "f.nii", sampled(AFFINES["axial"]), AFFINES["axial"], FAULTS[fault][0])
+    @pytest.mark.parametrize("edit", [FAULTS["spacing 0"][0], FAULTS["spacing NaN"][0], no_forms])
+    def test_a_given_spacing_stands_in_for_a_missing_frame(self, tmp_path: Path, edit: Callable[[Any], None]) -> None:
+        path = write_nifti(tmp_path / "f.nii", sampled(AFFINES["axial"]), AFFINES["axial"], edit)
         volume = read_volume(path, settings=ReadSettings(spacing=(0.5, 0.7, 2)))
         np.testing.assert_array_equal(volume.affine, np.diag([0.5, 0.7, 2, 1]))
         assert "--spacing" in volume.notes[0]
@@ -278,7 +277,8 @@ class TestLabels:
         assert first[3:8] == bytes(5)  # no name, no time
 
     def test_sides_that_nifti_cannot_hold_are_refused(self, tmp_path: Path) -> None:
-        volume = read_volume(write_nifti(tmp_path / "s.nii", np.zeros((1, 1, 32767), np.int8), np.eye(4)))
+        nibabel.save(nibabel.Nifti2Image(np.zeros((32768, 1, 1), np.int8), np.eye(4)), tmp_path / "s.nii")
+        volume = read_volume(tmp_path / "s.nii")
         with pytest.raises(OutputError, match="32767"):
             write_labels(np.zeros((1, 1, 32768), np.uint16), volume, tmp_path / "l.nii")
         with pytest.raises(UsageError):
@@ -322,7 +322,6 @@ class TestSharedData:
             ("truncated_data.nii", FormatError),
             ("bad_datatype.nii.gz", FormatError),
             ("dim_huge_bomb.nii.gz", ResourceError),
-            ("no_qform_no_sform.nii.gz", GeometryError),
             ("pixdim_zero.nii.gz", GeometryError),
             ("dim_zero.nii.gz", FormatError),
             ("empty.nii.gz", FormatError),

@@ -6,7 +6,7 @@ import bz2
 import gzip
 import tracemalloc
 import zlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import nibabel
 import numpy as np
@@ -249,6 +249,22 @@ class TestTiff:
             except FormatError:
                 continue
             np.testing.assert_array_equal(voxels, STORED)
+
+    @pytest.mark.parametrize("more", [{}, {"bigtiff": True}, {"byteorder": ">"}])
+    def test_a_circle_of_pages_is_refused(self, tmp_path: Path, more: dict[str, Any]) -> None:
+        tifffile = pytest.importorskip("tifffile", reason="the package tifffile is not installed")
+        raw = bytearray(self.write(tmp_path / "s.tif", **more))
+        with tifffile.TiffFile(tmp_path / "s.tif") as file:
+            layout, pages = file.tiff, [page.offset for page in file.pages]
+        for back in range(len(pages)):
+            order: Literal["little", "big"] = "little" if layout.byteorder == "<" else "big"
+            width = layout.offsetsize
+            count = int.from_bytes(raw[pages[-1] : pages[-1] + layout.tagnosize], order)
+            end = pages[-1] + layout.tagnosize + count * layout.tagsize
+            raw[end : end + width] = pages[back].to_bytes(width, order)
+            (tmp_path / "c.tif").write_bytes(bytes(raw))
+            with pytest.raises(FormatError, match=f"circle.*pages = {len(pages)}"):
+                read_volume(tmp_path / "c.tif", settings=SPACING)
 
     def test_files_that_ome_names_are_not_opened(self, tmp_path: Path) -> None:
         (tmp_path / "in").mkdir()

@@ -14,8 +14,8 @@ CHECKED_FORMATS = ("stl", "ply", "obj", "off")
 CLOUD_FORMATS = ("ply", "xyz", "txt", "csv", "npy", "npz", "pcd", "las", "laz", "e57", "obj", "off", "stl")
 STUDY_FORMATS = ("nii", "nii.gz", "nrrd", "mha", "mgh", "mgz", "npy", "tif", "tiff", "dcm", "ima", "zip")
 """Single files that hold a whole study."""
-HEADER_FORMATS = ("nhdr", "mhd")
-"""Headers of studies whose voxels lie in another file."""
+HEADER_FORMATS = ("nhdr", "mhd", "hdr", "hdr.gz", "img", "img.gz")
+"""Studies whose header and voxels lie in two files."""
 TEXTS = ("obj", "off", "xyz", "csv")
 """Formats that a terminal can show."""
 
@@ -28,7 +28,7 @@ def either(formats: Sequence[str]) -> str:
 
 MESH, POINT, LABEL, CHECKED = map(either, (MESH_FORMATS, POINT_FORMATS, LABEL_FORMATS, CHECKED_FORMATS))
 STUDY = (
-    f"a file ({either(STUDY_FORMATS + HEADER_FORMATS)}), a folder of DICOM slices, "
+    f"a file ({either(STUDY_FORMATS + HEADER_FORMATS)}), a folder of DICOM slices or of OME-Zarr, "
     "or a folder of PNG, TIFF or JPEG slices (with --spacing)"
 )
 CLOUD = (

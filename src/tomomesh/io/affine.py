@@ -65,6 +65,26 @@ def check_affine(affine: NDArray[np.float64], *, file: str, hint: str) -> None:
     )
 
 
+def required_spacing(
+    spacing: tuple[float, ...] | None, *, file: str, what: str = "the file does not say how far its voxels are apart"
+) -> tuple[float, ...]:
+    """Return the spacing that was given for a file that holds none.
+
+    Raises
+    ------
+    GeometryError
+        Where none was.
+    """
+    if spacing is None:
+        raise GeometryError(what, file=file, expected="the distance of the voxels in mm", hint="--spacing x y z")
+    return spacing
+
+
+def brought_to_mm(factor: float) -> tuple[str, ...]:
+    """Return the note on coordinates that are in another unit."""
+    return () if factor == 1 else (f"coordinates were brought to millimeters: x {factor:g}",)
+
+
 def passed_over(spacing: Sequence[float] | None) -> tuple[str, ...]:
     """Return the note on a spacing that was given for a file that holds its own."""
     return (NOT_GIVEN,) if spacing else ()

@@ -7,7 +7,10 @@ from typing import Any
 
 from ..errors import FormatError
 
-EXTRAS = {"tifffile": "tiff", "imagecodecs": "tiff", "laspy": "clouds", "lazrs": "clouds", "pye57": "clouds"}
+EXTRAS = {
+    "tifffile": "tiff", "imagecodecs": "tiff", "zarr": "zarr",
+    "laspy": "clouds", "lazrs": "clouds", "pye57": "clouds",
+}  # fmt: skip
 """Package to the extra that brings it."""
 
 

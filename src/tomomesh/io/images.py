@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import FormatError, GeometryError, ResourceError
 from ..model.volume import Volume
 from ..settings import ReadSettings
-from .affine import upright
+from .affine import required_spacing, upright
 from .gray import native, without_holes
 from .limits import require_memory
 from .source import existing_file, suffix_of, third_party
@@ -65,11 +65,7 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
             found=" and ".join(kinds),
             expected="one kind",
         )
-    if settings.spacing is None:
-        raise GeometryError(
-            f"{kinds[0]} slices hold no spacing", file=folder, expected="the distance of the voxels in mm",
-            hint="--spacing x y z",
-        )  # fmt: skip
+    spacing = required_spacing(settings.spacing, file=folder, what=f"{kinds[0]} slices hold no spacing")
     ordered = sorted(files, key=natural)
     first = _pixels(ordered[0])
     require_memory(first.nbytes * len(ordered), file=folder)
@@ -80,7 +76,7 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
         stack[k] = pixels
     voxels, notes = without_holes(stack, file=folder)
     note = f"{len(ordered)} {kinds[0]} slices in the order of their names: columns left, rows back, slices up"
-    return Volume.from_stored(voxels, upright(settings.spacing), notes=(note, *notes))
+    return Volume.from_stored(voxels, upright(spacing), notes=(note, *notes))
 
 
 def read_picture(path: str | Path) -> Volume:

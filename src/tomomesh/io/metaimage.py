@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import FormatError, GeometryError
 from ..model.volume import Volume
-from .affine import GIVEN, UNTURNED, check_affine, check_spacing, passed_over, upright
+from .affine import GIVEN, UNTURNED, check_affine, check_spacing, passed_over, required_spacing, upright
 from .detached import beside, check_count, numbered
 from .raster import TEXT, Raster, floats_of, gray_or_color, header_bytes, read_raster, sizes_of
 from .unpack import PLAIN, ZLIB
@@ -111,16 +111,8 @@ def _channels(fields: Fields, name: str) -> int:
 def _frame(fields: Fields, settings: ReadSettings, name: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Return the affine in millimeters, LPS, and notes."""
     spacing = _numbers(fields, ("ElementSpacing", "ElementSize"), 1, name)
-    if spacing is None and settings.spacing is None:
-        raise GeometryError(
-            "the file does not say how far its voxels are apart",
-            file=name,
-            found="ElementSpacing = missing",
-            expected="the distance of the voxels in mm",
-            hint=HINT,
-        )
     if spacing is None:
-        return upright(settings.spacing or ()), (GIVEN,)
+        return upright(required_spacing(settings.spacing, file=name)), (GIVEN,)
     check_spacing(spacing.tolist(), [f"ElementSpacing[{n}]" for n in range(3)], file=name, hint=HINT)
     matrix, origin = _numbers(fields, DIRECTIONS, 2, name), _numbers(fields, ORIGINS, 1, name)
     affine = np.eye(4)

@@ -1,17 +1,17 @@
-"""NIfTI studies: RAS becomes LPS here."""
+"""NIfTI studies, in one file or as a pair of header and voxels: RAS becomes LPS here."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import FormatError, GeometryError
 from ..model.volume import Volume
-from .affine import GIVEN, SMALLEST_SPACING, check_affine, check_spacing, passed_over, upright
-from .gray import check_scale, native, scaled, scaled_dtype, without_holes
-from .limits import require_bytes
+from .affine import GIVEN, SMALLEST_SPACING, brought_to_mm, check_affine, check_spacing, passed_over, upright
+from .detached import beside
+from .gray import native, scaled, scaled_dtype, without_holes
+from .nifti_header import SIZES, Layout, layout_of, unpack_header
 from .source import existing_file, suffix_of, third_party
 from .unpack import GZIP, PLAIN, check_promise, fill, unpacked
 
@@ -28,123 +28,74 @@ FLIP = np.diag([-1.0, -1.0, 1.0, 1.0])
 MM_PER_UNIT = {0: 1.0, 1: 1000.0, 2: 1.0, 3: 0.001}
 """Millimeters in the header's unit: unknown, meter, millimeter, micron."""
 
-SIZES = {348: "Nifti1Header", 540: "Nifti2Header"}
-"""Header lengths in bytes, and nibabel's classes for them."""
+PAIRED = {".hdr": ".img", ".img": ".hdr"}
+"""Suffixes of a pair of files, and their partners'."""
+
+UNPLACED = "no orientation in the file (sform_code = qform_code = 0): taken for columns right, rows front, slices up"
+"""The note on a file of the standard's method 1."""
 
 HINT = "--spacing x y z"
 
 
-@dataclass(frozen=True)
-class Layout:
-    """What a header promises, checked.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Sizes I, J, K as they are stored, fastest first.
-    dtype : data type
-        Of one voxel.
-    offset : int
-        Bytes before the first voxel.
-    slope, intercept : float
-        Scale of the gray levels; 1 and 0 where the header has none.
-    """
-
-    shape: tuple[int, int, int]
-    dtype: np.dtype[Any]
-    offset: int
-    slope: float
-    intercept: float
-
-    @property
-    def promised(self) -> int:
-        """Bytes of all voxels."""
-        return self.shape[0] * self.shape[1] * self.shape[2] * self.dtype.itemsize
-
-
 def read_nifti(path: Path, settings: ReadSettings) -> Volume:
-    """Read a study from a ``.nii`` or ``.nii.gz`` file.
+    """Read a study from a ``.nii`` file or from a ``.hdr`` and its ``.img``, each packed by gzip or not.
 
     Parameters
     ----------
     path : Path
-        The file.
+        The file; of a pair, either, and the other one beside it.
     settings : ReadSettings
         `spacing` stands in for a frame that the file does not hold.
 
     Returns
     -------
     Volume
-        In patient millimeters, LPS. The sform is used where its code is not 0, else the qform.
+        In patient millimeters, LPS. The sform is used where its code is not 0, else the qform, else the pixel sizes
+        alone, with a note: the standard's method 1, x = pixdim[1] i to the right, y = pixdim[2] j to the front,
+        z = pixdim[3] k up.
 
     Raises
     ------
     UnreadableError, FormatError, GeometryError, ResourceError
-        As the header or the voxels demand.
+        As the header or the voxels demand; `GeometryError` too for Analyze 7.5 without a `spacing`.
     """
-    path, name = existing_file(path), str(path)
-    packing = GZIP if suffix_of(path) == ".nii.gz" else PLAIN
-    with unpacked(path, packing, file=name) as stream:
-        start = stream.read(max(SIZES))
-        header = _header(start, name)
-        layout = _layout(header, name)
-        affine, notes = _frame(header, settings, name)
-        check_promise(layout.offset + layout.promised, path.stat().st_size, packing, file=name)
-        data = np.empty(layout.promised, np.uint8)
+    name = str(path)
+    front, back = _files(existing_file(path))
+    with unpacked(front, _packing(front), file=name) as stream:
+        header = unpack_header(stream.read(max(SIZES)), settings, paired=front != back, file=name)
+    layout = layout_of(header, paired=front != back, file=name)
+    affine, notes = _frame(header, settings, name)
+    check_promise(layout.offset + layout.promised, back.stat().st_size, _packing(back), file=name)
+    data = np.empty(layout.promised, np.uint8)
+    with unpacked(back, _packing(back), file=name) as stream:
         stream.seek(layout.offset)
         fill(data, stream, file=name)
     stored, more = _gray(data, layout, name)
     return Volume.from_stored(stored, affine, notes=notes + more)
 
 
-def _header(start: bytes, name: str) -> Any:
-    """Unpack the header as it stands: nibabel's own checks would repair it in silence."""
-    require_bytes(min(SIZES), len(start), file=name)
-    size = next((n for n in SIZES if n in (_int(start, "<"), _int(start, ">"))), 0)
-    if not size or not start[344 if size == 348 else 4 :].startswith((b"n+1\0", b"n+2\0")):
-        raise FormatError("the file is no NIfTI file", file=name, expected="NIfTI-1 or NIfTI-2 in one file")
-    require_bytes(size, len(start), file=name)
-    import nibabel
-
-    with third_party("nibabel", name):
-        return getattr(nibabel, SIZES[size])(start[:size], check=False)
+def _packing(path: Path) -> str:
+    return GZIP if suffix_of(path).endswith(".gz") else PLAIN
 
 
-def _int(start: bytes, order: str) -> int:
-    return int(np.frombuffer(start, f"{order}i4", 1)[0])
-
-
-def _layout(header: Any, name: str) -> Layout:
-    dim, ndim = [int(size) for size in header["dim"]], int(header["dim"][0])
-    if not 2 <= ndim <= 7 or min(dim[1 : ndim + 1]) < 1:
-        raise FormatError("the sizes of the volume are invalid", file=name, found=f"dim = {dim}", expected="all over 0")
-    sizes = [*dim[1 : ndim + 1], 1][: max(ndim, 3)]
-    if any(size > 1 for size in sizes[3:]):
+def _files(path: Path) -> tuple[Path, Path]:
+    """Return the file with the header and that with the voxels; never one outside of the folder."""
+    plain = path.with_suffix("") if _packing(path) == GZIP else path
+    suffix = plain.suffix.lower()
+    if suffix not in PAIRED:
+        return path, path
+    other = PAIRED[suffix].upper() if plain.suffix.isupper() else PAIRED[suffix]
+    names = [plain.with_suffix(other + packed).name for packed in ("", ".gz")]
+    found = [name for name in names if path.with_name(name).exists()]
+    if not found:
         raise FormatError(
-            "the file holds several frames",
-            file=name,
-            found=f"dim = {sizes}",
-            expected="one volume",
-            hint="one frame, written to a file of its own",
+            "the other file of the pair is missing",
+            file=str(path),
+            expected=f"{names[0]} beside it",
+            hint="the header together with its voxels",
         )
-    slope, intercept = float(header["scl_slope"]), float(header["scl_inter"])
-    if slope == 0:  # the standard's way to say: not scaled
-        slope, intercept = 1.0, 0.0
-    check_scale(slope, intercept, file=name)
-    offset = float(header["vox_offset"])
-    if not offset >= int(header["sizeof_hdr"]) or not offset.is_integer():
-        raise FormatError("the place of the voxels is invalid", file=name, found=f"vox_offset = {offset:g}")
-    return Layout((sizes[0], sizes[1], sizes[2]), _dtype(header, name), int(offset), slope, intercept)
-
-
-def _dtype(header: Any, name: str) -> np.dtype[Any]:
-    from nibabel.nifti1 import data_type_codes
-
-    code = int(header["datatype"])
-    dtype: np.dtype[Any] = np.dtype(data_type_codes.dtype.get(code, np.void))
-    if not dtype.itemsize:  # 0 and 1, an unknown kind and single bits, have none either
-        raise FormatError("the voxels are of an unknown kind", file=name, found=f"datatype = {code}")
-    return dtype.newbyteorder(header.endianness)
+    partner = beside(path, found[0])
+    return (path, partner) if suffix == ".hdr" else (partner, path)
 
 
 def _frame(header: Any, settings: ReadSettings, name: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
@@ -155,20 +106,12 @@ def _frame(header: Any, settings: ReadSettings, name: str) -> tuple[NDArray[np.f
     if settings.spacing and broken:
         return upright(settings.spacing), (GIVEN,)
     check_spacing(pixdim, ["pixdim[1]", "pixdim[2]", "pixdim[3]"], file=name, hint=HINT)
-    if not forms:
-        raise GeometryError(
-            "the file does not say where its voxels are",
-            file=name,
-            found="sform_code = 0, qform_code = 0",
-            expected="one of them over 0",
-            hint=HINT,
-        )
     with third_party("nibabel", name):
-        affine = np.asarray(header.get_sform() if forms[0] == "sform" else header.get_qform(), np.float64)
+        affine = getattr(header, f"get_{forms[0]}")() if forms else upright(pixdim)
     unit, notes = _unit(header, name)
-    affine = np.diag([unit, unit, unit, 1.0]) @ FLIP @ affine
+    affine = np.diag([unit, unit, unit, 1.0]) @ FLIP @ np.asarray(affine, np.float64)
     check_affine(affine, file=name, hint="a file with a valid sform")
-    return affine, notes + passed_over(settings.spacing)
+    return affine, (() if forms else (UNPLACED,)) + notes + passed_over(settings.spacing)
 
 
 def _unit(header: Any, name: str) -> tuple[float, tuple[str, ...]]:
@@ -181,7 +124,7 @@ def _unit(header: Any, name: str) -> tuple[float, tuple[str, ...]]:
             expected="0 to 3",
         )
     factor = MM_PER_UNIT[code]
-    return factor, () if factor == 1 else (f"coordinates were brought to millimeters: x {factor:g}",)
+    return factor, brought_to_mm(factor)
 
 
 def _gray(data: NDArray[np.uint8], layout: Layout, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:

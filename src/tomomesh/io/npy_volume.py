@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..errors import FormatError, GeometryError
+from ..errors import FormatError
 from ..model.volume import Volume
-from .affine import GIVEN, upright
+from .affine import GIVEN, required_spacing, upright
 from .arrays import npy_header
 from .raster import Raster, gray_or_color, header_bytes, read_raster
 from .unpack import PLAIN
@@ -46,11 +46,8 @@ def read_npy_volume(path: Path, settings: ReadSettings) -> Volume:
             found=f"shape = {shape}",
             expected="(slices, rows, columns), or colors behind",
         )
-    if settings.spacing is None:
-        raise GeometryError(
-            "NPY arrays hold no spacing", file=name, expected="the distance of the voxels in mm", hint="--spacing x y z"
-        )
+    spacing = required_spacing(settings.spacing, file=name, what="NPY arrays hold no spacing")
     numbers = read_raster(Raster(shape[::-1] if by_columns else shape, dtype, PLAIN, (path,), start), file=name)
     stored = (numbers.T if by_columns else numbers).reshape(*shape[:3], -1)
     voxels, notes = gray_or_color(stored, stored.shape[3], file=name)
-    return Volume.from_stored(voxels, upright(settings.spacing), notes=(GIVEN, *notes))
+    return Volume.from_stored(voxels, upright(spacing), notes=(GIVEN, *notes))

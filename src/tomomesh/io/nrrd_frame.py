@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import FormatError, GeometryError
-from .affine import GIVEN, UNTURNED, check_affine, check_spacing, passed_over, upright
+from .affine import GIVEN, UNTURNED, brought_to_mm, check_affine, check_spacing, passed_over, required_spacing, upright
 from .raster import floats_of
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def _unit(fields: Mapping[str, str], file: str) -> tuple[float, tuple[str, ...]]
         raise GeometryError(
             "the unit of the coordinates is unknown", file=file, found=found, expected="mm | cm | m | um"
         )
-    return factor, () if factor == 1 else (f"coordinates were brought to millimeters: x {factor:g}",)
+    return factor, brought_to_mm(factor)
 
 
 def _without_directions(
@@ -145,12 +145,4 @@ def _without_directions(
         spacings = floats_of(words, "spacings", file=file)[spatial].tolist()
         check_spacing(spacings, ["spacings[0]", "spacings[1]", "spacings[2]"], file=file, hint=HINT)
         return upright(spacings), (UNTURNED,)
-    if settings.spacing is None:
-        raise GeometryError(
-            "the file does not say where its voxels are",
-            file=file,
-            found="space directions, spacings = missing",
-            expected="one of them",
-            hint=HINT,
-        )
-    return upright(settings.spacing), (GIVEN,)
+    return upright(required_spacing(settings.spacing, file=file)), (GIVEN,)

@@ -11,6 +11,7 @@ from ..errors import FormatError, TomomeshError, UnreadableError
 from .dicom import is_dicom, list_stacks
 from .images import FAMILIES
 from .naming import distinct_names
+from .omezarr import is_zarr
 from .source import existing, regular_files, suffix_of
 from .volumes import VOLUME_READERS
 
@@ -20,8 +21,10 @@ if TYPE_CHECKING:
 
 SLICES = (".dcm", ".ima", *FAMILIES)
 """Suffixes of files that may be one slice of several."""
-HEADERS = (".nhdr", ".mhd")
+HEADERS = (".nhdr", ".mhd", ".hdr", ".hdr.gz")
 """Suffixes of headers whose voxels lie in other files beside them."""
+VOXELS = (".img", ".img.gz")
+"""Suffixes of files that belong to a header beside them."""
 PAGES = (".tif", ".tiff")
 """Suffixes of files that hold one slice, or all pages of a study."""
 
@@ -104,8 +107,10 @@ def find_studies(folder: str | Path, *, without: Iterable[Path] = (), series: in
 
 def _in_folder(folder: Path, top: Path, series: int | None, *, deep: bool) -> list[Study]:
     files, _ = regular_files(folder, deep=deep)
+    if deep and is_zarr(folder):
+        return [Study(_joined(folder, top), folder, None, tuple(files))]
     others = (path for path in files if suffix_of(path) not in SLICES or (not deep and suffix_of(path) in PAGES))
-    volumes = [path for path in others if suffix_of(path) in VOLUME_READERS]
+    volumes = [path for path in others if suffix_of(path) in VOLUME_READERS and suffix_of(path) not in VOXELS]
     found = [Study(_joined(path, top), path, None, _beside(path)) for path in volumes]
     dicom = [path for path in files if path not in volumes and is_dicom(path)]
     if dicom:

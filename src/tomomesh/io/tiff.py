@@ -12,14 +12,15 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
-from ..errors import FormatError, GeometryError
+from ..errors import FormatError
 from ..model.volume import Volume
-from .affine import GIVEN, UNTURNED, check_spacing, passed_over, upright
+from .affine import GIVEN, UNTURNED, check_spacing, passed_over, required_spacing, upright
 from .extras import required
 from .gray import native
 from .limits import require_bytes, require_memory
 from .raster import gray_or_color
 from .source import existing_file, third_party
+from .tiff_pages import check_chain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -69,6 +70,7 @@ def read_tiff(path: Path, settings: ReadSettings) -> Volume:
     """
     name = str(existing_file(path))
     tifffile = required("tifffile", file=name)
+    check_chain(path, file=name)
     with _complaints_refused(name), third_party("tifffile", name), tifffile.TiffFile(path, _multifile=False) as pages:
         series = _only(pages.series, name)
         _check_promise(series, path.stat().st_size, name)
@@ -80,27 +82,36 @@ def read_tiff(path: Path, settings: ReadSettings) -> Volume:
     return Volume.from_stored(voxels, upright(spacing), notes=notes + more)
 
 
+class _Complaints(logging.Handler):
+    """Keep what is logged as an error."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.ERROR)
+        self.found: list[logging.LogRecord] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.found.append(record)
+
+
 @contextmanager
 def _complaints_refused(name: str) -> Iterator[None]:
     """Refuse what tifffile only logs: pages behind a broken link would be missing in silence."""
-    found: list[logging.LogRecord] = []
-    handler, logger = logging.Handler(logging.ERROR), logging.getLogger("tifffile")
-    handler.emit = found.append  # type: ignore[assignment]
+    complaints, logger = _Complaints(), logging.getLogger("tifffile")
     propagate, logger.propagate = logger.propagate, False
-    logger.addHandler(handler)
+    logger.addHandler(complaints)
     try:
         yield
     except FormatError:
-        if not found:  # else they tell why
+        if not complaints.found:  # else they tell why
             raise
     finally:
-        logger.removeHandler(handler)
+        logger.removeHandler(complaints)
         logger.propagate = propagate
-    if found:
+    if complaints.found:
         raise FormatError(
             "the pages of the file are damaged",
             file=name,
-            found=f"tifffile = {len(found)} complaints",
+            found=f"tifffile = {len(complaints.found)} complaints",
             expected="a whole and valid file",
             hint="a fresh copy of the file",
         )
@@ -156,14 +167,7 @@ def _spacing(pages: Any, settings: ReadSettings, name: str) -> Spacing:
         check_spacing(own[0], ["spacing along x", "spacing along y", "spacing along z"], file=name, hint="another file")
         placed = tuple(value * MM_PER_UNIT[unit] for value, unit in zip(*own, strict=True))
         return placed, (UNTURNED, *passed_over(settings.spacing))
-    if settings.spacing is None:
-        raise GeometryError(
-            "the file does not say how far its voxels are apart",
-            file=name,
-            expected="the distance of the voxels in mm",
-            hint="--spacing x y z",
-        )
-    return settings.spacing, (GIVEN,)
+    return required_spacing(settings.spacing, file=name), (GIVEN,)
 
 
 def _of_ome(text: str, name: str) -> Spacing | None:

@@ -17,6 +17,7 @@ from .metaimage import read_metaimage
 from .nifti import read_nifti
 from .npy_volume import read_npy_volume
 from .nrrd import read_nrrd
+from .omezarr import is_zarr, read_omezarr
 from .source import counted, existing, existing_file, regular_files, suffix_of
 from .tiff import read_tiff
 
@@ -52,6 +53,10 @@ def _read_zip(path: Path, settings: ReadSettings, select: Sequence[int] | None =
 VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
     ".nii": read_nifti,
     ".nii.gz": read_nifti,
+    ".hdr": read_nifti,
+    ".hdr.gz": read_nifti,
+    ".img": read_nifti,
+    ".img.gz": read_nifti,
     ".nrrd": read_nrrd,
     ".nhdr": read_nrrd,
     ".mha": read_metaimage,
@@ -67,7 +72,7 @@ VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
 }
 """Suffix of a single file to its reader; folders, and DICOM of any name, are known by their content."""
 
-READABLE = "a folder of DICOM, PNG, TIFF or JPEG slices, a DICOM file, " + " | ".join(
+READABLE = "a folder of DICOM, PNG, TIFF or JPEG slices, of OME-Zarr, a DICOM file, " + " | ".join(
     suffix for suffix in VOLUME_READERS if suffix not in (".dcm", ".ima")
 )
 
@@ -81,7 +86,7 @@ def read_volume(
     ----------
     path : path
         A DICOM, NIfTI, NRRD, MetaImage, MGH, NPY or multi-page TIFF file, a folder of DICOM, PNG, TIFF or JPEG
-        slices, a DICOMDIR, or a zip file of one of these.
+        slices or of OME-Zarr, a DICOMDIR, or a zip file of one of these.
     settings : ReadSettings, optional
         What to do where the files leave a choice.
     select : sequence of int, optional
@@ -108,6 +113,8 @@ def read_volume(
         Where the voxels do not fit into the memory.
     """
     path, settings = existing(path), settings or ReadSettings()
+    if path.is_dir() and is_zarr(path):
+        return read_omezarr(path, settings)
     if path.is_dir():
         return _read_folder(path, settings, select)
     existing_file(path)

@@ -29,3 +29,7 @@ class ReadSettings(Group):
     skip_bad: bool = param(
         False, "go on without the files of a series that cannot be read, where the others still make a regular stack"
     )
+    level: int = param(0, "level of an OME-Zarr pyramid, 0 being the full resolution", low=0)
+    fill_chunks: bool = param(
+        False, "take missing chunks of a Zarr array for its fill value, whatever the voxels beside them are"
+    )

@@ -1,0 +1,38 @@
+"""Volumes as NPY arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from studies import AFFINES, assert_in_place, sampled
+from tomomesh.errors import FormatError, GeometryError
+from tomomesh.io import read_volume
+from tomomesh.settings import ReadSettings
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+SPACING = ReadSettings(spacing=(0.5, 0.7, 2.0))
+
+
+class TestNpy:
+    def test_a_spacing_puts_it_in_place(self, tmp_path: Path) -> None:
+        stored = sampled(np.diag([0.5, 0.7, 2, 1]))
+        for name, array in (("c", stored), ("f", np.asfortranarray(stored)), ("b", stored.astype(">i2"))):
+            np.save(tmp_path / f"{name}.npy", array)
+            assert_in_place(read_volume(tmp_path / f"{name}.npy", settings=SPACING))
+
+    def test_without_it_one_is_asked_for(self, tmp_path: Path) -> None:
+        np.save(tmp_path / "a.npy", sampled(AFFINES["axial"]))
+        with pytest.raises(GeometryError, match="--spacing x y z"):
+            read_volume(tmp_path / "a.npy")
+
+    @pytest.mark.parametrize("array", [np.zeros((3, 3)), np.zeros((2, 3, 4, 5)), np.zeros((2, 0, 3)), np.array([{}])])
+    def test_other_arrays_are_refused(self, tmp_path: Path, array: Any) -> None:
+        np.save(tmp_path / "a.npy", array, allow_pickle=True)
+        with pytest.raises(FormatError):
+            read_volume(tmp_path / "a.npy", settings=SPACING)
