@@ -181,14 +181,11 @@ def _window_of_picture(path: str, settings: Settings) -> NDArray[np.float64]:
 
 
 def _inspect(chosen: Namespace) -> None:
-    from ..segment.crop import crop
-    from ..segment.survey import survey
-    from . import findings
+    from .findings import of_study
+    from .inspection import inspected
 
-    settings = settings_of(chosen)
-    volume = io.read_volume(chosen.study, settings=settings.read)
-    found = survey(crop(volume, settings.part, volume.thickest_axis())[0])
-    _say(found, None if chosen.json else findings.of_study(found, chosen.study))
+    found = inspected(chosen.study, settings_of(chosen))
+    _say(found, None if chosen.json else of_study(found))
 
 
 def _check(chosen: Namespace) -> None:

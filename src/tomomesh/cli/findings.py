@@ -2,19 +2,75 @@
 
 from __future__ import annotations
 
-from typing import Any
+from textwrap import TextWrapper
+from typing import TYPE_CHECKING, Any
 
+from .series_table import TILTED, table_of
 from .summary import limit_in_words
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
 BARS = " ▁▂▃▄▅▆▇█"
+SIDES = 6
 LISTED = 12
 """Labels that are listed, the largest first."""
-TILTED = 0.1
-"""Degrees from which on a tilt is mentioned."""
+UNBROKEN = "\N{NO-BREAK SPACE}"
+INDENT, WIDTH = 10, 100
+"""Columns of the headings and of a line; commands are never broken."""
 
 
-def of_study(found: dict[str, Any], study: str) -> list[str]:
-    """Say what is in a study, and what to do with it."""
+def of_study(found: dict[str, Any]) -> list[str]:
+    """Say what is in a study, what would be refused, and what to do with it.
+
+    Parameters
+    ----------
+    found : dict
+        As `inspected` returns it.
+    """
+    refused, last = found["refused"], found["next"]
+    return [
+        *_of_series(found),
+        *(_of_voxels(found) if not refused else _told("refused", _in_words(refused))),
+        *([f"{'next':<{INDENT}}{last}"] if last else []),
+    ]
+
+
+def _told(heading: str, text: str) -> list[str]:
+    """Break a text into lines under a heading."""
+    wrapper = TextWrapper(
+        WIDTH,
+        initial_indent=f"{heading:<{INDENT}}",
+        subsequent_indent=" " * INDENT,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [line.replace(UNBROKEN, " ") for line in wrapper.wrap(text)]
+
+
+def _listed(entries: Iterable[str], between: str) -> str:
+    """Join entries that a line is not to break."""
+    return between.join(entry.replace(" ", UNBROKEN) for entry in entries)
+
+
+def _in_words(refusal: dict[str, Any]) -> str:
+    return f"exit {refusal['exit_code']}: {refusal['error']}"
+
+
+def _of_series(found: dict[str, Any]) -> list[str]:
+    """Draw the table of the series, each with what is wrong with it alone."""
+    if not found["series"]:
+        return []
+    first, *rows = table_of(found["series"])
+    lines = [f"{'series':<{INDENT}}{first}", *(" " * INDENT + row for row in rows)]
+    for series in found["series"]:
+        if series["refused"] and series["refused"] != found["refused"]:
+            lines += _told("", f"{series['number']}: {_in_words(series['refused'])}")
+    left_out = _listed((f"{count} {reason}" for reason, count in found["left_out"].items()), ", ")
+    return lines + (_told("left out", left_out) if left_out else [])
+
+
+def _of_voxels(found: dict[str, Any]) -> list[str]:
     slices, rows, columns = found["slices_rows_columns"]
     x, y, z = found["spacing_mm"]
     tilt = f"; slices sheared by {found['tilt_deg']:.1f} deg" if found["tilt_deg"] >= TILTED else ""
@@ -28,10 +84,9 @@ def of_study(found: dict[str, Any], study: str) -> list[str]:
         f"taken {found['default_plane']} by default",
         f"levels    {found['lowest']:g} to {found['highest']:g} ({found['gray_unit']})",
         f"          {_histogram(found['histogram'])}",
-        _windows(found["windows"]),
-        *([_labels(found["labels"])] if found["labels"] else []),
-        *(f"note      {note}" for note in found["notes"]),
-        f"next      tomomesh reconstruct {_options(found, study)} -o mesh.stl",
+        *_told("windows", _windows(found["windows"])),
+        *(_told("labels", _labels(found["labels"])) if found["labels"] else []),
+        *(line for note in [*found["notes"], *found["remarks"]] for line in _told("note", note)),
     ]
 
 
@@ -41,21 +96,17 @@ def _histogram(counts: list[int]) -> str:
 
 
 def _windows(windows: dict[str, Any]) -> str:
-    told = [f"{name}: k > {limit_in_words(one['lower'])} ({one['share']:.1%})" for name, one in windows.items()]
-    return f"windows   {'; '.join(told)}"
+    return _listed((f"{name}: {_window(window)}" for name, window in windows.items()), "; ")
+
+
+def _window(window: dict[str, Any]) -> str:
+    cut = window["cut_off_at"]
+    where = "" if not cut else "; cut off on all sides" if len(cut) == SIDES else f"; cut off at {' '.join(cut)}"
+    return f"k > {limit_in_words(window['lower'])} ({window['share']:.1%}{where})"
 
 
 def _labels(labels: dict[str, int]) -> str:
     largest = sorted(labels.items(), key=lambda entry: (-entry[1], int(entry[0])))
-    told = ", ".join(f"{label} ({count})" for label, count in largest[:LISTED])
+    told = _listed((f"{label} ({count})" for label, count in largest[:LISTED]), ", ")
     more = f" and {len(labels) - LISTED} more" if len(labels) > LISTED else ""
-    return f"labels    {len(labels)}, with their voxels: {told}{more}"
-
-
-def _options(found: dict[str, Any], study: str) -> str:
-    """Name the options of a first try: the largest label, bone, or Otsu's window."""
-    labels = found["labels"]
-    if labels:
-        return f"--labels-in {study} --select {max(labels, key=lambda label: labels[label])}"
-    bone = found["windows"].get("bone", {"share": 0})
-    return f"{study} --preset bone" if bone["share"] else study
+    return f"{len(labels)}, with their voxels: {told}{more}"

@@ -6,12 +6,14 @@ One file a format family; each table leads from a suffix to a reader or a writer
 from __future__ import annotations
 
 from .atomic import check_output, replacing
+from .dicom import Listing, Series
 from .documents import read_settings, write_document, write_settings, write_table
 from .frames import Frame, frame_of_study
 from .images import read_picture
 from .labels import LABEL_WRITERS, write_labels
 from .meshes import MESH_READERS, MESH_WRITERS, keeps, read_mesh, write_mesh
 from .points import POINT_READERS, POINT_WRITERS, read_points, write_points
+from .series import list_series
 from .studies import Study, find_studies
 from .volumes import VOLUME_READERS, read_volume
 
@@ -23,11 +25,14 @@ __all__ = [
     "POINT_WRITERS",
     "VOLUME_READERS",
     "Frame",
+    "Listing",
+    "Series",
     "Study",
     "check_output",
     "find_studies",
     "frame_of_study",
     "keeps",
+    "list_series",
     "read_mesh",
     "read_picture",
     "read_points",

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from ..errors import FormatError, UnreadableError
 from ..settings import ReadSettings
 from .archive import unpacked_zip
-from .dicom import dicom_among, index_in, is_dicom, is_index, read_dicom, read_index
-from .dicom.kinds import STRUCTURES, is_segmentation, storage_class
+from .dicom import index_in, is_dicom, is_index, is_segmentation, read_dicom, read_index
+from .dicom.kinds import STRUCTURES, storage_class
 from .dicom.segmentation import read_segmentation
 from .freesurfer import read_mgh
 from .images import FAMILIES, read_images
@@ -18,6 +18,7 @@ from .nifti import read_nifti
 from .npy_volume import read_npy_volume
 from .nrrd import read_nrrd
 from .omezarr import is_zarr, read_omezarr
+from .slices import slices_in
 from .source import counted, existing, existing_file, regular_files, suffix_of
 from .tiff import read_tiff
 
@@ -140,14 +141,14 @@ def _read_folder(folder: Path, settings: ReadSettings, select: Sequence[int] | N
     """Read what its DICOMDIR names, all DICOM below it, or its images; where it holds none, those of sub-folders."""
     if (index := index_in(folder)) is not None:
         return read_index(index, settings, study=str(folder))
-    for deep in (False, True):
-        files, others = regular_files(folder, deep=deep)
-        if not deep and dicom_among(files):
-            continue  # further series may be in sub-folders
-        volume = _read_images(files, others, folder, settings, select)
-        if volume is not None:
-            return volume
-    others += Counter(_kind(path) for path in files)
+    slices = slices_in(folder)
+    if len(slices.dicom) == 1 and is_segmentation(slices.dicom[0]):
+        return read_segmentation(slices.dicom[0], settings, study=str(folder), select=select)
+    if slices.dicom:
+        return read_dicom(slices.dicom, settings, study=str(folder), others=slices.others)
+    if slices.images:
+        return read_images(slices.images, settings, folder=str(folder))
+    others = slices.others + Counter(_kind(path) for path in slices.rest)
     if not others:
         raise UnreadableError("the folder is empty", file=str(folder), expected=READABLE)
     raise FormatError(
@@ -156,20 +157,6 @@ def _read_folder(folder: Path, settings: ReadSettings, select: Sequence[int] | N
         found=counted(others),
         expected=READABLE,
     )
-
-
-def _read_images(
-    files: list[Path], others: Counter[str], folder: Path, settings: ReadSettings, select: Sequence[int] | None
-) -> Volume | None:
-    """Read DICOM where there is any, else PNG, TIFF or JPEG slices."""
-    dicom = dicom_among(files)
-    if len(dicom) == 1 and is_segmentation(dicom[0]):
-        return read_segmentation(dicom[0], settings, study=str(folder), select=select)
-    if dicom:
-        others = others + Counter({"not DICOM": len(files) - len(dicom)})
-        return read_dicom(dicom, settings, study=str(folder), others=others)
-    images = [path for path in files if suffix_of(path) in FAMILIES]
-    return read_images(images, settings, folder=str(folder)) if images else None
 
 
 def _kind(path: Path) -> str:

@@ -11,6 +11,8 @@ from .otsu import histogram, otsu_levels
 from .window import PRESETS_HU, otsu_thresholds
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from ..model.volume import Volume
@@ -24,6 +26,13 @@ HIGHEST_LABEL = 2**16
 FLAT = 0.8
 """Share of equal neighbors, among those that are both over 0, from which levels are labels."""
 
+CUT_OFF = 0.01
+"""A window that takes more than this share of the study's first or last plane goes on beyond it."""
+OBLONG = 0.01
+"""Part by which the sides of a pixel may differ without a remark."""
+THICK = 5
+"""Pixels that slices may be apart without a remark."""
+
 
 def survey(volume: Volume) -> dict[str, Any]:
     """Describe a study without any patient data.
@@ -36,7 +45,7 @@ def survey(volume: Volume) -> dict[str, Any]:
     -------
     dict
         Size, spacing, frame, tilt, the range and histogram of the gray levels, suggested windows and the share of the
-        voxels in each, the labels of a label map, the reader's notes.
+        voxels in each, the labels of a label map, the reader's notes, and remarks on what a mesh of it will show.
     """
     voxels = volume.voxels
     low, high = float(voxels.min()), float(voxels.max())
@@ -60,6 +69,7 @@ def survey(volume: Volume) -> dict[str, Any]:
         "windows": _windows(volume, low),
         "labels": _labels(voxels),
         "notes": list(volume.notes),
+        "remarks": list(_remarks(volume)),
     }
 
 
@@ -75,14 +85,20 @@ def _windows(volume: Volume, low: float) -> dict[str, dict[str, Any]]:
     """Suggest lower limits: Otsu's, those between three and four classes, and for CT those of the presets."""
     limits: dict[str, Any] = {"otsu": otsu_thresholds(volume)}
     if volume.layers == 1:
-        upper = {f"otsu of {classes}": otsu_levels(volume.voxels, classes)[-1] for classes in (3, 4)}
-        limits |= {name: limit for name, limit in upper.items() if limit not in limits.values()}
+        for classes in (3, 4):
+            limit = otsu_levels(volume.voxels, classes)[-1]
+            limits |= {} if limit in limits.values() else {f"otsu of {classes}": limit}
     if low < 0:
         limits |= {name: lower for name, (lower, _) in PRESETS_HU.items()}
-    return {
-        name: {"lower": _finite(limit), "share": float(np.mean(volume.voxels > limit))}
-        for name, limit in limits.items()
-    }
+    return {name: _window(volume.voxels, limit) for name, limit in limits.items()}
+
+
+def _window(voxels: NDArray[Any], limit: Any) -> dict[str, Any]:
+    """Say which share of the voxels a window takes, and at which ends of the study it is cut off."""
+    inside = voxels > limit
+    ends = [(2 - n, end) for n in range(3) for end in (0, -1)]
+    cut = [LETTERS[axis][end] for axis, end in ends if inside.take(end, 2 - axis).mean() > CUT_OFF]
+    return {"lower": _finite(limit), "share": float(np.mean(inside)), "cut_off_at": cut}
 
 
 def _finite(limit: Any) -> Any:
@@ -106,6 +122,18 @@ def _labels(voxels: NDArray[Any]) -> dict[str, int]:
         return {}
     counts = np.bincount(voxels.ravel().astype(np.int64))
     return {str(label): int(counts[label]) for label in np.flatnonzero(counts) if label > 0}
+
+
+def _remarks(volume: Volume) -> Iterator[str]:
+    """Say what a mesh of the study will show that nobody may expect."""
+    columns, rows, step = np.sqrt((volume.grid.affine[:3, :3] ** 2).sum(axis=0))
+    if abs(columns - rows) > OBLONG * min(columns, rows):
+        yield f"pixels are not square, {columns:.4g} x {rows:.4g} mm: the mesh keeps the distances"
+    apart = step / max(columns, rows)
+    if apart > THICK:
+        yield f"slices are {apart:.1f} pixels apart: what lies between them is interpolated"
+    if 1 in volume.shape:
+        yield "one slice: the mesh will be a slab of its thickness"
 
 
 def _stored_axes(volume: Volume) -> str:

@@ -2,8 +2,25 @@
 
 from __future__ import annotations
 
-from .directory import index_in, is_index, read_index
-from .files import dicom_among, is_dicom
+from .directory import GONE, index_in, indexed, is_index, read_index
+from .files import NOT_DICOM, dicom_among, is_dicom
+from .kinds import is_segmentation
+from .listing import Listing, Series, list_dicom
 from .read import list_stacks, read_dicom
 
-__all__ = ["dicom_among", "index_in", "is_dicom", "is_index", "list_stacks", "read_dicom", "read_index"]
+__all__ = [
+    "GONE",
+    "NOT_DICOM",
+    "Listing",
+    "Series",
+    "dicom_among",
+    "index_in",
+    "indexed",
+    "is_dicom",
+    "is_index",
+    "is_segmentation",
+    "list_dicom",
+    "list_stacks",
+    "read_dicom",
+    "read_index",
+]

@@ -51,8 +51,27 @@ def read_index(index: Path, settings: ReadSettings, *, study: str) -> Volume:
     TomomeshError
         As `read_dicom`.
     """
-    named = _named(index)
-    files = _beside(index)
+    files, gone = indexed(index, study=study)
+    if gone and not settings.skip_bad:
+        raise FormatError(
+            f"{len(gone)} of {len(files) + len(gone)} files that DICOMDIR names are missing",
+            file=study,
+            found=listed(gone),
+            expected="all files beside it",
+            hint="the whole disc, or --skip-bad to go on without them",
+        )
+    return read_dicom(files, settings, study=study, others=Counter({GONE: len(gone)} if gone else {}))
+
+
+def indexed(index: Path, *, study: str) -> tuple[list[Path], list[PurePosixPath]]:
+    """Find the files that an index names, and the names of those that are missing.
+
+    Raises
+    ------
+    FormatError
+        Where the index is broken, or names files outside of its folder.
+    """
+    named, files = _named(index), _beside(index)
     outside = [name for name in named if leaves_folder(name)]
     if outside:
         raise FormatError(
@@ -62,16 +81,7 @@ def read_index(index: Path, settings: ReadSettings, *, study: str) -> Volume:
             expected="files in its folder or below",
         )
     gone = [PurePosixPath(name) for name in named if name.lower() not in files]
-    if gone and not settings.skip_bad:
-        raise FormatError(
-            f"{len(gone)} of {len(named)} files that DICOMDIR names are missing",
-            file=study,
-            found=listed(gone),
-            expected="all files beside it",
-            hint="the whole disc, or --skip-bad to go on without them",
-        )
-    found = [files[name.lower()] for name in named if name.lower() in files]
-    return read_dicom(found, settings, study=study, others=Counter({GONE: len(gone)} if gone else {}))
+    return [files[name.lower()] for name in named if name.lower() in files], gone
 
 
 def _beside(index: Path) -> dict[str, Path]:

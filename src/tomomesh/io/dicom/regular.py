@@ -49,9 +49,8 @@ def regular(
         Where slices are missing or unevenly spaced, and the setting for that is not on.
     """
     gaps = np.diff(heights)
-    steps = np.round(gaps / np.sort(gaps)[(len(gaps) - 1) // 2])
-    off = np.abs(gaps * (steps.sum() / gaps.sum()) - steps)
-    if steps.min() < 1 or (off > np.minimum(EVEN * steps, WHOLE)).any():
+    steps, whole = steps_between(gaps)
+    if not whole:
         if not settings.resample_slices:
             raise _uneven(heights, gaps, study)
         return _resampled(heights, gaps, pixel)
@@ -61,6 +60,13 @@ def regular(
     levels = np.concatenate([[0.0], np.cumsum(steps)])
     note = f"slices interpolated linearly: {missing} of {int(levels[-1]) + 1}"
     return levels, (note,) if missing else ()
+
+
+def steps_between(gaps: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool]:
+    """Return how many slices of a regular stack each distance (s - 1,) spans, and whether all span whole ones."""
+    steps = np.round(gaps / np.sort(gaps)[(len(gaps) - 1) // 2])
+    off = np.abs(gaps * (steps.sum() / gaps.sum()) - steps)
+    return steps, bool(steps.min() >= 1 and (off <= np.minimum(EVEN * steps, WHOLE)).all())
 
 
 def _resampled(

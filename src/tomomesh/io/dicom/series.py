@@ -44,10 +44,8 @@ def choose(frames: list[Frame], wanted: int | None, *, folder: str) -> Choice:
     UsageError
         Where the table has no such number.
     """
-    images = [frame for frame in frames if not _is_localizer(frame)] or frames
-    localizers = len(frames) - len(images)
+    series, localizers = grouped(frames)
     notes = (f"localizers left out: {localizers}",) if localizers else ()
-    series = _grouped(images)
     if wanted is not None:
         return Choice(_wanted(series, wanted, folder), notes)
     stacks = [number for number, members in enumerate(series) if len(members) > 1]
@@ -67,8 +65,7 @@ def choose(frames: list[Frame], wanted: int | None, *, folder: str) -> Choice:
 
 def stacks_among(frames: list[Frame]) -> list[int]:
     """Return the numbers, from 1, of the series with more than one slice; localizers are none."""
-    images = [frame for frame in frames if not _is_localizer(frame)] or frames
-    return [number for number, members in enumerate(_grouped(images), 1) if len(members) > 1]
+    return [number for number, members in enumerate(grouped(frames)[0], 1) if len(members) > 1]
 
 
 def _wanted(series: list[list[Frame]], wanted: int, folder: str) -> list[Frame]:
@@ -87,15 +84,29 @@ def _is_localizer(frame: Frame) -> bool:
     return "LOCALIZER" in ([kind] if isinstance(kind, str) else list(kind))
 
 
-def _grouped(frames: list[Frame]) -> list[list[Frame]]:
-    """Sort frames into series: by series number, identifier, and stack within an enhanced file."""
+def grouped(frames: list[Frame]) -> tuple[list[list[Frame]], int]:
+    """Sort frames into series: by series number, identifier, and stack within an enhanced file.
+
+    Returns
+    -------
+    series : list of lists of Frame
+        In the order of their numbers in the table.
+    localizers : int
+        How many frames are left out as such; none where there is nothing else.
+
+    Raises
+    ------
+    FormatError
+        For a series number that is none.
+    """
+    images = [frame for frame in frames if not _is_localizer(frame)] or frames
     groups: dict[tuple[float, str, str], list[Frame]] = {}
-    for frame in frames:
+    for frame in images:
         number = numbers(frame.header.get("SeriesNumber"), 1, "SeriesNumber", frame.path.name)
         place = LAST if number is None else float(number[0])
         key = (place, str(frame.header.get("SeriesInstanceUID", "")), frame.stack)
         groups.setdefault(key, []).append(frame)
-    return [groups[key] for key in sorted(groups)]
+    return [groups[key] for key in sorted(groups)], len(frames) - len(images)
 
 
 def table(series: list[list[Frame]]) -> str:

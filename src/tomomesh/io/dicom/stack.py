@@ -79,14 +79,14 @@ def stacked(frames: list[Frame], settings: ReadSettings, *, study: str) -> Stack
         Where the frames do not make one regular stack.
     """
     check_alike(frames)
-    pixel, axes = _pixel(frames[0], settings), _axes(frames[0])
+    pixel, axes = pixel_of(frames[0], settings), axes_of(frames[0])
     normal = np.cross(axes[0], axes[1])
     lost = [frame for frame in frames if frame.position is None]
     if lost:
         places = _numbered(frames)
         course = _along(normal, np.zeros(3), _given(settings), len(places), lost[0])
     else:
-        places = _placed(frames, normal, SAME_PLACE * min(pixel))
+        places = placed(frames, normal, SAME_PLACE * min(pixel))
         course = _course(places, normal, settings, min(pixel), study)
     affine = np.eye(4)
     affine[:3] = np.column_stack([axes[0] * pixel[0], axes[1] * pixel[1], course.step, course.origin])
@@ -99,8 +99,14 @@ def _given(settings: ReadSettings) -> float | None:
     return settings.spacing_z or (settings.spacing[2] if settings.spacing else None)
 
 
-def _pixel(frame: Frame, settings: ReadSettings) -> tuple[float, float]:
-    """Return the distance of the columns and of the rows."""
+def pixel_of(frame: Frame, settings: ReadSettings) -> tuple[float, float]:
+    """Return the distance of the columns and of the rows, mm.
+
+    Raises
+    ------
+    GeometryError
+        Where there is none, or none that is possible.
+    """
     if frame.spacing is None and settings.spacing:
         return settings.spacing[0], settings.spacing[1]
     if frame.spacing is None:
@@ -116,8 +122,14 @@ def _pixel(frame: Frame, settings: ReadSettings) -> tuple[float, float]:
     return x, y
 
 
-def _axes(frame: Frame) -> NDArray[np.float64]:
-    """Return the directions of the columns and of the rows; those of an axial slice where there are none."""
+def axes_of(frame: Frame) -> NDArray[np.float64]:
+    """Return the directions of the columns and of the rows (2, 3); those of an axial slice where there are none.
+
+    Raises
+    ------
+    GeometryError
+        Where they are not at right angles.
+    """
     if frame.axes is None and frame.position is None:
         return np.eye(3)[:2]
     axes = np.full((2, 3), np.nan) if frame.axes is None else frame.axes
@@ -162,8 +174,14 @@ def _along(
     return Course(origin, normal * distance, levels, (f"{note}: {distance:g} mm apart, as given",))
 
 
-def _placed(frames: list[Frame], normal: NDArray[np.float64], nearest: float) -> list[list[Frame]]:
-    """Order frames along the normal, those at one position together."""
+def placed(frames: list[Frame], normal: NDArray[np.float64], nearest: float) -> list[list[Frame]]:
+    """Order frames, all with a position, along their normal (3,); those nearer than `nearest` mm are together.
+
+    Raises
+    ------
+    GeometryError
+        For a position that is no number.
+    """
     positions = np.array([frame.position for frame in frames])
     if not np.isfinite(positions).all():
         worst = frames[int(np.argmin(np.isfinite(positions).all(axis=1)))]
@@ -206,7 +224,13 @@ def _course(
             found=f"off the line = {off.max():.3g} mm",
             expected=f"at most {ON_LINE * pixel:.3g} mm",
         )
-    tilt = float(np.degrees(np.arccos(min(1.0, way @ normal / np.linalg.norm(way)))))
+    tilt = tilt_of(way, normal)
     notes += (f"gantry tilt of {tilt:.1f} degrees: the axes are sheared",) if tilt > TILTED else ()
     notes += ("the given distance of the slices is not used: they have positions",) if distance else ()
     return Course(origins[0], way / levels[-1], levels, notes)
+
+
+def tilt_of(way: NDArray[np.float64], normal: NDArray[np.float64]) -> float:
+    """Return the angle between the way from the first slice to the last (3,) and their normal (3,), degrees."""
+    cosine = float(way @ normal / np.linalg.norm(way))
+    return float(np.degrees(np.arccos(min(1.0, cosine))))

@@ -1,0 +1,82 @@
+"""What `tomomesh inspect` finds: what is in a study, or why it would be refused, and what to do next."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .. import io
+from ..errors import FormatError, GeometryError, ResourceError, TomomeshError, UnreadableError
+from .next_step import next_step
+
+if TYPE_CHECKING:
+    from ..io import Listing, Series
+    from ..settings import Settings
+
+REFUSALS = (FormatError, GeometryError, ResourceError, UnreadableError)
+"""What reading raises because of the study; anything else is the user's or the program's fault."""
+
+
+def inspected(study: str, settings: Settings) -> dict[str, Any]:
+    """Return what is in a study, ready for JSON and without any patient data.
+
+    Parameters
+    ----------
+    study : str
+        The path as the user typed it.
+    settings : Settings
+        How it is read, and which part of it.
+
+    Returns
+    -------
+    dict
+        What `survey` says where the study can be read; always `series`, all of a DICOM study, `left_out`, `refused`
+        with the `exit_code` and the `error` of a run, None where it would go on, and `next`, a command.
+
+    Raises
+    ------
+    TomomeshError
+        Where nothing can be said of the study.
+    """
+    listing = io.list_series(study, settings=settings.read)
+    found, fault = _surveyed(study, settings, listing)
+    series = [_series(one, alone=len(listing.series) == 1) for one in listing.series]
+    found |= {"series": series, "left_out": dict(listing.left_out), "refused": _refusal(fault)}
+    return found | {"next": next_step(found, study, settings)}
+
+
+def _surveyed(study: str, settings: Settings, listing: Listing) -> tuple[dict[str, Any], TomomeshError | None]:
+    """Return what is in a study, or the error that refuses it; a single file that is broken says nothing more."""
+    from ..segment.crop import crop
+    from ..segment.survey import survey
+
+    try:
+        volume = io.read_volume(study, settings=settings.read)
+    except REFUSALS as fault:
+        if listing.files > 1 or (listing.files and isinstance(fault, GeometryError)):
+            return {}, fault
+        raise
+    return survey(crop(volume, settings.part, volume.thickest_axis())[0]), None
+
+
+def _series(series: Series, *, alone: bool) -> dict[str, Any]:
+    """Describe a series; its description, which people write freely, only where there is a choice to make."""
+    rows, columns = series.size
+    return {
+        "number": series.number,
+        "description": None if alone else series.description,
+        "modality": series.modality,
+        "slices": series.slices,
+        "rows": rows,
+        "columns": columns,
+        "pixel_mm": series.pixel_mm,
+        "distances_mm": series.course.distances_mm,
+        "tilt_deg": series.course.tilt_deg,
+        "missing": series.course.missing,
+        "gaps_mm": series.course.gaps_mm,
+        "repeats": series.course.repeats,
+        "refused": _refusal(series.refused),
+    }
+
+
+def _refusal(fault: TomomeshError | None) -> dict[str, Any] | None:
+    return None if fault is None else {"exit_code": fault.exit_code, "error": str(fault)}

@@ -1,0 +1,77 @@
+"""The command that `tomomesh inspect` suggests."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from typing import TYPE_CHECKING, Any
+
+from ..settings import Settings, option_of, parameters
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+VALUES = {"--spacing": "X Y Z", "--spacing-z": "MM"}
+"""What stands for the values that only the user knows."""
+SERIES = "--series"
+
+
+def next_step(found: dict[str, Any], study: str, settings: Settings) -> str | None:
+    """Return the command that goes on: a first mesh, or `inspect` with the flag that helps; None where none does.
+
+    Parameters
+    ----------
+    found : dict
+        As `inspected` returns it.
+    study : str
+        The path as the user typed it.
+    settings : Settings
+        Those given; the command repeats them.
+    """
+    path, given = shlex.quote(study), list(_given(settings))
+    if not found["refused"]:
+        return " ".join(["tomomesh reconstruct", _first_try(found, path), *given, "-o mesh.stl"])
+    helping = list(_helping(found))
+    return " ".join(["tomomesh inspect", path, *given, *helping]) if helping else None
+
+
+def _first_try(found: dict[str, Any], path: str) -> str:
+    """Name the study, and its largest label, bone, or nothing for Otsu's window."""
+    labels = found["labels"]
+    if labels:
+        return f"--labels-in {path} --select {max(labels, key=lambda label: labels[label])}"
+    bone = found["windows"].get("bone", {"share": 0})
+    return f"{path} --preset bone" if bone["share"] else path
+
+
+def _given(settings: Settings) -> Iterator[str]:
+    """Yield the options that differ from their defaults."""
+    sections, defaults = settings.to_dict(), Settings().to_dict()
+    for section, entry in parameters():
+        value = sections[section].get(entry.name)
+        if value not in (None, defaults[section].get(entry.name)):
+            values = value if isinstance(value, list) else [] if value is True else [value]
+            yield " ".join([option_of(entry.name), *(f"{one:.10g}" for one in values)])
+
+
+def _helping(found: dict[str, Any]) -> Iterator[str]:
+    """Yield the flags that a refusal names; for a choice of series, the best one's number and what it needs."""
+    flags = _named(found["refused"])
+    if SERIES in flags:
+        best = max(found["series"], key=_promise)
+        yield f"{SERIES} {best['number']}"
+        flags += _named(best["refused"])
+    for flag in dict.fromkeys(flags):
+        if flag != SERIES:
+            yield f"{flag} {VALUES[flag]}" if flag in VALUES else flag
+
+
+def _named(refusal: dict[str, Any] | None) -> list[str]:
+    """Return the flags that an error suggests."""
+    hint = refusal["error"].partition(" Try: ")[2] if refusal else ""
+    return re.findall(r"--[a-z]+(?:-[a-z]+)*", hint)
+
+
+def _promise(series: dict[str, Any]) -> tuple[bool, int, int]:
+    """Rank series: those that can be read, or that a flag helps, then by their slices, the first of equals."""
+    return not series["refused"] or bool(_named(series["refused"])), series["slices"], -series["number"]

@@ -1,0 +1,65 @@
+"""The series of a study, before any of them is read."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from ..settings import ReadSettings
+from .archive import unpacked_zip
+from .dicom import GONE, Listing, index_in, indexed, is_dicom, is_index, is_segmentation, list_dicom
+from .slices import slices_in
+from .source import existing, existing_file, suffix_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def list_series(path: str | Path, *, settings: ReadSettings | None = None) -> Listing:
+    """List the DICOM series of a study from their headers alone.
+
+    Parameters
+    ----------
+    path : path
+        As `read_volume` takes it.
+    settings : ReadSettings, optional
+        Under which each series would be read.
+
+    Returns
+    -------
+    Listing
+        Empty for what is no DICOM, and for a segmentation.
+
+    Raises
+    ------
+    UnreadableError
+        Where the path is missing or may not be read.
+    FormatError
+        For a file that is empty, and archives and discs that are broken.
+    ResourceError
+        For an archive that holds too much.
+    """
+    path, settings = existing(path), settings or ReadSettings()
+    if path.is_dir() or suffix_of(existing_file(path)) != ".zip":
+        return _listed(path, settings, study=str(path))
+    with unpacked_zip(path) as folder:
+        return _listed(folder, settings, study=str(path))
+
+
+def _listed(path: Path, settings: ReadSettings, *, study: str) -> Listing:
+    files, others = _dicom_behind(path, study)
+    if not files or (len(files) == 1 and is_segmentation(files[0])):
+        return Listing()
+    return list_dicom(files, settings, study=study, others=others)
+
+
+def _dicom_behind(path: Path, study: str) -> tuple[list[Path], Counter[str]]:
+    """Find what a DICOMDIR names, the slices of a folder, or a single file; and count what was passed over."""
+    index = index_in(path) if path.is_dir() else path if is_index(path) else None
+    if index is not None:
+        files, gone = indexed(index, study=study)
+        return files, Counter({GONE: len(gone)})
+    if path.is_dir():
+        slices = slices_in(path)
+        return slices.dicom, slices.others
+    return [path] if is_dicom(path) else [], Counter()
