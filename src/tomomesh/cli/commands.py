@@ -184,7 +184,7 @@ def _inspect(chosen: Namespace) -> None:
     from .findings import of_study
     from .inspection import inspected
 
-    found = inspected(chosen.study, settings_of(chosen))
+    found = inspected(chosen.study, settings_of(chosen), typed=getattr(chosen, "typed", ""))
     _say(found, None if chosen.json else of_study(found))
 
 

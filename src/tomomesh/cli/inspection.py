@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import TYPE_CHECKING, Any
 
 from .. import io
@@ -16,15 +17,17 @@ REFUSALS = (FormatError, GeometryError, ResourceError, UnreadableError)
 """What reading raises because of the study; anything else is the user's or the program's fault."""
 
 
-def inspected(study: str, settings: Settings) -> dict[str, Any]:
+def inspected(study: str, settings: Settings, *, typed: str = "") -> dict[str, Any]:
     """Return what is in a study, ready for JSON and without any patient data.
 
     Parameters
     ----------
     study : str
-        The path as the user typed it.
+        The path of the study.
     settings : Settings
         How it is read, and which part of it.
+    typed : str
+        What the user typed in its place, for the study of a stream.
 
     Returns
     -------
@@ -41,7 +44,16 @@ def inspected(study: str, settings: Settings) -> dict[str, Any]:
     found, fault = _surveyed(study, settings, listing)
     series = [_series(one, alone=len(listing.series) == 1) for one in listing.series]
     found |= {"series": series, "left_out": dict(listing.left_out), "refused": _refusal(fault)}
-    return found | {"next": next_step(found, study, settings)}
+    if typed:
+        _rename(found, study, typed.split()[0])
+    return found | {"next": next_step(found, typed or shlex.quote(study), settings)}
+
+
+def _rename(found: dict[str, Any], study: str, name: str) -> None:
+    """Name the study in errors as it was typed, not the temporary file in its place."""
+    for one in (found, *found["series"]):
+        if one["refused"]:
+            one["refused"]["error"] = one["refused"]["error"].replace(study, name)
 
 
 def _surveyed(study: str, settings: Settings, listing: Listing) -> tuple[dict[str, Any], TomomeshError | None]:

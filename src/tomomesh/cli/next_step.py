@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 from typing import TYPE_CHECKING, Any
 
 from ..settings import Settings, option_of, parameters
@@ -24,24 +23,24 @@ def next_step(found: dict[str, Any], study: str, settings: Settings) -> str | No
     found : dict
         As `inspected` returns it.
     study : str
-        The path as the user typed it.
+        Its words on a command line.
     settings : Settings
         Those given; the command repeats them.
     """
-    path, given = shlex.quote(study), list(_given(settings))
+    given = list(_given(settings))
     if not found["refused"]:
-        return " ".join(["tomomesh reconstruct", _first_try(found, path), *given, "-o mesh.stl"])
+        return " ".join(["tomomesh reconstruct", _first_try(found, study), *given, "-o mesh.stl"])
     helping = list(_helping(found))
-    return " ".join(["tomomesh inspect", path, *given, *helping]) if helping else None
+    return " ".join(["tomomesh inspect", study, *given, *helping]) if helping else None
 
 
-def _first_try(found: dict[str, Any], path: str) -> str:
+def _first_try(found: dict[str, Any], study: str) -> str:
     """Name the study, and its largest label, bone, or nothing for Otsu's window."""
     labels = found["labels"]
     if labels:
-        return f"--labels-in {path} --select {max(labels, key=lambda label: labels[label])}"
+        return f"--labels-in {study} --select {max(labels, key=lambda label: labels[label])}"
     bone = found["windows"].get("bone", {"share": 0})
-    return f"{path} --preset bone" if bone["share"] else path
+    return f"{study} --preset bone" if bone["share"] else study
 
 
 def _given(settings: Settings) -> Iterator[str]:

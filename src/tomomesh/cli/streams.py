@@ -49,6 +49,7 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
         files = {}
         if inside:
             files[inside] = _received(Path(folder, f"input.{chosen.input_format}"))
+            files["typed"] = f"{STREAM} --input-format {chosen.input_format}"
         if not outside:
             yield Namespace(**vars(chosen) | files)
             return
