@@ -64,7 +64,7 @@ class TestTable:
         assert [one.number for one in listing.series] == [1, 2, 3]
         assert [one.slices for one in listing.series] == [2, 4, 1]
         assert {one.size for one in listing.series} == {(7, 9)}
-        assert np.allclose([one.pixel_mm for one in listing.series], [0.5, 0.7])
+        assert [one.pixel_mm for one in listing.series] == [pytest.approx((0.5, 0.7))] * 3
         assert sound.refused is None
         assert sound.course.distances_mm == pytest.approx((2, 2))
         assert sound.course.tilt_deg == pytest.approx(0, abs=1e-4)
