@@ -52,6 +52,11 @@ FLAGS: dict[str, dict[str, Any]] = {
     "derived/dev54_t1/png": {"spacing": (0.9375, 0.9375, 2.695)},
     "derived/dev54_t1/tif": {"spacing": (0.9375, 0.9375, 2.695)},
     "dcm_qa_ct/In/GE": {"resample_slices": True},
+    "derived/mixed_multi_series": {"series": 2},
+    "dicom2nifti/failing/sliceincrement/001": {"fill_gaps": True},
+    "dicom2nifti/failing/sliceorientation/001": {"series": 1},
+    "malformed/no_ipp.dcm": {"spacing_z": 1.0},
+    "malformed/no_pixelspacing.dcm": {"spacing": (1.0, 1.0, 1.0)},
 }
 """What a study needs, or what its refusal names."""
 
