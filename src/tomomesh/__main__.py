@@ -14,6 +14,10 @@ def main() -> int:
         return run()
     except KeyboardInterrupt:
         return 130
+    except RuntimeError as fault:  # Python before 3.12 wraps what is raised while a class is made
+        if isinstance(fault.__cause__, KeyboardInterrupt):
+            return 130
+        raise
 
 
 if __name__ == "__main__":

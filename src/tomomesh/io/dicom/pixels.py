@@ -73,7 +73,7 @@ class Decoder:
 
     def expect(self, frame: Frame) -> None:
         """Start the child process where frames like this one need it: while it starts, headers can be read."""
-        with suppress(TomomeshError):  # what is wrong is said when the frame is read
+        with suppress(TomomeshError), third_party("pydicom", frame.path.name):  # what is wrong is said when it is read
             layout = layout_of(frame, "PixelData")
             if layout.syntax in SYNTAXES and layout.frame_bytes <= LARGEST_FRAME_BYTES:
                 self._child.ready(layout.frame_bytes)

@@ -98,11 +98,11 @@ def read_segmentation(path: Path, settings: ReadSettings, *, study: str, select:
     rows, columns = found.frames[0].size
     require_memory(count * rows * columns * dtype.itemsize, file=study)
     voxels = np.zeros((count, rows, columns), dtype)
-    if found.kind == LABELMAP:
-        _copy(found, levels, voxels, select)
-        notes: tuple[str, ...] = ()
-    else:
-        notes = _paint(found, levels, voxels, select, study)
+    with Decoder() as decode:
+        if found.kind == LABELMAP:
+            notes = _copy(found, decode, levels, voxels, select)
+        else:
+            notes = _paint(found, decode, levels, voxels, select, study)
     _require(found, voxels, select, study)
     empty = count - len(np.unique(levels))
     notes += (f"slices that the file leaves out, taken as background: {empty}",) if empty else ()
@@ -143,21 +143,24 @@ def _number(item: Any, keyword: str, name: str) -> int:
     return int(value[0])
 
 
-def _copy(found: Segmentation, levels: NDArray[np.int64], voxels: NDArray[Any], select: Sequence[int] | None) -> None:
-    """Take pixels that are segment numbers."""
-    decode = Decoder()
+def _copy(
+    found: Segmentation, decode: Decoder, levels: NDArray[np.int64], voxels: NDArray[Any], select: Sequence[int] | None
+) -> tuple[str, ...]:
+    """Take pixels that are segment numbers; nothing is to be decided."""
     for frame, level in zip(found.frames, levels.tolist(), strict=True):
         labels = decode(frame)
         kept = labels != found.background if select is None else np.isin(labels, select)
         np.copyto(voxels[level], labels, where=kept, casting="unsafe")
+    return ()
 
 
 def _paint(
-    found: Segmentation, levels: NDArray[np.int64], voxels: NDArray[Any], select: Sequence[int] | None, study: str
-) -> tuple[str, ...]:
+    found: Segmentation, decode: Decoder, levels: NDArray[np.int64], voxels: NDArray[Any],
+    select: Sequence[int] | None, study: str,
+) -> tuple[str, ...]:  # fmt: skip
     """Lay segment over segment, the largest first; return notes on what was decided."""
     wanted = np.flatnonzero(np.isin(found.segments, found.segments if select is None else select))
-    decode, size = Decoder(), Counter[int]()
+    size: Counter[int] = Counter()
     for n, mask in _masks(found, wanted.tolist(), decode):
         size[int(found.segments[n])] += int(np.count_nonzero(mask))
     order = sorted(wanted.tolist(), key=lambda n: (-size[int(found.segments[n])], int(found.segments[n])))
