@@ -156,9 +156,14 @@ class TestDeflatedFiles:
         path = save(data, tmp_path / "a.dcm")
         np.testing.assert_array_equal(read_volume(path, settings=ONE).voxels[0], PIXELS)
 
-    def test_a_bomb_is_stopped_before_it_is_unpacked(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    @pytest.mark.parametrize("address", [False, True])
+    def test_a_bomb_is_stopped_before_it_is_unpacked(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, address: bool
+    ) -> None:
         data = slice_dataset(PIXELS, AFFINES["axial"], 0)
         data.file_meta.TransferSyntaxUID = DeflatedExplicitVRLittleEndian
+        if address:  # stands before the syntax, and its length has four bytes
+            data.file_meta.add_new(0x0002000F, "UR", "http://x")
         path = save(data, tmp_path / "a.dcm")
         packer = zlib.compressobj(wbits=-15)
         raw = path.read_bytes()

@@ -11,7 +11,6 @@ import json
 import math
 import os
 import stat
-import struct
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +20,9 @@ from ..errors import FormatError, ResourceError
 from .detached import beside
 from .extras import required
 from .gray import native
-from .limits import require_bytes, require_memory
-from .source import first_bytes, third_party, whole
+from .limits import require_memory
+from .packed_chunk import promised_bytes
+from .source import third_party, whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -171,33 +171,17 @@ def _missing(array: Any, files: dict[str, Path]) -> NDArray[np.bool_]:
 
 
 def _check_lengths(array: Any, files: dict[str, Path], file: str) -> None:
-    """Compare the lengths that blosc and zstd write before a chunk with the file's, and with those of the voxels."""
+    """Compare what chunks hold with their voxels; those in shards, and zstd's that do not say it, are passed over."""
+    codecs = array.compressors[-1:] if not array.shards else ()
+    packing = next((str(getattr(codec, "codec_id", type(codec).__name__)) for codec in codecs), "")
     held = 2 * math.prod(array.chunks) * array.dtype.itemsize + 2**16
-    packings = [type(codec).__name__.removesuffix("Codec").lower() for codec in array.compressors[-1:]]
-    if array.shards or packings not in (["blosc"], ["zstd"]):
-        return
     for key in (key for key in files if Path(key).name not in (*DOCUMENTS, ".zattrs")):
-        start = first_bytes(files[key], 18)
-        if packings == ["blosc"] and len(start) >= 16:
-            promised, packed = struct.unpack("<4xI4xI", start[:16])
-            require_bytes(packed, files[key].stat().st_size, file=file)
-        else:
-            promised = _zstd_length(start)
+        promised = promised_bytes(files[key], packing.removesuffix("Codec").lower(), held, file=file)
         if promised > held:
-            found = f"chunk = {promised} bytes"
+            found = f"chunk = {promised} bytes and more"
             raise ResourceError(
                 "a chunk holds far more than its voxels", file=file, found=found, expected=f"{held} bytes"
             )
-
-
-def _zstd_length(start: bytes) -> int:
-    """Return the length of what a zstd frame holds, 0 where it does not say (RFC 8878, 3.1.1.1)."""
-    if len(start) < 18:
-        return 0
-    flag, single = start[4] >> 6, start[4] >> 5 & 1
-    size = (single, 2, 4, 8)[flag]
-    begin = 5 + (1 - single) + (0, 1, 2, 4)[start[4] & 3]
-    return int.from_bytes(start[begin : begin + size], "little") + (256 if flag == 1 else 0)
 
 
 def _are_fill(voxels: NDArray[Any], missing: NDArray[np.bool_], chunks: tuple[int, ...], fill: Any) -> bool:

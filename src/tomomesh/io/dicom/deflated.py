@@ -38,18 +38,22 @@ def check_deflated(file: BinaryIO, *, name: str) -> None:
 
 
 def _is_deflated(file: BinaryIO) -> bool:
-    """Look for the transfer syntax among the elements of group 2, and stop behind them."""
-    found = False
+    """Look for the transfer syntax among the elements of group 2, as pydicom does, and stop behind them.
+
+    Whether kinds are written down is told by the first element, for all.
+    """
+    found, explicit = False, None
     file.seek(132 if file.read(132)[128:] == b"DICM" else 0)
     while len(head := file.read(8)) == 8:
         group, number, kind, length = struct.unpack("<HH2sH", head)
         if group != 2:
             file.seek(-8, io.SEEK_CUR)
             break
-        if kind in WIDE:
-            (length,) = struct.unpack("<I", file.read(4).ljust(4, b"\0"))
-        elif not kind.isalpha():
+        explicit = kind.isupper() if explicit is None else explicit
+        if not explicit:
             (length,) = struct.unpack("<I", head[4:])
+        elif kind in WIDE:
+            (length,) = struct.unpack("<I", file.read(4).ljust(4, b"\0"))
         end = file.tell() + length
         found |= number == 0x10 and file.read(min(length, 64)).rstrip(b"\0 ") == DEFLATED.encode()
         file.seek(end)

@@ -18,8 +18,8 @@ ELEMENTS = {0x7FE00010: "PixelData", 0x7FE00008: "FloatPixelData", 0x7FE00009: "
 UNDEFINED = 0xFFFFFFFF
 """The length of an element that goes on until its delimiter: that of compressed pixels."""
 
-WIDE = (b"OB", b"OW", b"OF", b"OD", b"OL", b"OV", b"UN")
-"""Kinds of values whose length has four bytes."""
+WIDE = (b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT", b"UV")
+"""Kinds of values whose length has four bytes (PS3.5, 7.1.2)."""
 
 
 @dataclass(frozen=True)
