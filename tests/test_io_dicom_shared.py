@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from studies import shared
 from tomomesh.errors import FormatError, GeometryError
 from tomomesh.io import read_volume
+from tomomesh.measure.report import compare
+from tomomesh.pipeline import reconstruct
 from tomomesh.settings import ReadSettings
+
+ARM = 69
+"""The label of the upper arm."""
 
 
 class TestSharedData:
@@ -37,6 +45,22 @@ class TestSharedData:
         labels = read_volume(shared("totalsegmentator/example_seg_dicom.nii.gz"))
         assert body.unit == "HU"
         np.testing.assert_allclose(body.affine, labels.affine, atol=1e-3)
+
+    def test_a_bone_by_its_gray_levels_lies_on_that_by_its_labels(self) -> None:
+        """An upper arm: compact bone is over 200 HU, and its marrow, which is not, is filled in every slice."""
+        body = read_volume(shared("totalsegmentator/example_ct_dicom"))
+        labels = read_volume(shared("totalsegmentator/example_seg_dicom.nii.gz"))
+        near = ndimage.binary_dilation(labels.voxels == ARM, iterations=3)
+        solid = np.stack(
+            [ndimage.binary_fill_holes(ndimage.binary_closing(one, iterations=2)) for one in (body.voxels > 200) & near]
+        )
+        bone = replace(body, voxels=solid.astype(np.uint8), unit="stored")
+        by_gray = reconstruct(bone, select=(1,), keep="largest", network="none").mesh
+        by_label = reconstruct(labels, select=(ARM,), network="none").mesh
+        apart = compare(by_gray, by_label)
+        across, along = body.spacing_mm[0], body.spacing_mm[2]
+        assert max(apart["mean_mm"], apart["back_mean_mm"]) < 0.7 * across
+        assert max(apart["p95_mm"], apart["back_p95_mm"]) < along
 
     def test_mixed_vendors_are_listed_as_three_series(self) -> None:
         folder = shared("derived/mixed_multi_series")
