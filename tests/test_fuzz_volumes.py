@@ -28,8 +28,6 @@ AFFINE = AFFINES["oblique"]
 STORED = sampled(AFFINE)
 PIXELS = STORED.astype(np.uint16)
 SETTINGS = ReadSettings(spacing=(1, 1, 1), spacing_z=1)
-LYING_LENGTH = 2**33
-"""pydicom asks for as many bytes as a length promises, in room that the system never fills."""
 NRRD = (
     "NRRD0005\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 9 7 5\n"
     "space directions: (0.5,0,0) (0,0.7,0) (0,0,2)\nendian: little\nencoding: {}\nspace origin: (-3,11,40)\n{}\n"
@@ -145,4 +143,4 @@ def test_damage_ends_in_a_result_or_in_one_line(tmp_path: Path, name: str) -> No
     path = tmp_path / name
     path.parent.mkdir(exist_ok=True)
     FILES[name](path)
-    fuzz(read, path, most=LYING_LENGTH if name.endswith(".dcm") else PEAK_BYTES)
+    fuzz(read, path, most=PEAK_BYTES)
