@@ -10,7 +10,7 @@ from tomomesh import read_volume, segment
 from tomomesh.errors import UsageError
 from tomomesh.model.volume import Volume
 
-AIR, SKIN, BONE, TABLE = -1000, 40, 900, 500
+AIR, SKIN, BONE, TABLE, LUNG = -1000, 40, 900, 500, -850
 
 
 def head(*, table: bool = True, thin: float = 3.0) -> Volume:
@@ -80,6 +80,50 @@ class TestKeep:
         levels[:, 3:6, 3:6], levels[0, 0, 0] = BONE, -5
         found = segment(Volume.from_stored(levels, np.eye(4), unit="HU"), preset="bone", network="none")
         assert np.array_equal(found.mask, levels == BONE)
+
+
+def lungs(*, bubble: bool = True) -> Volume:
+    """A chest with two lungs, and one voxel of air between them, which coarse voxels miss."""
+    spacing = (1.0, 3.0, 3.0)
+    z, y, x = (np.indices((48, 80, 110)) - np.array([24, 40, 55]).reshape(3, 1, 1, 1)) * np.reshape(
+        spacing, (3, 1, 1, 1)
+    )
+    levels = np.where((x / 150) ** 2 + (y / 105) ** 2 < 1, SKIN, AIR)
+    for side in (-70, 70):
+        levels[((x - side) / 45) ** 2 + (y / 65) ** 2 + (z / 20) ** 2 < 1] = LUNG
+    if bubble:
+        levels[25, 40, 55] = LUNG
+    return Volume.from_stored(levels.astype(np.int16), np.diag([*spacing[::-1], 1.0]), unit="HU")
+
+
+class TestAuto:
+    """What is thrown away unasked must not be what was wanted."""
+
+    @pytest.mark.parametrize("bubble", [False, True])
+    @pytest.mark.parametrize("upper", [-500.0, -200.0])
+    def test_a_window_of_air_is_kept(self, bubble: bool, upper: float) -> None:
+        study = lungs(bubble=bubble)
+        found = segment(study, lower=-950.0, upper=upper, network="none")
+        assert np.array_equal(found.mask, study.voxels == LUNG)
+        assert found.report["window"]["components"] is None
+
+    def test_body_is_taken_at_its_word(self) -> None:
+        found = segment(lungs(), lower=-950.0, upper=-500.0, network="none", keep="body")
+        assert np.count_nonzero(found.mask) == 1
+
+    def test_a_table_goes_from_a_window_that_begins_in_air(self) -> None:
+        found = segment(head(), lower=-470.0, network="none")
+        assert found.report["window"]["dropped_voxels"] == np.count_nonzero(head().voxels == TABLE)
+
+    def test_most_of_a_window_is_kept_with_a_warning(self) -> None:
+        study = head(table=False)
+        study.voxels[:, :8] = TABLE - 1
+        study.voxels[:, 8:10, 40] = study.voxels[:, 2:8:2] = AIR
+        study.voxels[:, 70, 40] = TABLE - 1
+        found = segment(study, lower=TABLE - 2.0, upper=TABLE - 1.0, network="none")
+        assert np.array_equal(found.mask, study.voxels == TABLE - 1)
+        [warning] = [told for told in found.report["warnings"] if "most of the window" in told]
+        assert "--keep body" in warning
 
 
 def test_a_real_table_is_left_out_and_the_arms_stay() -> None:

@@ -67,6 +67,11 @@ def components_of_body(mask: NDArray[np.bool_], volume: Volume) -> Components:
     return _kept(labels, within >= LEAST * sizes, mask)
 
 
+def is_dense(mask: NDArray[np.bool_], volume: Volume) -> bool:
+    """Tell whether over half of a window of a CT is as dense as a body; one of lungs or airways is not."""
+    return bool(2 * np.count_nonzero(volume.voxels[mask] > PRESETS_HU["skin"][0]) > np.count_nonzero(mask))
+
+
 def _components(mask: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[np.int64]]:
     """Return the numbers of components that touch along faces, edges or at corners, and their sizes, 0 for the rest."""
     labels, _ = ndimage.label(mask, np.ones((3, 3, 3), np.bool_))

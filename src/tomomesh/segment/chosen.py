@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import EmptyError, UsageError
-from .body import Components, components_of_body, largest_component
+from .body import Components, components_of_body, is_dense, largest_component
 from .select import select
 from .window import choose_window, window
 
@@ -34,6 +34,8 @@ class Chosen:
     found, dropped : int
         Components of the window, and those that were left out; 0 where all were to be kept.
     dropped_voxels : int
+    spared_voxels : int
+        Voxels that lie in no body, and were kept for being most of the window.
     """
 
     volume: Volume
@@ -43,6 +45,7 @@ class Chosen:
     found: int = 0
     dropped: int = 0
     dropped_voxels: int = 0
+    spared_voxels: int = 0
 
 
 def choose(stack: Volume, labels: Volume | None, settings: Settings, inside: NDArray[np.bool_] | None = None) -> Chosen:
@@ -71,7 +74,7 @@ def choose(stack: Volume, labels: Volume | None, settings: Settings, inside: NDA
         chosen = Chosen(replace(stack, voxels=mask.view(np.uint8)), mask, 0.5, np.inf)
     if inside is not None:
         chosen = replace(chosen, mask=_within(chosen.mask, inside))
-    return _some(chosen, _kept_components(chosen, stack, asked))
+    return _some(chosen, _kept_components(chosen, stack, asked), guessed=asked.keep == "auto")
 
 
 def _within(mask: NDArray[np.bool_], inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -86,7 +89,7 @@ def _kept_components(chosen: Chosen, stack: Volume, asked: WindowSettings) -> Co
     ct = stack.layers == 1 and (stack.unit == "HU" or asked.preset is not None)
     keep = asked.keep
     if keep == "auto":
-        keep = "body" if ct and asked.select is None else "all"
+        keep = "body" if ct and asked.select is None and is_dense(chosen.mask, stack) else "all"
     if keep == "largest":
         return largest_component(chosen.mask)
     if keep == "all":
@@ -99,13 +102,16 @@ def _kept_components(chosen: Chosen, stack: Volume, asked: WindowSettings) -> Co
     return components_of_body(chosen.mask, stack)
 
 
-def _some(chosen: Chosen, kept: Components | None) -> Chosen:
-    """Leave components out; not all of them, where a study shows no body at all."""
+def _some(chosen: Chosen, kept: Components | None, *, guessed: bool) -> Chosen:
+    """Leave components out; not all of them, where a study shows no body at all, nor most of a window on a guess."""
     if kept is None:
         return chosen
-    if not kept.mask.any():
+    voxels = int(np.count_nonzero(chosen.mask))
+    dropped_voxels = voxels - int(np.count_nonzero(kept.mask))
+    if guessed and 2 * dropped_voxels > voxels:
+        return replace(chosen, found=kept.found, spared_voxels=dropped_voxels)
+    if dropped_voxels == voxels:
         return replace(chosen, found=kept.found)
-    dropped_voxels = int(np.count_nonzero(chosen.mask) - np.count_nonzero(kept.mask))
     return replace(
         chosen, mask=kept.mask, found=kept.found, dropped=kept.dropped, dropped_voxels=dropped_voxels
     )  # fmt: skip

@@ -33,7 +33,7 @@ class WindowSettings(Group):
     keep: str = param(
         "auto",
         "components of the window that are kept: those of the patient's body, without the scanner's table; the "
-        "largest; or all. auto is body for CT, and all elsewhere and for labels",
+        "largest; or all. auto is body for what is dense in CT, and all elsewhere and for labels",
         choices=("auto", "body", "largest", "all"),
     )
 
