@@ -29,8 +29,16 @@ OTHER: dict[str, Any] = {
     "bridge": 1.1, "even": False, "trim": 1.5, "cell_mm": (1.5,), "cell_factor": 1.7, "caps": False, "closing": 3,
     "stacks": "none", "allow_leaks": True, "open": True, "smoothing": 0, "attraction": "surface", "stiffness": 0.9,
     "damping": 0.9, "step": 0.5, "springs": "triangles", "limit": "shorten", "units": "cm", "local_origin": True,
+    "largest": True, "surface": "outer", "seed": 99,
 }  # fmt: skip
 """Another value of each parameter that may be without effect."""
+ALWAYS = {
+    "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "level", "fill_chunks", "structure",
+    "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "keep", "slices", "network", "space",
+    "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow", "drain", "least_wall", "print_check",
+    "threads", "frame", "target_faces",
+}  # fmt: skip
+"""Parameters that matter on every way, or that choose what is read, the way, or what becomes of the mesh."""
 STUDY: dict[str, dict[str, Any]] = {
     "networks": {"neurons": 24},
     "online": {"neurons": 24, "training": "online", "iterations": 300, "alpha_fall": "linear", "radius_fall": "linear"},
@@ -42,6 +50,9 @@ STUDY: dict[str, dict[str, Any]] = {
     "nearest in space": {"network": "sphere", "neurons": 42, "attraction": "nearest"},
 }
 CLOUD: dict[str, dict[str, Any]] = {"cloud": {}, "nearest": {"attraction": "nearest"}}
+POWERS = {"training": "online", "alpha_fall": "power", "radius_fall": "power"}
+WAYS = [*(("gray", asked) for asked in STUDY.values()), *(("cloud", asked) for asked in CLOUD.values()), ("stack", {})]
+"""What is read, and what is asked for, on each way to a mesh."""
 
 
 def ball() -> Volume:
@@ -58,6 +69,24 @@ def sphere() -> PointSet:
     return PointSet.from_positions(10 * np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=1))
 
 
+def two_spheres() -> PointSet:
+    """Return 1200 points on two spheres apart, the second the smaller."""
+    first = sphere().positions
+    return PointSet.from_positions(np.concatenate([first, 0.8 * first + [40, 0, 0]]))
+
+
+def stack() -> PointSet:
+    """Return the contours of two balls apart, 60 points each, on parallel slices."""
+    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    rings = [
+        np.stack([x + r * np.cos(angle), r * np.sin(angle), np.full(60, z)], axis=1)
+        for x, most in ((0, 10), (30, 8))
+        for z in range(-8, 9, 2)
+        if (r := np.sqrt(most**2 - z**2)) > 1
+    ]
+    return PointSet.from_positions(np.concatenate(rings))
+
+
 def silent(settings: dict[str, Any], kind: str) -> list[str]:
     """Return the parameters that are said to have no effect."""
     asked = Settings().replace(**settings)
@@ -65,8 +94,8 @@ def silent(settings: dict[str, Any], kind: str) -> list[str]:
 
 
 def vertices(settings: dict[str, Any], kind: str) -> NDArray[np.float64]:
-    if kind == "cloud":
-        return reconstruct_points(sphere(), **settings).mesh.vertices
+    if kind in ("cloud", "stack"):
+        return reconstruct_points(sphere() if kind == "cloud" else stack(), **settings).mesh.vertices
     return reconstruct(ball(), lower=40.0, **settings).mesh.vertices
 
 
@@ -77,6 +106,19 @@ class TestTable:
         for conditions in MATTERS.values():
             for key, values in conditions.items():
                 assert key in ("way", "input") or set(values) < set(choices[key])
+
+    def test_every_parameter_is_in_it_or_always_matters(self) -> None:
+        assert set(MATTERS) | ALWAYS == set(NAMES)
+        assert not set(MATTERS) & ALWAYS
+        assert set(OTHER) == set(MATTERS)
+
+    @pytest.mark.parametrize("name", sorted(MATTERS))
+    def test_what_is_in_it_matters_on_some_ways_and_not_on_others(self, name: str) -> None:
+        told = {
+            bool(without_effect(Settings().replace(**asked), [name], input=kind))
+            for kind, asked in [*WAYS, ("color", POWERS)]
+        }
+        assert told == {True, False}
 
     def test_the_defaults_have_something_to_say_of_few(self) -> None:
         assert {"alpha", "iterations"} < set(silent({}, "gray"))
@@ -93,6 +135,9 @@ class TestTruth:
     def test_what_has_no_effect_on_a_cloud_leaves_the_mesh_as_it_is(self, way: str) -> None:
         self.leaves_the_mesh(CLOUD[way], "cloud")
 
+    def test_what_has_no_effect_on_a_stack_leaves_the_mesh_as_it_is(self) -> None:
+        self.leaves_the_mesh({}, "stack")
+
     @staticmethod
     def leaves_the_mesh(settings: dict[str, Any], kind: str) -> None:
         before, names = vertices(settings, kind), silent(settings, kind)
@@ -106,6 +151,25 @@ class TestTruth:
             assert name not in silent(STUDY["networks"], "gray")
             after = vertices(STUDY["networks"] | {name: OTHER[name]}, "gray")
             assert after.shape != before.shape or not np.array_equal(after, before), name
+
+
+class TestLargest:
+    """A surface of several parts, on the ways that keep all of them."""
+
+    @pytest.mark.parametrize(
+        "asked", [{"network": "none"}, {"contours": "components"}, {"contours": "walls"}, {"network": "sphere"}]
+    )
+    def test_another_option_is_named_where_it_has_no_effect(self, asked: dict[str, Any]) -> None:
+        [told] = without_effect(Settings().replace(**asked), ["largest"], input="gray")
+        assert told.startswith("--largest has no effect with --")
+        assert told.endswith(": --keep largest has")
+
+    def test_a_stack_of_contours_is_told_apart_from_a_cloud(self) -> None:
+        told = reconstruct_points(stack(), largest=True).report["warnings"]
+        assert "--largest has no effect on a stack of contours" in told
+        found = reconstruct_points(two_spheres(), largest=True).report
+        assert not any("--largest" in one for one in found["warnings"])
+        assert found["quality"]["components"] == 1
 
 
 class TestReport:

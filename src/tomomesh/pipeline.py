@@ -77,22 +77,9 @@ def reconstruct(
     require_surface(settings)
     account = _begun(settings, changes, volume)
     segmentation = segment_study(volume, labels, settings, account, progress)
-    sampling = segmentation.sampling
-    if segmentation.boundary is not None:
-        surface = _surface_of_voxels(segmentation.boundary, settings, account, progress)
-    elif segmentation.space is not None:
-        surface = surface_of_space(segmentation, settings, account, progress)
-    elif segmentation.contours is not None:
-        finest, slices = min(segmentation.volume.spacing_mm[:2]), slices_of_rings(sampling.points)
-        surface = _surface_of_contours(
-            sampling.points, slices, settings, account, progress, finest=finest, bridged=sampling.bridged
-        )
-    else:
-        surface = surface_of_networks(
-            sampling.points, sampling.spacing_mm, settings, account, progress, expected_mm3=sampling.volume_mm3
-        )
+    surface = _surface_of(segmentation, settings, account, progress)
     surface = _printed(_coarser(surface, settings, account, progress), settings, account, progress)
-    account.volume(sampling)
+    account.volume(segmentation.sampling)
     if truth is not None:
         account.truth(surface.mesh, surface.cap_faces, truth)
     return replace(surface, segmentation=segmentation)
@@ -145,9 +132,10 @@ def reconstruct_points(
         settings = settings.replace(units="mm")
     if settings.run.local_origin:
         cloud = replace(cloud, positions=cloud.positions - lowest)
-    account = _begun(settings, changes)
+    account = Account(settings)
     with account.timed("slices"):
         slices = slices_of(cloud, settings)
+    _warn(settings, changes, "cloud" if slices is None else "stack", account)
     if slices is not None and settings.fit.attraction != "nearest":
         surface = _surface_of_contours(cloud, slices, settings, account, progress)
     elif settings.fit.attraction == "nearest":
@@ -162,13 +150,34 @@ def reconstruct_points(
     return _printed(surface, settings, account, progress, unit=settings.run.units)
 
 
-def _begun(settings: Settings, changes: Mapping[str, Any], volume: Volume | None = None) -> Account:
-    """Begin the account of a run; warn of what was asked for and changes nothing."""
+def _begun(settings: Settings, changes: Mapping[str, Any], volume: Volume) -> Account:
+    """Begin the account of a study."""
     account = Account(settings)
-    kind = "cloud" if volume is None else "color" if getattr(volume, "layers", 1) > 1 else "gray"
+    _warn(settings, changes, "color" if getattr(volume, "layers", 1) > 1 else "gray", account)
+    return account
+
+
+def _warn(settings: Settings, changes: Mapping[str, Any], kind: str, account: Account) -> None:
+    """Warn of what was asked for and changes nothing."""
     for message in without_effect(settings, changes, input=kind):
         account.warn(message)
-    return account
+
+
+def _surface_of(segmentation: Segmentation, settings: Settings, account: Account, progress: Progress) -> Surface:
+    """Take the way to a surface that stage one has taken."""
+    sampling = segmentation.sampling
+    if segmentation.boundary is not None:
+        return _surface_of_voxels(segmentation.boundary, settings, account, progress)
+    if segmentation.space is not None:
+        return surface_of_space(segmentation, settings, account, progress)
+    if segmentation.contours is not None:
+        finest, slices = min(segmentation.volume.spacing_mm[:2]), slices_of_rings(sampling.points)
+        return _surface_of_contours(
+            sampling.points, slices, settings, account, progress, finest=finest, bridged=sampling.bridged
+        )
+    return surface_of_networks(
+        sampling.points, sampling.spacing_mm, settings, account, progress, expected_mm3=sampling.volume_mm3
+    )
 
 
 def _surface_of_cloud(cloud: PointSet, settings: Settings, account: Account, progress: Progress) -> Surface:

@@ -81,8 +81,8 @@ class StageOne(Ledger):
             )
         if chosen.spared_voxels:
             self.warn(
-                f"most of the window ({chosen.spared_voxels} of {int(mask.sum())} voxels) lies in nothing that is 12 mm "
-                "thick, and was kept for all that: --keep body leaves it out"
+                f"most of the window ({chosen.spared_voxels} of {int(mask.sum())} voxels) lies in nothing that is 12 "
+                "mm thick, and was kept for all that: --keep body leaves it out"
             )
         if any(edges[2:]):
             self.warn("the window touches the border of the slices: the surface is closed along it")

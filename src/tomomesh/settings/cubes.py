@@ -26,7 +26,7 @@ class CubeSettings(Group):
         "take points on parallel slices as contours, and close what lies between their insides; none never does",
         choices=("auto", "none"),
     )
-    largest: bool = param(False, "keep the largest surface alone")
+    largest: bool = param(False, "keep the largest surface alone, where cubes make it; elsewhere --keep largest does")
     allow_leaks: bool = param(False, "write the surface even where the outside leaks into the shell")
     open: bool = param(False, "write an open surface as a one-sided sheet with its borders")
     surface: str = param(

@@ -18,6 +18,8 @@ SPRINGS = ("networks", "nearest", "space nearest")
 """Ways whose mesh hangs on springs between masses."""
 TRAINED = ("networks", "contours", "space", "space nearest")
 """Ways that train networks; ``voxels`` has none."""
+CLOUDS = ("cloud", "stack")
+"""Kinds of points; a stack is a cloud of contours on parallel slices."""
 ONLINE, BATCH = {"training": ("online",)}, {"training": ("batch",)}
 
 MATTERS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
@@ -40,27 +42,34 @@ MATTERS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "bridge": {"way": ("networks", "contours")},
     "even": {"way": ("networks", "contours"), "network": ("chain", "ring")},
     "trim": {"way": TRAINED},
-    "cell_mm": {"way": (*CUBES, "contours")},
-    "cell_factor": {"way": (*CUBES, "contours")},
+    "cell_mm": {"way": (*CUBES, "contours", "stack")},
+    "cell_factor": {"way": (*CUBES, "contours", "stack")},
     "caps": {"way": ("networks",)},
     "closing": {"way": CUBES},
-    "stacks": {"way": ("cloud",)},
-    "allow_leaks": {"way": CUBES},
+    "stacks": {"way": CLOUDS},
+    "largest": {"way": CUBES},
+    "allow_leaks": {"way": (*CUBES, "stack")},
     "open": {"way": ("cloud",)},
+    "surface": {"way": (*CUBES, "voxels")},
     "smoothing": {"way": CUBES},
-    "attraction": {"way": ("nearest", "cloud", "space", "space nearest")},
-    "stiffness": {"way": (*SPRINGS, "voxels", "contours", "cloud")},
+    "attraction": {"way": ("nearest", *CLOUDS, "space", "space nearest")},
+    "stiffness": {"way": (*SPRINGS, "voxels", "contours", "stack")},
     "damping": {"way": (*SPRINGS, "cloud", "space")},
     "step": {"way": (*SPRINGS, "cloud", "space")},
     "springs": {"way": SPRINGS},
     "limit": {"way": SPRINGS},
-    "units": {"input": ("cloud",)},
-    "local_origin": {"input": ("cloud",)},
+    "units": {"input": CLOUDS},
+    "local_origin": {"input": CLOUDS},
+    "seed": {"way": TRAINED},
 }
 """Parameter to what must hold so that it changes anything: another parameter's values, what is read (gray or color
-study, or cloud), or the way to the mesh. Those that always matter are not named."""
+study, cloud or stack), or the way to the mesh. Those that always matter are not named."""
 
-INPUTS = {"gray": "on a gray study", "color": "on a color study", "cloud": "on a cloud"}
+INPUTS = {
+    "gray": "on a gray study", "color": "on a color study", "cloud": "on a cloud", "stack": "on a stack of contours",
+}  # fmt: skip
+INSTEAD = {"largest": "--keep largest"}
+"""Parameter to what does the same on the voxels of a study, whichever way it goes."""
 
 
 def without_effect(settings: Settings, given: Collection[str], *, input: str) -> list[str]:
@@ -73,7 +82,8 @@ def without_effect(settings: Settings, given: Collection[str], *, input: str) ->
     given : collection of str
         The bare names of those that were asked for; the others are not looked at.
     input : str
-        What is read: ``gray`` or ``color`` for a study, or ``cloud``.
+        What is read: ``gray`` or ``color`` for a study, ``cloud``, or ``stack`` for a cloud of contours on parallel
+        slices.
 
     Returns
     -------
@@ -88,7 +98,8 @@ def without_effect(settings: Settings, given: Collection[str], *, input: str) ->
     found = []
     for entry in (entry for entry in entries if entry.name in given):
         failed = [key for key, allowed in MATTERS.get(entry.name, {}).items() if values[key] not in allowed]
-        found += [f"{asked_by(entry)} has no effect {_reason(key, values, reasons)}" for key in failed[:1]]
+        instead = f": {INSTEAD[entry.name]} has" if entry.name in INSTEAD and input not in CLOUDS else ""
+        found += [f"{asked_by(entry)} has no effect {_reason(key, values, reasons)}{instead}" for key in failed[:1]]
     return found
 
 
@@ -99,8 +110,8 @@ def _reason(key: str, values: Mapping[str, object], reasons: Mapping[str, str]) 
 def _way(settings: Settings, input: str) -> tuple[str, str]:
     """Return which way leads to the mesh, and what took it there, in words."""
     network, nearest = settings.network, settings.fit.attraction == "nearest"
-    if input == "cloud":
-        return ("nearest", "on a cloud with --attraction nearest") if nearest else ("cloud", "on a cloud")
+    if input in CLOUDS:
+        return ("nearest", "on a cloud with --attraction nearest") if nearest else (input, INPUTS[input])
     if network.network == "none":
         return "voxels", "with --network none"
     if network.in_space:
