@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ from .outputs import (
     write_stage_one,
     write_surface,
 )
+from .parts import frame_of_mesh, frame_of_part, turned
 from .sources import read_study, sources_of
 from .streams import streamed
 
@@ -197,9 +199,12 @@ def _check(chosen: Namespace) -> None:
     mesh = io.read_mesh(chosen.mesh)
     report = assess(mesh, against=other)
     if chosen.print_check:
+        from ..printing.part import MM, resized
         from ..printing.verdict import verdict
 
-        report["print"] = verdict(mesh, settings_of(chosen).printing)
+        named = frame_of_mesh(chosen.mesh)
+        asked = turned(settings_of(chosen).printing, named["frame"])
+        report["print"] = verdict(resized(mesh, MM[named["unit"]]), asked)
     if chosen.report:
         io.write_document(report, chosen.report)
     _say(report, None if chosen.json else summary.of_check(report))
@@ -211,9 +216,13 @@ def _print(chosen: Namespace) -> None:
     from ..printing.part import make_part
 
     with Bars(quiet=chosen.quiet) as progress:
-        part = make_part(io.read_mesh(chosen.mesh), settings, unit=settings.run.units, progress=progress)
-        io.write_mesh(part.mesh, chosen.output, unit="mm", frame="unknown")
-    report = {"print": part.report, "settings": settings.to_dict()}
+        mesh = io.read_mesh(chosen.mesh)
+        named = frame_of_mesh(chosen.mesh, given_of(chosen).get("units"))
+        asked = replace(settings, printing=turned(settings.printing, named["frame"]))
+        part = make_part(mesh, asked, unit=named["unit"], progress=progress)
+        written = frame_of_part(named, settings.printing.scale)
+        io.write_mesh(part.mesh, chosen.output, **written)
+    report = {"print": part.report, "written": written, "settings": settings.to_dict()}
     if chosen.report:
         io.write_document(report, chosen.report)
     _tell(chosen, report, summary.of_part(report["print"], chosen.output))

@@ -12,6 +12,7 @@ import numpy as np
 from .. import io
 from ..errors import OutputError, UsageError
 from ..io.source import suffix_of
+from .parts import frame_of_part
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -107,7 +108,7 @@ def _placed(surface: Surface, output: str | Path, settings: Settings) -> tuple[T
     mesh = surface.mesh if part is None else part.mesh
     if stage_one is None:
         frame_of_cloud = _frame_of_cloud(surface.report, settings)
-        return mesh, frame_of_cloud if part is None else frame_of_part(frame_of_cloud)
+        return mesh, frame_of_cloud if part is None else frame_of_part(frame_of_cloud, settings.printing.scale)
     asked = "ras" if suffix_of(output) in RAS_ALONE else settings.run.frame
     frame = io.frame_of_study(asked, stage_one.volume.grid)
     return frame.mesh(mesh), {"unit": frame.unit, "frame": frame.name}
@@ -131,12 +132,6 @@ def _frame_of_cloud(report: dict[str, Any], settings: Settings) -> dict[str, str
     corner = ",".join(repr(place).removesuffix(".0") for place in points.get("origin", ()))
     frame = points.get("frame", "unknown")
     return {"unit": points["unit"], "frame": f"local:{corner}" if settings.run.local_origin else frame}
-
-
-def frame_of_part(frame: dict[str, str]) -> dict[str, str]:
-    """Name unit and frame of a part of a cloud, whose own are not those of its part, but for a patient's."""
-    unit = frame["unit"] if frame["unit"] == "unknown" else "mm"
-    return {"unit": unit, "frame": frame["frame"] if frame["frame"] == "LPS" else "unknown"}
 
 
 def _write_mask(surface: Surface, path: str | Path, settings: Settings) -> dict[str, Any]:

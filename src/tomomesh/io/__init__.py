@@ -14,6 +14,7 @@ from .labels import LABEL_WRITERS, write_labels
 from .meshes import MESH_READERS, MESH_WRITERS, keeps, read_mesh, write_mesh
 from .points import POINT_READERS, POINT_WRITERS, read_points, write_points
 from .series import list_series
+from .stated import stated
 from .studies import Study, find_studies
 from .volumes import VOLUME_READERS, read_volume
 
@@ -39,6 +40,7 @@ __all__ = [
     "read_settings",
     "read_volume",
     "replacing",
+    "stated",
     "write_document",
     "write_labels",
     "write_mesh",

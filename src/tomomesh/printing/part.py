@@ -47,6 +47,11 @@ class Part:
         return verdict(self.mesh, self.settings.printing, threads=self.settings.run.threads)
 
 
+def resized(mesh: TriMesh, factor: float) -> TriMesh:
+    """Return a mesh with every coordinate times a factor."""
+    return mesh if factor == 1 else mesh.moved(factor * mesh.vertices)
+
+
 def require_printing(settings: Settings) -> None:
     """Refuse what cannot be printed, and what needs a package that is not installed.
 
@@ -91,7 +96,7 @@ def make_part(mesh: TriMesh, settings: Settings, *, unit: str = "mm", progress: 
         )
     asked, threads = settings.printing, settings.run.threads
     per_unit = asked.scale * MM[unit]
-    made = mesh if per_unit == 1 else mesh.moved(per_unit * mesh.vertices)
+    made = resized(mesh, per_unit)
     if asked.flat_base is not None:
         made = stood(made, asked.flat_base, asked.down)
     if asked.hollow is not None:

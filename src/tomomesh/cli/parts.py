@@ -1,0 +1,47 @@
+"""What a part to print is measured in: the unit and frame of the mesh that it is made of, and its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from .. import io
+from ..errors import GeometryError
+
+if TYPE_CHECKING:
+    from ..settings.printing import PrintSettings
+
+PATIENT = ("LPS", "RAS")
+"""Frames in which front and back, left and right are the patient's."""
+MIRRORED = {"anterior": "posterior", "posterior": "anterior", "left": "right", "right": "left"}
+"""Where a side of LPS lies in RAS."""
+
+
+def frame_of_mesh(path: str, unit: str | None = None) -> dict[str, str]:
+    """Return the unit and frame of a mesh file: as asked for, else as it states them itself, else millimeters.
+
+    Raises
+    ------
+    GeometryError
+        For a unit that has no length, as voxels.
+    """
+    from ..printing.part import MM
+
+    named = {"unit": "mm", "frame": "unknown"} | io.stated(path) | ({"unit": unit} if unit else {})
+    if named["unit"] not in MM:
+        raise GeometryError(
+            "the mesh's unit has no known length", file=path, found=f"unit = {named['unit']}",
+            expected=" | ".join(MM), hint="--frame lps where the mesh is made",
+        )  # fmt: skip
+    return named
+
+
+def turned(asked: PrintSettings, frame: str) -> PrintSettings:
+    """Return the settings for a frame: the way down is that of LPS, against which RAS is turned by half a turn."""
+    return replace(asked, down=MIRRORED.get(asked.down, asked.down)) if frame == "RAS" else asked
+
+
+def frame_of_part(frame: dict[str, str], scale: float) -> dict[str, str]:
+    """Name unit and frame of a part: a patient's frame is kept where the part has the object's own size."""
+    unit = frame["unit"] if frame["unit"] == "unknown" else "mm"
+    return {"unit": unit, "frame": frame["frame"] if frame["frame"] in PATIENT and scale == 1 else "unknown"}
