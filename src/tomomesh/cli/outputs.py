@@ -111,7 +111,8 @@ def _placed(surface: Surface, output: str | Path, settings: Settings) -> tuple[T
         return mesh, frame_of_cloud if part is None else frame_of_part(frame_of_cloud, settings.printing.scale)
     asked = "ras" if suffix_of(output) in RAS_ALONE else settings.run.frame
     frame = io.frame_of_study(asked, stage_one.volume.grid)
-    return frame.mesh(mesh), {"unit": frame.unit, "frame": frame.name}
+    named = {"unit": frame.unit, "frame": frame.name}
+    return frame.mesh(mesh), named if part is None else frame_of_part(named, settings.printing.scale)
 
 
 def write_points(

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from .meshes import STL_TEXT
 from .source import suffix_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 HEAD = 300
 """Bytes that hold the longest signature and what the formats have before it."""
@@ -24,7 +21,7 @@ def stated(path: str | Path) -> dict[str, str]:
     path : path
         One of `MESH_READERS`, already known to be readable.
     """
-    with open(path, "rb") as file:
+    with Path(path).open("rb") as file:
         found = SIGNATURE.search(file.read(STL_TEXT if suffix_of(path) == ".stl" else HEAD))
     words = found[1].decode("ascii", "replace").split() if found else []
     named = dict(word.split("=", 1) for word in words if "=" in word)
