@@ -5,8 +5,10 @@ from __future__ import annotations
 import io
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from test_cli import ERROR
 from tomomesh.cli import main
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 OPTIONS = ["--network", "none", "--lower", "50"]
@@ -54,6 +57,14 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(folder))
     return folder
+
+
+def until(true: Callable[[], bool]) -> bool:
+    """Wait until something is true, 20 s at most."""
+    end = time.monotonic() + 20
+    while not (found := true()) and time.monotonic() < end:
+        time.sleep(0.02)
+    return found
 
 
 def feed(monkeypatch: pytest.MonkeyPatch, data: bytes) -> None:
@@ -159,6 +170,21 @@ class TestIn:
         assert "File: -" in said
         assert str(temporary) not in said
         assert list(temporary.iterdir()) == []
+
+
+class TestPrivacy:
+    def test_nothing_is_left_of_a_study_after_a_kill(self, study: Path, tmp_path: Path) -> None:
+        private = tmp_path / "private"
+        private.mkdir()
+        line = [sys.executable, "-c", PROGRAM, "inspect", "-"]
+        environment = {**os.environ, "TMPDIR": str(private)}
+        with subprocess.Popen(line, stdin=subprocess.PIPE, env=environment, start_new_session=True) as child:
+            assert child.stdin is not None
+            child.stdin.write(study.read_bytes().ljust(2**21))  # more than waits in buffers
+            child.stdin.flush()
+            assert until(lambda: any(path.stat().st_size for path in private.glob("tomomesh-*/input.nii")))
+            os.killpg(child.pid, signal.SIGKILL)
+        assert until(lambda: not list(private.iterdir()))
 
 
 class TestPipes:

@@ -6,13 +6,13 @@ import os
 import re
 import shutil
 import sys
-import tempfile
 from argparse import Namespace
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import TomomeshError, UsageError
+from ..io.private import private_folder
 from .formats import TEXTS
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
     if not inside and not outside:
         yield chosen
         return
-    with tempfile.TemporaryDirectory(prefix="tomomesh-") as folder, _named_as_typed(folder):
+    with private_folder() as folder, _named_as_typed(folder):
         files = {}
         if inside:
             files[inside] = _received(Path(folder, f"input.{chosen.input_format}"))
@@ -80,11 +80,11 @@ def _received(path: Path) -> str:
 
 
 @contextmanager
-def _named_as_typed(folder: str) -> Iterator[None]:
+def _named_as_typed(folder: Path) -> Iterator[None]:
     """Name streams in errors as they were typed, not the temporary files in their place."""
     try:
         yield
     except TomomeshError as fault:
-        inside = re.escape(folder + os.sep)
+        inside = re.escape(f"{folder}{os.sep}")
         fault.args = (re.sub(rf"{inside}(input|output)(\.\w+)+", STREAM, str(fault)),)
         raise

@@ -15,8 +15,8 @@ class RunSettings(Group):
     threads: int = param(0, "threads; 0 is one a core", low=0, high=1024)
     units: str = param(
         "mm",
-        "unit that the numbers of a cloud are in, or those of a mesh to print, whose own file is believed where this is "
-        "not given; studies are always in mm",
+        "unit that the numbers of a cloud are in, or those of a mesh to print, whose own file is believed where this "
+        "is not given; studies are always in mm",
         choices=("mm", "cm", "m", "unknown"),
     )
     frame: str = param(
