@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,9 +22,9 @@ from tomomesh.cli import main
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
 OPTIONS = ["--network", "none", "--lower", "50"]
+FULL = Path("/dev/full")
 PROGRAM = "import sys; from tomomesh.cli import main; sys.exit(main(sys.argv[1:]))"
 
 
@@ -170,6 +171,45 @@ class TestIn:
         assert "File: -" in said
         assert str(temporary) not in said
         assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="this system has no /dev/full")
+class TestRoom:
+    @pytest.mark.parametrize("line", [
+        ["--help"], ["man"], ["inspect", "s.nii"], ["inspect", "s.nii", "--json"],
+        ["reconstruct", "s.nii", *OPTIONS, "-o", "m.stl"],
+        ["reconstruct", "s.nii", *OPTIONS, "-o", "-", "--format", "stl"],
+        ["reconstruct", ".", *OPTIONS, "--each", "-o", "out"],
+    ])  # fmt: skip
+    def test_a_full_disk_is_one_line_and_no_bug(self, line: list[str], study: Path) -> None:
+        command = [sys.executable, "-c", PROGRAM, *line, *(["--quiet"] if "-" in line else [])]
+        with FULL.open("wb") as full:
+            done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, cwd=study.parent)
+        said = [one for one in done.stderr.decode().splitlines() if one.startswith(("error", "Trace", "Exception"))]
+        assert done.returncode == 8
+        assert len(said) == 1
+        assert "no space left on device" in said[0]
+        assert ERROR.match(said[0])
+
+    def test_a_temporary_folder_too_small_for_what_comes_in(self, tmp_path: Path) -> None:
+        import resource
+
+        def limit() -> None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+
+        line = [sys.executable, "-c", PROGRAM, "inspect", "-"]
+        environment = {**os.environ, "TMPDIR": str(tmp_path)}
+        done = subprocess.run(line, input=bytes(10**6), capture_output=True, env=environment, preexec_fn=limit)
+        (said,) = done.stderr.decode().splitlines()
+        assert done.returncode == 8
+        assert "TMPDIR" in said
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_no_temporary_folder_is_no_bug(temporary: Path, tmp_path: Path, capfdbinary: Any) -> None:
+    temporary.rmdir()
+    assert main(["surface", "-", "-o", str(tmp_path / "m.stl")]) == 8
+    assert b"TMPDIR" in capfdbinary.readouterr().err
 
 
 class TestPrivacy:

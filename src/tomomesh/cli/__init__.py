@@ -9,12 +9,13 @@ import sys
 from typing import TYPE_CHECKING
 
 from . import shell
-from .faults import as_error
+from .faults import as_error, is_full
 from .options import TOLD, build_parser, joined
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from types import FrameType
+    from typing import TextIO
 
 INTERRUPTED, TERMINATED = 130, 143
 
@@ -33,9 +34,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             return _run(sys.argv[1:] if arguments is None else arguments)
         finally:
-            sys.stdout.flush()  # here, so that a pipe that was closed early is noticed
-    except BrokenPipeError:
-        return _leave_quietly()
+            print(end="", flush=True)  # here, so that a pipe that was closed early, or a full disk, is noticed
+    except BrokenPipeError:  # who reads it has left, as `head` does
+        _drop(sys.stdout, sys.stderr)
+        return 0
+    except Exception as fault:
+        if is_full(fault):
+            _drop(sys.stdout)
+        error = as_error(fault)
+        print(f"error: {error}", file=sys.stderr)
+        return error.exit_code
 
 
 def _run(arguments: Sequence[str]) -> int:
@@ -53,21 +61,14 @@ def _run(arguments: Sequence[str]) -> int:
         return INTERRUPTED
     except _Terminated:
         return TERMINATED
-    except BrokenPipeError:
-        raise
-    except Exception as fault:
-        error = as_error(fault)
-        print(f"error: {error}", file=sys.stderr)
-        return error.exit_code
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
     raise _Terminated
 
 
-def _leave_quietly() -> int:
-    """Let what is still to be written go nowhere: who reads it has left, as ``head`` does."""
+def _drop(*streams: TextIO) -> None:
+    """Let what is still to be written go nowhere."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (sys.stdout, sys.stderr):
+    for stream in streams:
         os.dup2(nowhere, stream.fileno())
-    return 0

@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from ..errors import InternalCheckError, ResourceError, TomomeshError
+import errno
+from typing import TYPE_CHECKING
+
+from ..errors import InternalCheckError, OutputError, ResourceError, TomomeshError
+
+if TYPE_CHECKING:
+    from typing import TypeGuard
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def as_error(fault: Exception) -> TomomeshError:
@@ -11,8 +19,15 @@ def as_error(fault: Exception) -> TomomeshError:
         return fault
     if isinstance(fault, MemoryError):
         return ResourceError("the machine's memory is full", hint="a larger --cell-mm, or fewer slices")
+    if is_full(fault):
+        return OutputError("there is no room for what is written", found=str(fault.strerror).lower())
     # not in its own words: they may quote what a study says of a patient
     return InternalCheckError(f"a bug: {type(fault).__name__} in {_place(fault)}")
+
+
+def is_full(fault: Exception) -> TypeGuard[OSError]:
+    """Tell whether something could not be written for want of room."""
+    return isinstance(fault, OSError) and fault.errno in NO_ROOM
 
 
 def _place(fault: BaseException) -> str:

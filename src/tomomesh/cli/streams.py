@@ -11,7 +11,7 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import TomomeshError, UsageError
+from ..errors import OutputError, TomomeshError, UsageError
 from ..io.private import private_folder
 from .formats import TEXTS
 
@@ -74,8 +74,14 @@ def _suffix(chosen: Namespace) -> str:
 
 def _received(path: Path) -> str:
     """Write standard input to a file."""
-    with path.open("wb") as file:
-        shutil.copyfileobj(sys.stdin.buffer, file)
+    try:
+        with path.open("wb") as file:
+            shutil.copyfileobj(sys.stdin.buffer, file)
+    except OSError as fault:
+        raise OutputError(
+            "standard input cannot be kept in the temporary folder", found=str(fault.strerror).lower(),
+            hint="TMPDIR=FOLDER, one with more room",
+        ) from None  # fmt: skip
     return str(path)
 
 
