@@ -65,6 +65,15 @@ def done(said: str) -> list[str]:
     return [line.split()[1].rstrip(":") for line in said.splitlines() if "component(s)" in line]
 
 
+@pytest.mark.parametrize("options", [["--format", "3mf"], ["--format", "gii"], ["--flat-base", "5"]])
+def test_what_has_no_voxels_is_refused_before_any_work(
+    folder: Path, options: list[str], capsys: CaptureFixture[str]
+) -> None:
+    assert batch(folder, "--frame", "voxel", *options) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert not (folder.parent / "out").exists()
+
+
 class TestBatch:
     def test_every_study_has_a_mesh_a_report_and_a_row(self, folder: Path, capsys: CaptureFixture[str]) -> None:
         assert batch(folder) == 10

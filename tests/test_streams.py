@@ -206,9 +206,10 @@ class TestRoom:
         assert list(tmp_path.iterdir()) == []
 
 
-def test_no_temporary_folder_is_no_bug(temporary: Path, tmp_path: Path, capfdbinary: Any) -> None:
-    temporary.rmdir()
-    assert main(["surface", "-", "-o", str(tmp_path / "m.stl")]) == 8
+def test_no_temporary_folder_is_no_bug(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfdbinary: Any) -> None:
+    with monkeypatch.context() as patched:
+        patched.setattr("tempfile.tempdir", str(tmp_path / "none"))
+        assert main(["surface", "-", "-o", str(tmp_path / "m.stl")]) == 8
     assert b"TMPDIR" in capfdbinary.readouterr().err
 
 

@@ -14,7 +14,7 @@ from .. import io
 from ..errors import BatchError, UsageError, printable
 from . import summary
 from .faults import as_error
-from .outputs import check_files, check_folder, make_folder
+from .outputs import check_files, check_folder, check_frame, make_folder
 from .records import COLUMNS, finished, record_of, row_of
 
 if TYPE_CHECKING:
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     Work = Callable[[Namespace, Settings], Surface]
 
 TABLE = "reports.csv"
+USUAL = "stl"
+"""Format of the meshes where none is asked for."""
 SINGLE = ("labels_in", "points", "labels", "mask_out", "figures", "report")
 """Files of one study, which a batch has no place for."""
 
@@ -48,7 +50,7 @@ def reconstruct_each(chosen: Namespace, settings: Settings, work: Work) -> None:
     UsageError
         For options that are for one study.
     """
-    folder = _checked(chosen)
+    folder = _checked(chosen, settings)
     studies = io.find_studies(chosen.study, without=[folder], series=settings.read.series)
     make_folder(folder)
     rows: list[dict[str, Any]] = []
@@ -69,7 +71,7 @@ def reconstruct_each(chosen: Namespace, settings: Settings, work: Work) -> None:
     _tell_failures(chosen, rows)
 
 
-def _checked(chosen: Namespace) -> Path:
+def _checked(chosen: Namespace, settings: Settings) -> Path:
     """Return the folder of the results; refuse what does not go with many studies."""
     single = [f"--{name.replace('_', '-')}" for name in SINGLE if getattr(chosen, name)]
     if single:
@@ -80,6 +82,7 @@ def _checked(chosen: Namespace) -> Path:
         raise UsageError("--each writes into a folder of its own", file=chosen.output, hint="another folder")
     if Path(chosen.output).is_file():
         raise UsageError("--each writes into a folder", file=chosen.output, expected="a folder")
+    check_frame(Path(chosen.output, f"NAME.{chosen.format or USUAL}"), settings)
     check_files(chosen)
     return check_folder(chosen.output)
 
@@ -88,7 +91,7 @@ def _done(study: io.Study, chosen: Namespace, settings: Settings, folder: Path, 
     """Return a study's row: of its report, or of its fault; of a fault only words are kept, not what it holds on to."""
     try:
         asked = settings if study.series is None else settings.replace(series=study.series)
-        mesh, told = (folder / f"{study.name}.{suffix}" for suffix in (chosen.format or "stl", "json"))
+        mesh, told = (folder / f"{study.name}.{suffix}" for suffix in (chosen.format or USUAL, "json"))
         state = study.state
         report = None if chosen.force else finished(told, mesh, asked, state)
         if report is not None:
