@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Numbers of the system's errors where a disk, a quota or a limit of a file's size is full."""
+
 
 class TomomeshError(Exception):
     """Say in one line what is wrong, where, what was expected and what to try.

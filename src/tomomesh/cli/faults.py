@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 from typing import TYPE_CHECKING
 
-from ..errors import InternalCheckError, OutputError, ResourceError, TomomeshError
+from ..errors import NO_ROOM, InternalCheckError, OutputError, ResourceError, TomomeshError
 
 if TYPE_CHECKING:
     from typing import TypeGuard
-
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def as_error(fault: Exception) -> TomomeshError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import shutil
 import stat
 import zipfile
@@ -10,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
-from ..errors import FormatError, ResourceError, TomomeshError
+from ..errors import NO_ROOM, FormatError, ResourceError, TomomeshError
 from .limits import require_memory
 from .private import private_folder
 from .source import leaves_folder, third_party
@@ -33,8 +32,6 @@ SMALL = 2**26
 
 TAIL = 2**16 + 200
 """The table's length stands among the last bytes of an archive, before a comment of at most 64 KiB."""
-
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @contextmanager
