@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import TYPE_CHECKING
 
 from ..settings import ReadSettings
 from .archive import unpacked_zip
-from .dicom import GONE, Listing, index_in, indexed, is_dicom, is_index, is_segmentation, list_dicom
-from .slices import slices_in
+from .dicom import Listing, is_segmentation, list_dicom
+from .slices import slices_behind
 from .source import existing, existing_file, suffix_of
 
 if TYPE_CHECKING:
@@ -47,19 +46,7 @@ def list_series(path: str | Path, *, settings: ReadSettings | None = None) -> Li
 
 
 def _listed(path: Path, settings: ReadSettings, *, study: str) -> Listing:
-    files, others = _dicom_behind(path, study)
-    if not files or (len(files) == 1 and is_segmentation(files[0])):
+    slices = slices_behind(path, study)
+    if not slices.dicom or (len(slices.dicom) == 1 and is_segmentation(slices.dicom[0])):
         return Listing()
-    return list_dicom(files, settings, study=study, others=others)
-
-
-def _dicom_behind(path: Path, study: str) -> tuple[list[Path], Counter[str]]:
-    """Find what a DICOMDIR names, the slices of a folder, or a single file; and count what was passed over."""
-    index = index_in(path) if path.is_dir() else path if is_index(path) else None
-    if index is not None:
-        files, gone = indexed(index, study=study)
-        return files, Counter({GONE: len(gone)})
-    if path.is_dir():
-        slices = slices_in(path)
-        return slices.dicom, slices.others
-    return [path] if is_dicom(path) else [], Counter()
+    return list_dicom(slices.dicom, settings, study=study, others=slices.others)
