@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..settings import ReadSettings
 from .archive import unpacked_zip
-from .dicom import Listing, is_segmentation, list_dicom
+from .dicom import Listing, list_dicom, lone_object
 from .slices import slices_behind
 from .source import existing, existing_file, suffix_of
 
@@ -47,6 +47,6 @@ def list_series(path: str | Path, *, settings: ReadSettings | None = None) -> Li
 
 def _listed(path: Path, settings: ReadSettings, *, study: str) -> Listing:
     slices = slices_behind(path, study)
-    if not slices.dicom or (len(slices.dicom) == 1 and is_segmentation(slices.dicom[0])):
+    if not slices.dicom or lone_object(slices.dicom) is not None:
         return Listing()
     return list_dicom(slices.dicom, settings, study=study, others=slices.others)

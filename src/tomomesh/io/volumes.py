@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..errors import FormatError, UnreadableError
 from ..settings import ReadSettings
 from .archive import unpacked_zip
-from .dicom import index_in, is_dicom, is_index, is_segmentation, read_dicom, read_index
+from .dicom import index_in, is_dicom, is_index, is_segmentation, lone_object, read_dicom, read_index
 from .dicom.kinds import STRUCTURES, storage_class
 from .dicom.segmentation import read_segmentation
 from .freesurfer import read_mgh
@@ -29,17 +29,20 @@ if TYPE_CHECKING:
     from ..model.volume import Volume
 
 
-def _read_one_dicom(path: Path, settings: ReadSettings, select: Sequence[int] | None = None) -> Volume:
+def _read_one_dicom(
+    path: Path, settings: ReadSettings, select: Sequence[int] | None = None, *, study: str = ""
+) -> Volume:
+    study = study or str(path)
     if storage_class(path) == STRUCTURES:
         raise FormatError(
             "the file holds contours, no voxels",
-            file=str(path),
+            file=study,
             found="an RT Structure Set",
-            hint="tomomesh surface, which takes one of its structures",
+            hint=f"tomomesh surface {path.name} --structure N, which takes one of its structures",
         )
     if is_segmentation(path):
-        return read_segmentation(path, settings, study=str(path), select=select)
-    return read_dicom([path], settings, study=str(path))
+        return read_segmentation(path, settings, study=study, select=select)
+    return read_dicom([path], settings, study=study)
 
 
 def _read_zip(path: Path, settings: ReadSettings, select: Sequence[int] | None = None) -> Volume:
@@ -142,8 +145,8 @@ def _read_folder(folder: Path, settings: ReadSettings, select: Sequence[int] | N
     if (index := index_in(folder)) is not None:
         return read_index(index, settings, study=str(folder))
     slices = slices_in(folder)
-    if len(slices.dicom) == 1 and is_segmentation(slices.dicom[0]):
-        return read_segmentation(slices.dicom[0], settings, study=str(folder), select=select)
+    if (alone := lone_object(slices.dicom)) is not None:
+        return _read_one_dicom(alone, settings, select, study=str(folder))
     if slices.dicom:
         return read_dicom(slices.dicom, settings, study=str(folder), others=slices.others)
     if slices.images:

@@ -10,6 +10,7 @@ from ...model.volume import Volume
 from ..source import counted
 from .bad import leave_out
 from .files import read_frames
+from .kinds import SEGMENTED
 from .pixels import Decoder
 from .series import choose, stacks_among
 from .stack import Stack, stacked
@@ -67,6 +68,7 @@ def _read(files: list[Path], settings: ReadSettings, study: str, others: Counter
             file=study,
             found=counted(passed),
             expected="a DICOM series",
+            hint="one of the segmentations alone" if passed[SEGMENTED] else "",
         )
     left = (f"left out: {counted(passed)}",) if passed else ()
     choice = choose(reading.frames, settings.series, folder=study)
