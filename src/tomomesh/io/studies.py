@@ -14,7 +14,7 @@ from .naming import distinct_names
 from .omezarr import is_zarr
 from .slices import slices_behind
 from .source import existing, regular_files, suffix_of
-from .volumes import VOLUME_READERS
+from .volumes import volumes_among
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -24,8 +24,6 @@ SLICES = (".dcm", ".ima", *FAMILIES)
 """Suffixes of files that may be one slice of several."""
 HEADERS = (".nhdr", ".mhd", ".hdr", ".hdr.gz")
 """Suffixes of headers whose voxels lie in other files beside them."""
-VOXELS = (".img", ".img.gz")
-"""Suffixes of files that belong to a header beside them."""
 PAGES = (".tif", ".tiff")
 """Suffixes of files that hold one slice, or all pages of a study."""
 
@@ -126,9 +124,8 @@ def _volumes_in(folder: Path, top: Path, *, deep: bool) -> list[Study]:
         files, _ = regular_files(folder, deep=True, hidden=True)
         return [Study(_joined(folder, top), folder, None, tuple(files))]
     files, _ = regular_files(folder, deep=deep)
-    others = (path for path in files if suffix_of(path) not in SLICES or (not deep and suffix_of(path) in PAGES))
-    volumes = [path for path in others if suffix_of(path) in VOLUME_READERS and suffix_of(path) not in VOXELS]
-    return [Study(_joined(path, top), path, None, _beside(path)) for path in volumes]
+    others = [path for path in files if suffix_of(path) not in SLICES or (not deep and suffix_of(path) in PAGES)]
+    return [Study(_joined(path, top), path, None, _beside(path)) for path in volumes_among(others)]
 
 
 def _slices_in(folder: Path, top: Path, wanted: int | None) -> list[Study]:

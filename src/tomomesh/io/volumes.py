@@ -49,7 +49,8 @@ def _read_zip(path: Path, settings: ReadSettings, select: Sequence[int] | None =
     """Read the slices in an archive, or the only volume; archives inside it are not opened."""
     with unpacked_zip(path) as folder:
         files, _ = regular_files(folder, deep=True)
-        whole = [file for file in files if suffix_of(file) in VOLUME_READERS.keys() - {".zip"}]
+        stores = [folder] if is_zarr(folder) else [path for path in folder.iterdir() if path.is_dir() and is_zarr(path)]
+        whole = stores + [file for file in volumes_among(files) if suffix_of(file) != ".zip"]
         one = len(whole) == 1 and not any(map(is_dicom, files))
         return read_volume(whole[0] if one else folder, settings=settings, select=select)
 
@@ -79,6 +80,15 @@ VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
 READABLE = "a folder of DICOM, PNG, TIFF or JPEG slices, of OME-Zarr, a DICOM file, " + " | ".join(
     suffix for suffix in VOLUME_READERS if suffix not in (".dcm", ".ima")
 )
+
+
+VOXELS = (".img", ".img.gz")
+"""Suffixes of files that belong to a header beside them."""
+
+
+def volumes_among(files: Sequence[Path]) -> list[Path]:
+    """Return the volume files among some; of a NIfTI pair its header alone."""
+    return [path for path in files if suffix_of(path) in VOLUME_READERS and suffix_of(path) not in VOXELS]
 
 
 def read_volume(
