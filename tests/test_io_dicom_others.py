@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shlex
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,11 +13,14 @@ from pydicom.uid import EncapsulatedPDFStorage
 from segmentations import segmentation, written
 from structure_sets import circle, structure_set
 from studies import AFFINES, as_ct, sampled, save, slice_dataset, write_series
+from tomomesh.cli import main
 from tomomesh.errors import FormatError
 from tomomesh.io import find_studies, list_series, read_volume
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from _pytest.capture import CaptureFixture
 
 AXIAL = AFFINES["axial"]
 STORED = sampled(AXIAL)
@@ -56,6 +61,31 @@ class TestAmongSlices:
             written(masks(), AXIAL, tmp_path / "s" / f"{name}.dcm")
         with pytest.raises(FormatError, match=r"0 of 2 files are images.*2 segmentations.*one of the segmentations"):
             read_volume(tmp_path / "s", select=(1,))
+
+
+class TestInspect:
+    @pytest.mark.parametrize("name", ["", "seg.dcm"])
+    def test_segments_that_overlap_are_told_and_the_command_for_one_goes_on(
+        self, tmp_path: Path, capsys: CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        path = written(masks(), AXIAL, tmp_path / "s" / "seg.dcm").parent / name
+        assert main(["inspect", str(path)]) == 0
+        said = capsys.readouterr().out.splitlines()
+        assert said[0] == "segments  1 Liver, 2 Left [31m kidney"
+        assert said[1].startswith("refused   exit 5: segments overlap")
+        assert said[-1] == f"next      tomomesh reconstruct --labels-in {path} --select 1 -o mesh.stl"
+        assert main([*shlex.split(said[-1])[2:], "--network", "none", "--quiet"]) == 0
+        assert main(["inspect", str(path), "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["segments"] == {"1": "Liver", "2": "Left [31m kidney"}
+        assert found["refused"]["exit_code"] == 5
+        assert main(["reconstruct", str(path), "-o", "m.stl"]) == 5
+
+    def test_a_broken_segmentation_is_refused(self, tmp_path: Path) -> None:
+        path = written(masks(), AXIAL, tmp_path / "seg.dcm")
+        path.write_bytes(path.read_bytes()[:-20])
+        assert main(["inspect", str(path)]) == 4
 
 
 class TestAlone:

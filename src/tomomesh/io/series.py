@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from ..settings import ReadSettings
 from .archive import unpacked_zip
-from .dicom import Listing, list_dicom, lone_object
+from .dicom import Listing, is_segmentation, list_dicom, lone_object
+from .dicom.segmentation import segments_of
 from .slices import slices_behind
 from .source import existing, existing_file, suffix_of
 
@@ -27,14 +28,14 @@ def list_series(path: str | Path, *, settings: ReadSettings | None = None) -> Li
     Returns
     -------
     Listing
-        Empty for what is no DICOM, and for a segmentation.
+        Without series for what is no DICOM, and for a segmentation, whose segments it has.
 
     Raises
     ------
     UnreadableError
         Where the path is missing or may not be read.
     FormatError
-        For a file that is empty, and archives and discs that are broken.
+        For a file that is empty, and archives, discs and segmentations that are broken.
     ResourceError
         For an archive that holds too much.
     """
@@ -47,6 +48,9 @@ def list_series(path: str | Path, *, settings: ReadSettings | None = None) -> Li
 
 def _listed(path: Path, settings: ReadSettings, *, study: str) -> Listing:
     slices = slices_behind(path, study)
-    if not slices.dicom or lone_object(slices.dicom) is not None:
+    alone = lone_object(slices.dicom)
+    if alone is not None and is_segmentation(alone):
+        return Listing(files=1, segments=tuple(segments_of(alone).items()))
+    if alone is not None or not slices.dicom:
         return Listing()
     return list_dicom(slices.dicom, settings, study=study, others=slices.others)
