@@ -154,6 +154,13 @@ def failing(monkeypatch: pytest.MonkeyPatch, *, at: int, fault: BaseException) -
     monkeypatch.setattr(tomomesh.pipeline, "reconstruct", some)
 
 
+def made_by(report: Path, version: str) -> None:
+    """Let a report be of another version of the program."""
+    told = json.loads(report.read_text())
+    told["versions"]["tomomesh"] = version
+    report.write_text(json.dumps(told))
+
+
 class TestAgain:
     @pytest.mark.parametrize(
         ("options", "redone"),
@@ -179,9 +186,10 @@ class TestAgain:
             lambda folder, out: (out / "first.json").unlink(),
             lambda folder, out: (out / "first.json").write_text("{}"),
             lambda folder, out: (out / "first.json").write_text("[1]"),
+            lambda folder, out: made_by(out / "first.json", "0.0.1"),
             lambda folder, out: (out / "first.stl").write_bytes((out / "first.stl").read_bytes()[:-1] + b"!"),
         ],
-        ids=["input", "time", "mesh", "report", "record", "no report", "damage"],
+        ids=["input", "time", "mesh", "report", "record", "no report", "version", "damage"],
     )
     def test_what_has_changed_is_done_again(
         self, change: Callable[[Path, Path], None], folder: Path, capsys: CaptureFixture[str]

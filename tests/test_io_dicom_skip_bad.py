@@ -52,9 +52,16 @@ class TestKinds:
         volume = read_volume(tmp_path / "s", settings=SKIP)
         assert_in_place(volume)
         assert volume.shape == (3, 7, 9)
-        [note] = volume.notes
+        note, now = volume.notes
+        assert now == "the distance of the slices is now 2 mm, from the first to the last 4 mm"
         assert note.startswith("unreadable files left out: 2 (")
         assert all(name in note for name in names)
+
+    def test_every_second_one_leaves_no_gap_and_twice_the_distance_is_said(self, tmp_path: Path, left: int) -> None:
+        cut(write_series(tmp_path / "s", STORED, AXIAL), {1: left, 3: left})
+        volume = read_volume(tmp_path / "s", settings=SKIP)
+        assert_in_place(volume)
+        assert volume.notes[1:] == ("the distance of the slices is now 4 mm, from the first to the last 8 mm",)
 
     def test_in_its_middle_they_leave_a_gap_that_is_refused(self, tmp_path: Path, left: int) -> None:
         cut(write_series(tmp_path / "s", STORED, AXIAL), {2: left})
@@ -74,13 +81,20 @@ def test_headers_and_pixels_may_be_broken_in_one_series(tmp_path: Path) -> None:
     cut(write_series(tmp_path / "s", STORED, AXIAL), {0: HEADER, 4: PIXELS})
     volume = read_volume(tmp_path / "s", settings=SKIP)
     assert_in_place(volume)
-    assert [note.split(" (")[0] for note in volume.notes] == ["unreadable files left out: 1"] * 2
+    assert [note.split(" (")[0] for note in volume.notes[:2]] == ["unreadable files left out: 1"] * 2
 
 
 def test_a_sound_series_is_read_the_same_with_the_flag(tmp_path: Path) -> None:
     volume = read_volume(write_series(tmp_path / "s", STORED, AXIAL), settings=SKIP)
     assert_in_place(volume)
     assert volume.notes == ()
+
+
+def test_of_one_slice_there_is_no_distance(tmp_path: Path) -> None:
+    cut(write_series(tmp_path / "s", STORED, AXIAL), dict.fromkeys(range(1, 5), HEADER))
+    notes = read_volume(tmp_path / "s", settings=ReadSettings(skip_bad=True, spacing_z=2)).notes
+    assert notes[0].startswith("unreadable files left out: 4 (")
+    assert not any("is now" in note for note in notes)
 
 
 def test_a_broken_copy_of_a_slice_leaves_the_other(tmp_path: Path) -> None:
@@ -94,7 +108,7 @@ def test_names_are_shown_without_what_could_write_to_a_terminal(tmp_path: Path) 
     folder = write_series(tmp_path / "s", STORED, AXIAL)
     [name] = cut(folder, {0: PIXELS})
     (folder / name).rename(folder / "a\x1b[31m.dcm")
-    [note] = read_volume(folder, settings=SKIP).notes
+    note, _ = read_volume(folder, settings=SKIP).notes
     assert note == "unreadable files left out: 1 (a?[31m.dcm)"
 
 

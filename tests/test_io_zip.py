@@ -15,11 +15,12 @@ import zipfile
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
+import nibabel
 import numpy as np
 import pytest
 from PIL import Image
 
-from studies import AFFINES, assert_in_place, sampled, shared, write_nifti, write_series
+from studies import AFFINES, LPS_TO_RAS, assert_in_place, sampled, shared, write_nifti, write_series
 from tomomesh.errors import FormatError, GeometryError, ResourceError, TomomeshError, UnreadableError
 from tomomesh.io import archive, limits, read_volume
 from tomomesh.settings import ReadSettings
@@ -66,6 +67,25 @@ class TestRead:
     def test_the_only_volume_is_read(self, tmp_path: Path) -> None:
         nifti = write_nifti(tmp_path / "a.nii", STORED, AXIAL)
         assert_in_place(read_volume(zipped(tmp_path / "s.ZIP", {"x/a.nii": nifti, "readme.txt": b"x"})))
+
+    @pytest.mark.parametrize("packed", ["", ".gz"])
+    def test_a_pair_of_header_and_voxels_is_one_volume(self, tmp_path: Path, packed: str) -> None:
+        nibabel.save(nibabel.Nifti1Pair(STORED.T, LPS_TO_RAS @ AXIAL), tmp_path / f"a.img{packed}")
+        pair: dict[str, bytes | Path] = {f"a{kind}{packed}": tmp_path / f"a{kind}{packed}" for kind in (".hdr", ".img")}
+        assert_in_place(read_volume(zipped(tmp_path / "s.zip", pair)))
+
+    @pytest.mark.parametrize("inside", ["", "scan.zarr/", "scan/"])
+    @pytest.mark.parametrize("zarr_format", [2, 3])
+    def test_a_zarr_store_is_read_as_from_its_folder(self, tmp_path: Path, inside: str, zarr_format: int) -> None:
+        pytest.importorskip("zarr", reason="the package zarr is not installed")
+        from test_io_omezarr import write
+
+        store = write(tmp_path / "s.zarr", zarr_format=zarr_format)
+        files = [path for path in store.rglob("*") if path.is_file()]
+        members: dict[str, bytes | Path] = {inside + path.relative_to(store).as_posix(): path for path in files}
+        volume, folder = read_volume(zipped(tmp_path / "s.zip", members)), read_volume(store)
+        np.testing.assert_array_equal(volume.voxels, folder.voxels)
+        np.testing.assert_array_equal(volume.affine, folder.affine)
 
     def test_pictures_are_read_as_slices(self, tmp_path: Path) -> None:
         members: dict[str, bytes | Path] = {}

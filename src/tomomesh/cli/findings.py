@@ -31,6 +31,7 @@ def of_study(found: dict[str, Any]) -> list[str]:
     refused, last = found["refused"], found["next"]
     return [
         *_of_series(found),
+        *(_told("segments", _segments(found["segments"])) if refused and found["segments"] else []),
         *(_of_voxels(found) if not refused else _told("refused", _in_words(refused))),
         *([f"{'next':<{INDENT}}{last}"] if last else []),
     ]
@@ -103,6 +104,10 @@ def _window(window: dict[str, Any]) -> str:
     cut = window["cut_off_at"]
     where = "" if not cut else "; cut off on all sides" if len(cut) == SIDES else f"; cut off at {' '.join(cut)}"
     return f"k > {limit_in_words(window['lower'])} ({window['share']:.1%}{where})"
+
+
+def _segments(segments: dict[int, str]) -> str:
+    return _listed((f"{number} {label}" for number, label in segments.items()), ", ")
 
 
 def _labels(labels: dict[str, int]) -> str:

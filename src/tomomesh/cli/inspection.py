@@ -32,8 +32,9 @@ def inspected(study: str, settings: Settings, *, typed: str = "") -> dict[str, A
     Returns
     -------
     dict
-        What `survey` says where the study can be read; always `series`, all of a DICOM study, `left_out`, `refused`
-        with the `exit_code` and the `error` of a run, None where it would go on, and `next`, a command.
+        What `survey` says where the study can be read; always `series`, all of a DICOM study, `segments`, those of a
+        DICOM segmentation, `left_out`, `refused` with the `exit_code` and the `error` of a run, None where it would go
+        on, and `next`, a command.
 
     Raises
     ------
@@ -43,7 +44,8 @@ def inspected(study: str, settings: Settings, *, typed: str = "") -> dict[str, A
     listing = io.list_series(study, settings=settings.read)
     found, fault = _surveyed(study, settings, listing)
     series = [_series(one, alone=len(listing.series) == 1) for one in listing.series]
-    found |= {"series": series, "left_out": dict(listing.left_out), "refused": _refusal(fault)}
+    found |= {"series": series, "segments": dict(listing.segments), "left_out": dict(listing.left_out)}
+    found["refused"] = _refusal(fault)
     if typed:
         _rename(found, study, typed.split()[0])
     return found | {"next": next_step(found, typed or shlex.quote(study), settings)}

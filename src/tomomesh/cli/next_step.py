@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 VALUES = {"--spacing": "X Y Z", "--spacing-z": "MM"}
 """What stands for the values that only the user knows."""
-SERIES = "--series"
+SERIES, SELECT = "--series", "--select"
 
 
 def next_step(found: dict[str, Any], study: str, settings: Settings) -> str | None:
@@ -30,6 +30,9 @@ def next_step(found: dict[str, Any], study: str, settings: Settings) -> str | No
     given = list(_given(settings))
     if not found["refused"]:
         return " ".join(["tomomesh reconstruct", _first_try(found, study), *given, "-o mesh.stl"])
+    if SELECT in _named(found["refused"]):
+        chosen = f"--labels-in {study} {SELECT} {min(found['segments'], default='N')}"
+        return " ".join(["tomomesh reconstruct", chosen, *given, "-o mesh.stl"])
     helping = list(_helping(found))
     return " ".join(["tomomesh inspect", study, *given, *helping]) if helping else None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -26,11 +27,12 @@ def record_of(mesh: Path, state: str, seconds: float) -> dict[str, Any]:
 
 
 def finished(report: Path, mesh: Path, settings: Settings, state: str) -> dict[str, Any] | None:
-    """Return the report of a study that is done: both files whole, from the same input by the same settings."""
+    """Return the report of a study that is done: both files whole, from the same input, settings and version."""
     try:
         found = json.loads(report.read_bytes())
         record = found["batch"]
         same = record["input"] == state and _asked(found["settings"]) == _asked(settings.to_dict())
+        same = same and found["versions"]["tomomesh"] == version("tomomesh")
         return found if same and record["mesh_sha256"] == _digest(mesh) else None
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return None

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import TYPE_CHECKING
 
 from ..settings import ReadSettings
 from .archive import unpacked_zip
-from .dicom import GONE, Listing, index_in, indexed, is_dicom, is_index, is_segmentation, list_dicom
-from .slices import slices_in
+from .dicom import Listing, is_segmentation, list_dicom, lone_object
+from .dicom.segmentation import segments_of
+from .slices import slices_behind
 from .source import existing, existing_file, suffix_of
 
 if TYPE_CHECKING:
@@ -28,14 +28,14 @@ def list_series(path: str | Path, *, settings: ReadSettings | None = None) -> Li
     Returns
     -------
     Listing
-        Empty for what is no DICOM, and for a segmentation.
+        Without series for what is no DICOM, and for a segmentation, whose segments it has.
 
     Raises
     ------
     UnreadableError
         Where the path is missing or may not be read.
     FormatError
-        For a file that is empty, and archives and discs that are broken.
+        For a file that is empty, and archives, discs and segmentations that are broken.
     ResourceError
         For an archive that holds too much.
     """
@@ -47,19 +47,10 @@ def list_series(path: str | Path, *, settings: ReadSettings | None = None) -> Li
 
 
 def _listed(path: Path, settings: ReadSettings, *, study: str) -> Listing:
-    files, others = _dicom_behind(path, study)
-    if not files or (len(files) == 1 and is_segmentation(files[0])):
+    slices = slices_behind(path, study)
+    alone = lone_object(slices.dicom)
+    if alone is not None and is_segmentation(alone):
+        return Listing(files=1, segments=tuple(segments_of(alone).items()))
+    if alone is not None or not slices.dicom:
         return Listing()
-    return list_dicom(files, settings, study=study, others=others)
-
-
-def _dicom_behind(path: Path, study: str) -> tuple[list[Path], Counter[str]]:
-    """Find what a DICOMDIR names, the slices of a folder, or a single file; and count what was passed over."""
-    index = index_in(path) if path.is_dir() else path if is_index(path) else None
-    if index is not None:
-        files, gone = indexed(index, study=study)
-        return files, Counter({GONE: len(gone)})
-    if path.is_dir():
-        slices = slices_in(path)
-        return slices.dicom, slices.others
-    return [path] if is_dicom(path) else [], Counter()
+    return list_dicom(slices.dicom, settings, study=study, others=slices.others)

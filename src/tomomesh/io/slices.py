@@ -1,4 +1,4 @@
-"""Which slices a folder holds."""
+"""Which slices a study is read from."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .dicom import NOT_DICOM, dicom_among
+from .dicom import GONE, NOT_DICOM, dicom_among, index_in, indexed, is_dicom, is_index
 from .images import FAMILIES
 from .source import regular_files, suffix_of
 
@@ -30,6 +30,32 @@ class Slices:
     images: list[Path]
     rest: list[Path]
     others: Counter[str]
+
+
+def slices_behind(path: Path, study: str) -> Slices:
+    """Find what a study is read from: the files that a DICOMDIR names, the slices of a folder, or a single file.
+
+    Parameters
+    ----------
+    path : Path
+        A file or a folder.
+    study : str
+        The path as the user typed it.
+
+    Raises
+    ------
+    UnreadableError
+        For a file or a folder that may not be read.
+    FormatError
+        For a DICOMDIR that is broken, or names files outside of its folder.
+    """
+    index = index_in(path) if path.is_dir() else path if is_index(path) else None
+    if index is not None:
+        files, gone = indexed(index, study=study)
+        return Slices(files, [], [], Counter({GONE: len(gone)}))
+    if path.is_dir():
+        return slices_in(path)
+    return Slices([path], [], [], Counter()) if is_dicom(path) else Slices([], [], [path], Counter())
 
 
 def slices_in(folder: Path) -> Slices:

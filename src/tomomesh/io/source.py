@@ -112,7 +112,7 @@ def first_bytes(path: Path, count: int) -> bytes:
         raise UnreadableError("the file cannot be read", file=path.name, found=_reason(fault)) from None
 
 
-def regular_files(folder: Path, *, deep: bool = False) -> tuple[list[Path], Counter[str]]:
+def regular_files(folder: Path, *, deep: bool = False, hidden: bool = False) -> tuple[list[Path], Counter[str]]:
     """List the regular files of a folder.
 
     Parameters
@@ -121,6 +121,8 @@ def regular_files(folder: Path, *, deep: bool = False) -> tuple[list[Path], Coun
         The path as the user typed it.
     deep : bool
         Whether the files of all sub-folders are listed too; links to folders are never followed.
+    hidden : bool
+        Whether files whose names begin with a dot are listed too.
 
     Returns
     -------
@@ -139,7 +141,7 @@ def regular_files(folder: Path, *, deep: bool = False) -> tuple[list[Path], Coun
     for parent, folders, names in os.walk(folder, onerror=_refuse):
         folders[:] = sorted(folders) if deep else []
         for path in (Path(parent, name) for name in sorted(names)):
-            reason = _passed_over(path, folder)
+            reason = "hidden" if path.name.startswith(".") and not hidden else _passed_over(path, folder)
             others.update([reason] if reason else [])
             files += [] if reason else [path]
     return files, others
@@ -152,8 +154,6 @@ def leaves_folder(name: str) -> bool:
 
 
 def _passed_over(path: Path, folder: Path) -> str:
-    if path.name.startswith("."):
-        return "hidden"
     try:
         target = path.resolve(strict=True)
     except (OSError, RuntimeError):

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ..errors import FormatError, TomomeshError, UnreadableError
-from .dicom import is_dicom, list_stacks
+from .dicom import index_in, is_dicom, list_stacks
 from .images import FAMILIES
 from .naming import distinct_names
 from .omezarr import is_zarr
+from .slices import slices_behind
 from .source import existing, regular_files, suffix_of
-from .volumes import VOLUME_READERS
+from .volumes import volumes_among
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -23,8 +24,6 @@ SLICES = (".dcm", ".ima", *FAMILIES)
 """Suffixes of files that may be one slice of several."""
 HEADERS = (".nhdr", ".mhd", ".hdr", ".hdr.gz")
 """Suffixes of headers whose voxels lie in other files beside them."""
-VOXELS = (".img", ".img.gz")
-"""Suffixes of files that belong to a header beside them."""
 PAGES = (".tif", ".tiff")
 """Suffixes of files that hold one slice, or all pages of a study."""
 
@@ -66,7 +65,8 @@ def find_studies(folder: str | Path, *, without: Iterable[Path] = (), series: in
     """List the studies of a folder.
 
     A study is each volume file in the folder and in its sub-folders, and the slices of each sub-folder: where they
-    are DICOM and more than one series is a stack, each of these. DICOM slices in the folder itself are a study too.
+    are DICOM and more than one series is a stack, each of these. Where the folder itself holds DICOM or a DICOMDIR,
+    all slices below it are read with them, as `read_volume` does, and its sub-folders have no slices of their own.
 
     Parameters
     ----------
@@ -94,10 +94,12 @@ def find_studies(folder: str | Path, *, without: Iterable[Path] = (), series: in
         raise FormatError("--each takes a folder of studies", file=str(folder), found="a file")
     left_out = {path.resolve() for path in without}
     inner = sorted(path for path in top.iterdir() if path.is_dir() and not path.name.startswith("."))
-    found = _in_folder(top, top, series, deep=False)
+    whole = _holds_slices(top)
+    found = _volumes_in(top, top, deep=False) + (_slices_in(top, top, series) if whole else [])
     for path in inner:
         if not path.is_symlink() and path.resolve() not in left_out:
-            found += _in_folder(path, top, series, deep=True)
+            found += _volumes_in(path, top, deep=True)
+            found += [] if whole or is_zarr(path) else _slices_in(path, top, series)
     if not found and not any(top.iterdir()):
         raise UnreadableError("the folder is empty", file=str(folder), expected="a folder of studies")
     if not found:
@@ -105,31 +107,39 @@ def find_studies(folder: str | Path, *, without: Iterable[Path] = (), series: in
     return _named(sorted(found, key=lambda study: (study.path, study.series or 0)))
 
 
-def _in_folder(folder: Path, top: Path, series: int | None, *, deep: bool) -> list[Study]:
-    files, _ = regular_files(folder, deep=deep)
-    if deep and is_zarr(folder):
-        return [Study(_joined(folder, top), folder, None, tuple(files))]
-    others = (path for path in files if suffix_of(path) not in SLICES or (not deep and suffix_of(path) in PAGES))
-    volumes = [path for path in others if suffix_of(path) in VOLUME_READERS and suffix_of(path) not in VOXELS]
-    found = [Study(_joined(path, top), path, None, _beside(path)) for path in volumes]
-    dicom = [path for path in files if path not in volumes and is_dicom(path)]
-    if dicom:
-        name = folder.resolve().name if folder == top else _joined(folder, top)
-        return found + _series_of(folder, name, dicom, series)
-    if deep and any(suffix_of(path) in FAMILIES for path in files):
-        found.append(Study(_joined(folder, top), folder, None, tuple(files)))
-    return found
+def _holds_slices(folder: Path) -> bool:
+    """Tell whether a folder itself holds DICOM, so that it is read with all that is below it."""
+    return index_in(folder) is not None or any(map(_surely_dicom, regular_files(folder)[0]))
 
 
-def _series_of(folder: Path, name: str, files: Sequence[Path], wanted: int | None) -> list[Study]:
-    """Return each series of a folder that is a stack; the folder itself where it leaves no choice."""
+def _surely_dicom(path: Path) -> bool:
     try:
-        numbers = [] if wanted is not None else list_stacks(list(files))
-    except TomomeshError:
-        numbers = []  # told when the folder is read, as one study that fails
-    if len(numbers) < 2:
-        return [Study(name, folder, wanted, tuple(files))]
-    return [Study(f"{name}-series-{number}", folder, number, tuple(files)) for number in numbers]
+        return is_dicom(path)
+    except UnreadableError:
+        return False
+
+
+def _volumes_in(folder: Path, top: Path, *, deep: bool) -> list[Study]:
+    if deep and is_zarr(folder):
+        files, _ = regular_files(folder, deep=True, hidden=True)
+        return [Study(_joined(folder, top), folder, None, tuple(files))]
+    files, _ = regular_files(folder, deep=deep)
+    others = [path for path in files if suffix_of(path) not in SLICES or (not deep and suffix_of(path) in PAGES)]
+    return [Study(_joined(path, top), path, None, _beside(path)) for path in volumes_among(others)]
+
+
+def _slices_in(folder: Path, top: Path, wanted: int | None) -> list[Study]:
+    """Return the studies of a folder's slices, numbered among the very files that are read."""
+    name = _joined(folder, top) or folder.resolve().name
+    try:
+        slices = slices_behind(folder, str(folder))
+        numbers = list_stacks(slices.dicom) if wanted is None else []
+    except TomomeshError:  # told when the folder is read, as one study that fails
+        return [Study(name, folder, wanted, tuple(regular_files(folder, deep=True)[0]))]
+    files = tuple(slices.dicom or slices.images)
+    if len(numbers) > 1:
+        return [Study(f"{name}-series-{number}", folder, number, files) for number in numbers]
+    return [Study(name, folder, wanted if slices.dicom else None, files)] if files else []
 
 
 def _beside(path: Path) -> tuple[Path, ...]:

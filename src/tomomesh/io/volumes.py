@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..errors import FormatError, UnreadableError
 from ..settings import ReadSettings
 from .archive import unpacked_zip
-from .dicom import index_in, is_dicom, is_index, is_segmentation, read_dicom, read_index
+from .dicom import index_in, is_dicom, is_index, is_segmentation, lone_object, read_dicom, read_index
 from .dicom.kinds import STRUCTURES, storage_class
 from .dicom.segmentation import read_segmentation
 from .freesurfer import read_mgh
@@ -29,24 +29,28 @@ if TYPE_CHECKING:
     from ..model.volume import Volume
 
 
-def _read_one_dicom(path: Path, settings: ReadSettings, select: Sequence[int] | None = None) -> Volume:
+def _read_one_dicom(
+    path: Path, settings: ReadSettings, select: Sequence[int] | None = None, *, study: str = ""
+) -> Volume:
+    study = study or str(path)
     if storage_class(path) == STRUCTURES:
         raise FormatError(
             "the file holds contours, no voxels",
-            file=str(path),
+            file=study,
             found="an RT Structure Set",
-            hint="tomomesh surface, which takes one of its structures",
+            hint=f"tomomesh surface {path.name} --structure N, which takes one of its structures",
         )
     if is_segmentation(path):
-        return read_segmentation(path, settings, study=str(path), select=select)
-    return read_dicom([path], settings, study=str(path))
+        return read_segmentation(path, settings, study=study, select=select)
+    return read_dicom([path], settings, study=study)
 
 
 def _read_zip(path: Path, settings: ReadSettings, select: Sequence[int] | None = None) -> Volume:
     """Read the slices in an archive, or the only volume; archives inside it are not opened."""
     with unpacked_zip(path) as folder:
         files, _ = regular_files(folder, deep=True)
-        whole = [file for file in files if suffix_of(file) in VOLUME_READERS.keys() - {".zip"}]
+        stores = [folder] if is_zarr(folder) else [path for path in folder.iterdir() if path.is_dir() and is_zarr(path)]
+        whole = stores + [file for file in volumes_among(files) if suffix_of(file) != ".zip"]
         one = len(whole) == 1 and not any(map(is_dicom, files))
         return read_volume(whole[0] if one else folder, settings=settings, select=select)
 
@@ -76,6 +80,15 @@ VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
 READABLE = "a folder of DICOM, PNG, TIFF or JPEG slices, of OME-Zarr, a DICOM file, " + " | ".join(
     suffix for suffix in VOLUME_READERS if suffix not in (".dcm", ".ima")
 )
+
+
+VOXELS = (".img", ".img.gz")
+"""Suffixes of files that belong to a header beside them."""
+
+
+def volumes_among(files: Sequence[Path]) -> list[Path]:
+    """Return the volume files among some; of a NIfTI pair its header alone."""
+    return [path for path in files if suffix_of(path) in VOLUME_READERS and suffix_of(path) not in VOXELS]
 
 
 def read_volume(
@@ -142,8 +155,8 @@ def _read_folder(folder: Path, settings: ReadSettings, select: Sequence[int] | N
     if (index := index_in(folder)) is not None:
         return read_index(index, settings, study=str(folder))
     slices = slices_in(folder)
-    if len(slices.dicom) == 1 and is_segmentation(slices.dicom[0]):
-        return read_segmentation(slices.dicom[0], settings, study=str(folder), select=select)
+    if (alone := lone_object(slices.dicom)) is not None:
+        return _read_one_dicom(alone, settings, select, study=str(folder))
     if slices.dicom:
         return read_dicom(slices.dicom, settings, study=str(folder), others=slices.others)
     if slices.images:

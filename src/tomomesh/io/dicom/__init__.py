@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .directory import GONE, index_in, indexed, is_index, read_index
 from .files import NOT_DICOM, dicom_among, is_dicom
-from .kinds import is_segmentation
+from .kinds import is_segmentation, lone_object
 from .listing import Listing, Series, list_dicom
 from .read import list_stacks, read_dicom
 
@@ -21,6 +21,7 @@ __all__ = [
     "is_segmentation",
     "list_dicom",
     "list_stacks",
+    "lone_object",
     "read_dicom",
     "read_index",
 ]

@@ -10,6 +10,7 @@ from ...errors import FormatError, TomomeshError, UnreadableError
 from ..source import first_bytes, third_party
 from .dataset import read_dataset
 from .header import Frame, frames_of
+from .kinds import no_image
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,7 +22,6 @@ FIELDS = (
 """Fields that are looked at later on."""
 
 NOT_DICOM = "not DICOM"
-WITHOUT_PIXELS = "DICOM without pixels"
 
 
 @dataclass
@@ -75,10 +75,11 @@ def read_frames(paths: list[Path]) -> Reading:
     for path in paths:
         try:
             header = _read_header(path) if is_dicom(path) else None
-            if header is not None and _is_image(header):
+            reason = NOT_DICOM if header is None else no_image(header)
+            if reason is None:
                 reading.frames += frames_of(path, header)
             else:
-                reading.others[NOT_DICOM if header is None else WITHOUT_PIXELS] += 1
+                reading.others[reason] += 1
         except (FormatError, UnreadableError) as fault:
             reading.bad[path] = fault
     return reading

@@ -87,11 +87,23 @@ class Series:
 
 @dataclass(frozen=True)
 class Listing:
-    """The series of a study; `left_out` counts what belongs to none, by reason, `files` those that do."""
+    """The series of a study.
+
+    Attributes
+    ----------
+    series : tuple of Series
+    left_out : tuple of (reason, count)
+        What belongs to none.
+    files : int
+        How many belong to one; 1 for a segmentation, which has no series.
+    segments : tuple of (number, label)
+        Those of a segmentation.
+    """
 
     series: tuple[Series, ...] = ()
     left_out: tuple[tuple[str, int], ...] = ()
     files: int = 0
+    segments: tuple[tuple[int, str], ...] = ()
 
 
 def list_dicom(files: list[Path], settings: ReadSettings, *, study: str, others: Counter[str]) -> Listing:

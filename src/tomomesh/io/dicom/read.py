@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ...errors import FormatError
 from ...model.volume import Volume
 from ..source import counted
 from .bad import leave_out
 from .files import read_frames
+from .kinds import SEGMENTED
 from .pixels import Decoder
 from .series import choose, stacks_among
 from .stack import Stack, stacked
@@ -67,6 +70,7 @@ def _read(files: list[Path], settings: ReadSettings, study: str, others: Counter
             file=study,
             found=counted(passed),
             expected="a DICOM series",
+            hint="one of the segmentations alone" if passed[SEGMENTED] else "",
         )
     left = (f"left out: {counted(passed)}",) if passed else ()
     choice = choose(reading.frames, settings.series, folder=study)
@@ -75,8 +79,20 @@ def _read(files: list[Path], settings: ReadSettings, study: str, others: Counter
     inverted = header.get("PhotometricInterpretation") == "MONOCHROME1"
     unit = "HU" if header.get("Modality") == "CT" else "stored"
     turned = ("MONOCHROME1: gray levels were inverted" if unit != "HU" else "MONOCHROME1: HU were kept",)
-    notes = left + broken + choice.notes + without + stack.notes + levels.notes + (turned if inverted else ())
+    skipped = _left(stack) if broken or without else ()
+    notes = left + broken + choice.notes + without + skipped + stack.notes + levels.notes + (turned if inverted else ())
     return Volume.from_stored(levels.voxels, stack.affine, unit=unit, notes=notes)
+
+
+def _left(stack: Stack) -> tuple[str, ...]:
+    """Say how the slices lie that are left: those that are gone at the ends, or every second one, leave no gap."""
+    if len(stack.places) < 2 or stack.places[0][0].position is None:
+        return ()
+    columns, rows, step = stack.affine[:3, :3].T
+    normal = np.cross(columns, rows)
+    apart = abs(float(step @ normal)) / float(np.linalg.norm(normal))
+    reach = apart * float(np.ptp(stack.levels))
+    return (f"the distance of the slices is now {apart:.4g} mm, from the first to the last {reach:.4g} mm",)
 
 
 def list_stacks(files: list[Path]) -> list[int]:

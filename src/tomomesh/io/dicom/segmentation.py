@@ -109,6 +109,18 @@ def read_segmentation(path: Path, settings: ReadSettings, *, study: str, select:
     return Volume.from_stored(voxels, affine, notes=(f"segments: {_named(found.labels)}", *notes))
 
 
+def segments_of(path: Path) -> dict[int, str]:
+    """Return what each segment of a segmentation is called, by its number.
+
+    Raises
+    ------
+    FormatError
+        For a broken file.
+    """
+    labels = _header(path).labels
+    return {number: labels[number] for number in sorted(labels)}
+
+
 def _header(path: Path) -> Segmentation:
     name = path.name
     with third_party("pydicom", name):
