@@ -41,12 +41,12 @@ def segment_study(
             expected="read_volume(path) or Volume.from_stored(array, affine)",
         )
     axis = _slice_axis(volume, settings.network.slices)
-    part, box = crop(volume, settings.part, axis)
+    part, box = crop(volume, settings.crop, axis)
     stack = part.along(axis)
     account.study(stack, AXES[axis])
     account.cropped(tuple(box[n] for n in order_along(axis)), volume.along(axis).shape)
     if labels is not None:
-        labels = _fitting(labels, volume, settings).part(box).along(axis)
+        labels = _fitting(labels, volume, settings).cropped(box).along(axis)
         account.notes(labels.notes)
     chosen = _chosen(stack, labels, settings, account)
     mask = chosen.mask
@@ -81,7 +81,7 @@ def _fitting(labels: Volume, volume: Volume, settings: Settings) -> Volume:
 
 def _chosen(stack: Volume, labels: Volume | None, settings: Settings, account: Account) -> Chosen:
     with account.timed("window"):
-        chosen = choose(stack, labels, settings, inside_roi(stack, settings.part.roi))
+        chosen = choose(stack, labels, settings, inside_roi(stack, settings.crop.roi))
     account.window(chosen)
     if settings.window.select is not None and (doubt := doubted(stack if labels is None else labels)):
         account.warn(doubt)

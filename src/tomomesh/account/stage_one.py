@@ -49,7 +49,7 @@ class StageOne(Ledger):
         kept = [[int(side.start), int(side.stop) - 1] for side in box]
         cropped = kept != [[0, size - 1] for size in sizes]
         names = ("slices", "rows", "columns")
-        self._sections["study"]["part"] = dict(zip(names, kept, strict=True)) if cropped else None
+        self._sections["study"]["crop"] = dict(zip(names, kept, strict=True)) if cropped else None
 
     def notes(self, notes: tuple[str, ...]) -> None:
         """Note what was decided on a label map beside the study."""

@@ -69,7 +69,7 @@ def _surveyed(study: str, settings: Settings, listing: Listing) -> tuple[dict[st
         if listing.files > 1 or (listing.files and isinstance(fault, GeometryError)):
             return {}, fault
         raise
-    return survey(crop(volume, settings.part, volume.thickest_axis())[0]), None
+    return survey(crop(volume, settings.crop, volume.thickest_axis())[0]), None
 
 
 def _series(series: Series, *, alone: bool) -> dict[str, Any]:

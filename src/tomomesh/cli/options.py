@@ -25,7 +25,7 @@ from .formats import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-STAGE_ONE = ("read", "part", "window", "network")
+STAGE_ONE = ("read", "crop", "window", "network")
 STAGE_TWO = ("cubes", "fit", "printing")
 ALIASES = {"cell_mm": "--cell"}
 """Second spellings: the numbers of a cloud need not be millimeters."""
@@ -125,7 +125,7 @@ def build_parser() -> argparse.ArgumentParser:
     inspect.add_argument("study", metavar="STUDY", help=f"{STUDY}, or - with --input-format")
     _add_streams(inspect, STUDY_FORMATS)
     inspect.add_argument("--json", action="store_true", help="print the findings as JSON")
-    _add_settings(inspect, ("read", "part"), paper=False)
+    _add_settings(inspect, ("read", "crop"), paper=False)
 
     check = _command(commands, "check", "the quality report of any mesh")
     check.add_argument("mesh", metavar="MESH", help=CHECKED)

@@ -159,7 +159,7 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
     lower, upper = limit_in_words(window["lower"]), limit_in_words(window["upper"])
     joined = f", in {window['joined_by']} of {window['layers']} layers" if window["joined_by"] else ""
     chosen = {"otsu": "Otsu's, as no window was given", "preset": "the preset", "given": "as given", "labels": ""}
-    part = " of a part of the study" if study["part"] else ""
+    part = " of a part of the study" if study["crop"] else ""
     lines = [
         f"study     {study['slices']} {study['plane']} slices of {study['columns']} x {study['rows']}{part}",
         f"window    {lower} < k <= {upper} ({chosen[window['chosen_by']]}{joined}), "

@@ -182,7 +182,7 @@ class Volume:
         voxels = np.transpose(self.voxels, (*order, *range(3, self.voxels.ndim)))
         return replace(self, voxels=voxels, affine=self.affine[:, columns], grid=grid)
 
-    def part(self, box: tuple[slice, slice, slice]) -> Volume:
+    def cropped(self, box: tuple[slice, slice, slice]) -> Volume:
         """Return a view of the voxels from ``start`` to before ``stop`` along K, J and I."""
         first = np.array([side.start for side in box[::-1]])
         affine = self.affine.copy()

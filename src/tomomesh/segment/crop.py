@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.volume import Volume
-    from ..settings import PartSettings
+    from ..settings import CropSettings
 
     Box = tuple[slice, slice, slice]
 
@@ -21,14 +21,14 @@ NEAR = 1e-6
 """Share of a voxel by which its center may lie outside of a box and still count as in it."""
 
 
-def crop(volume: Volume, part: PartSettings, axis: int) -> tuple[Volume, Box]:
+def crop(volume: Volume, asked: CropSettings, axis: int) -> tuple[Volume, Box]:
     """Return the part of a study that is asked for, a view, and which of its voxels along K, J and I these are.
 
     Parameters
     ----------
     volume : Volume
         The whole study.
-    part : PartSettings
+    asked : CropSettings
         A box in patient millimeters, a range of slices, or both.
     axis : int
         The patient axis across the slices, 0 left, 1 posterior, 2 superior; they are counted from 0 along it.
@@ -39,15 +39,15 @@ def crop(volume: Volume, part: PartSettings, axis: int) -> tuple[Volume, Box]:
         Where the study has no such slices, or nothing of it lies in the box; it names what the study has.
     """
     low, high = np.zeros(3, np.int64), np.array(volume.shape)
-    if part.slice_range is not None:
-        low[2 - axis], high[2 - axis] = _slices(volume.shape[2 - axis], part.slice_range)
-    if part.roi is not None:
-        first, last = _sides(volume, part.roi)
+    if asked.slice_range is not None:
+        low[2 - axis], high[2 - axis] = _slices(volume.shape[2 - axis], asked.slice_range)
+    if asked.roi is not None:
+        first, last = _sides(volume, asked.roi)
         low, high = np.maximum(low, first), np.minimum(high, last)
         if (low >= high).any():
-            raise _outside(volume, part.roi)
+            raise _outside(volume, asked.roi)
     box = slice(low[0], high[0]), slice(low[1], high[1]), slice(low[2], high[2])
-    return volume.part(box), box
+    return volume.cropped(box), box
 
 
 def inside_roi(volume: Volume, roi: tuple[float, ...] | None) -> NDArray[np.bool_] | None:

@@ -11,12 +11,12 @@ from typing import Any
 
 from ..errors import UsageError
 from .cloud import CloudSettings
+from .crop import CropSettings
 from .cubes import CubeSettings
 from .effect import without_effect
 from .fit import FitSettings
 from .network import FALLS, IN_SLICE, IN_SPACE, SURFACES, NetworkSettings
 from .parameter import LAYERS, MANY, UNSET, asked_by, limits_of, option_of
-from .part import PartSettings
 from .printing import PrintSettings
 from .read import ReadSettings
 from .run import RunSettings
@@ -31,10 +31,10 @@ __all__ = [
     "SURFACES",
     "UNSET",
     "CloudSettings",
+    "CropSettings",
     "CubeSettings",
     "FitSettings",
     "NetworkSettings",
-    "PartSettings",
     "PrintSettings",
     "ReadSettings",
     "RunSettings",
@@ -54,7 +54,7 @@ class Settings:
 
     read: ReadSettings = field(default_factory=ReadSettings)
     cloud: CloudSettings = field(default_factory=CloudSettings)
-    part: PartSettings = field(default_factory=PartSettings)
+    crop: CropSettings = field(default_factory=CropSettings)
     window: WindowSettings = field(default_factory=WindowSettings)
     network: NetworkSettings = field(default_factory=NetworkSettings)
     cubes: CubeSettings = field(default_factory=CubeSettings)

@@ -9,7 +9,7 @@ from .parameter import Group, param
 
 
 @dataclass(frozen=True)
-class PartSettings(Group):
+class CropSettings(Group):
     """The part of a study that matters; the rest is cropped away before anything else is done."""
 
     roi: tuple[float, ...] | None = param(

@@ -19,7 +19,7 @@ from tomomesh.cli import main
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.model.volume import Volume
 from tomomesh.segment.crop import crop, inside_roi
-from tomomesh.settings.part import PartSettings
+from tomomesh.settings.crop import CropSettings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,7 +48,7 @@ class TestCrop:
     def test_the_part_is_a_view_in_place_and_holds_what_the_box_holds(self, name: str, shares: list[float]) -> None:
         volume = volume_of(name)
         roi = roi_around(volume, np.reshape(shares, (2, 3)))
-        part, sides = PartSettings(roi=roi), np.array(roi)
+        part, sides = CropSettings(roi=roi), np.array(roi)
         low, high = sides[::2], sides[1::2]
         places = volume.to_mm(indices_of(volume.shape))
         wanted = ((places >= low - 1e-5) & (places <= high + 1e-5)).all(axis=1)
@@ -69,8 +69,8 @@ class TestCrop:
     def test_slices_are_counted_along_their_axis_and_from_the_end(self, name: str, axis: int) -> None:
         volume = volume_of(name)
         count = len(volume.along(axis).voxels)
-        forth, _ = crop(volume, PartSettings(slice_range=(1, count - 2)), axis)
-        back, _ = crop(volume, PartSettings(slice_range=(1, -2)), axis)
+        forth, _ = crop(volume, CropSettings(slice_range=(1, count - 2)), axis)
+        back, _ = crop(volume, CropSettings(slice_range=(1, -2)), axis)
         assert np.array_equal(forth.along(axis).voxels, volume.along(axis).voxels[1:-1])
         assert np.array_equal(forth.voxels, back.voxels)
         assert_in_place(forth.along(axis))
@@ -79,8 +79,8 @@ class TestCrop:
     @pytest.mark.parametrize("axis", [0, 1, 2])
     def test_what_is_found_in_a_part_of_a_part_goes_back_to_its_own_voxels(self, name: str, axis: int) -> None:
         volume = volume_of(name)
-        once, _ = crop(volume, PartSettings(slice_range=(1, -1)), axis)
-        twice = once.along((axis + 1) % 3).part((slice(0, 2), slice(1, 3), slice(1, 4))).along(2)
+        once, _ = crop(volume, CropSettings(slice_range=(1, -1)), axis)
+        twice = once.along((axis + 1) % 3).cropped((slice(0, 2), slice(1, 3), slice(1, 4))).along(2)
         restored = twice.grid.restore(twice.voxels)
         assert restored.shape == volume.grid.shape
         kept = restored != 0
@@ -89,7 +89,7 @@ class TestCrop:
 
     def test_the_whole_grid_lies_where_the_study_does(self) -> None:
         volume = volume_of("oblique sagittal")
-        part = volume.part((slice(1, 3), slice(0, 2), slice(2, 4)))
+        part = volume.cropped((slice(1, 3), slice(0, 2), slice(2, 4)))
         blank = part.grid.blank()
         assert blank.shape == volume.shape
         assert np.allclose(blank.affine, volume.affine)
@@ -97,11 +97,11 @@ class TestCrop:
     @pytest.mark.parametrize("asked", [(0, 99), (5, 3), (-99, 2), (3, -4)])
     def test_slices_that_there_are_not_are_refused(self, asked: tuple[int, int]) -> None:
         with pytest.raises(EmptyError, match="0 to 4"):
-            crop(volume_of("axial"), PartSettings(slice_range=asked), 2)
+            crop(volume_of("axial"), CropSettings(slice_range=asked), 2)
 
     def test_a_box_elsewhere_is_refused_with_the_extent_of_the_study(self) -> None:
         with pytest.raises(EmptyError, match=r"x -3 to 1, y 11 to 15\.2, z 40 to 48 mm"):
-            crop(volume_of("axial"), PartSettings(roi=(50, 60, 11, 12, 40, 48)), 2)
+            crop(volume_of("axial"), CropSettings(roi=(50, 60, 11, 12, 40, 48)), 2)
 
     def test_a_box_between_the_voxels_of_a_turned_grid_is_refused(self) -> None:
         volume = volume_of("oblique")
@@ -112,7 +112,7 @@ class TestCrop:
 
     def test_a_box_inside_out_is_refused(self) -> None:
         with pytest.raises(UsageError, match="X0 <= X1"):
-            PartSettings(roi=(1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
+            CropSettings(roi=(1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
 
 
 class TestOnWholeGrid:
@@ -159,8 +159,8 @@ class TestOnWholeGrid:
         volume = Volume.from_stored(ball(), np.eye(4))
         _, rows, columns = volume.shape
         study = segment(volume, lower=50.0, slice_range=(2, 7)).report["study"]
-        assert study["part"] == {"slices": [2, 7], "rows": [0, rows - 1], "columns": [0, columns - 1]}
-        assert segment(volume, lower=50.0).report["study"]["part"] is None
+        assert study["crop"] == {"slices": [2, 7], "rows": [0, rows - 1], "columns": [0, columns - 1]}
+        assert segment(volume, lower=50.0).report["study"]["crop"] is None
 
 
 def test_the_command_refuses_a_box_elsewhere(tmp_path: Path, capsys: CaptureFixture[str]) -> None:
