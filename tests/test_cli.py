@@ -161,6 +161,17 @@ class TestOtherCommands:
         assert main(["inspect", str(study), "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["slices_rows_columns"] == [40, 48, 44]
 
+    def test_check_takes_the_lining_of_a_cavity_for_sound(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
+        inner = trimesh.creation.icosphere(2, radius=0.5)
+        inner.invert()
+        trimesh.util.concatenate([trimesh.creation.icosphere(2), inner]).export(tmp_path / "shell.stl")
+        assert main(["check", str(tmp_path / "shell.stl"), "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["sound"]
+        inner.apply_translation([5, 0, 0])
+        trimesh.util.concatenate([trimesh.creation.icosphere(2), inner]).export(tmp_path / "apart.stl")
+        assert main(["check", str(tmp_path / "apart.stl"), "--json"]) == 0
+        assert not json.loads(capsys.readouterr().out)["sound"]
+
     def test_check_judges_good_and_bad_meshes(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
         sphere = trimesh.creation.icosphere(2)
         sphere.export(tmp_path / "good.ply")

@@ -34,3 +34,17 @@ class TestDoubt:
         levels = np.zeros((20, 20, 20), np.uint16)
         levels.flat[:5000] = np.arange(5000)
         assert any("5000 labels" in warning for warning in warnings(Volume.from_stored(levels, np.eye(4))))
+
+
+class TestGrayLevels:
+    def test_labels_that_are_taken_for_gray_levels_are_warned_of(self) -> None:
+        labels = np.where(ball() > 50, 7, 0).astype(np.uint8)
+        labels[:, :, :20] //= 2
+        told = segment(Volume.from_stored(labels, np.eye(4)), network="none").report["warnings"]
+        assert any("--select chooses labels" in warning for warning in told)
+
+    def test_gray_levels_and_masks_are_not(self) -> None:
+        levels = ball() + np.random.default_rng(0).integers(0, 20, ball().shape)
+        for one in (levels, np.where(ball() > 50, 7, 0)):
+            told = segment(Volume.from_stored(one.astype(np.uint8), np.eye(4)), network="none").report["warnings"]
+            assert not any("--select" in warning for warning in told)

@@ -103,7 +103,8 @@ class Account(StageOne, StageTwo):
         far = quality.get("points_to_surface_p95_mm", 0.0)
         if "study" in self._sections and far > FAR * self._sections["study"]["slice_spacing_mm"]:
             self.warn(
-                f"one point in twenty lies over {far:.3g} mm from the surface: it does not follow the window there"
+                f"one point in twenty lies over {far:.3g} mm from the surface: it does not follow the window there, "
+                "as --network none and --contours loops do"
             )
         if quality["self_intersections"]:
             self.warn(f"{quality['self_intersections']} faces pass through others")

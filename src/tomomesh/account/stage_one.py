@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..measure.rings import assess_contours
+from ..segment.select import labels_in
 from ..segment.som.schedules import schedule_warning
 from .ledger import Ledger
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 LEFT_OUT = 0.01
 """Share of the window in small pieces over which a network in space is warned of."""
+APART = 4
+"""One slice in so many is looked at for labels."""
 CROWDED = 0.25
 """Share of the slices with several components side by side over which one network a slice is warned of."""
 HOLES = 0.15
@@ -84,6 +87,8 @@ class StageOne(Ledger):
                 f"most of the window ({chosen.spared_voxels} of {int(mask.sum())} voxels) lies in nothing that is 12 "
                 "mm thick, and was kept for all that: --keep body leaves it out"
             )
+        if self._sections["window"]["chosen_by"] == "otsu" and len(labels_in(chosen.volume.voxels[::APART])) > 1:
+            self.warn("labels of a label map were taken for gray levels: --select chooses labels")
         if any(edges[2:]):
             self.warn("the window touches the border of the slices: the surface is closed along it")
 

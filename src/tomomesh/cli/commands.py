@@ -194,10 +194,11 @@ def _check(chosen: Namespace) -> None:
     if chosen.report:
         io.check_output(chosen.report, (".json",), inputs=[chosen.mesh])
     from ..measure.report import assess
+    from ..measure.winding import linings
 
     other = io.read_mesh(chosen.against) if chosen.against else None
     mesh = io.read_mesh(chosen.mesh)
-    report = assess(mesh, against=other)
+    report = assess(mesh, against=other, cavities=linings(mesh))
     if chosen.print_check:
         from ..printing.part import MM, resized
         from ..printing.verdict import verdict

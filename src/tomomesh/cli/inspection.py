@@ -48,7 +48,8 @@ def inspected(study: str, settings: Settings, *, typed: str = "") -> dict[str, A
     found["refused"] = _refusal(fault)
     if typed:
         _rename(found, study, typed.split()[0])
-    return found | {"next": next_step(found, typed or shlex.quote(study), settings)}
+    path = f"./{study}" if study.startswith("-") else study  # else it would look like an option
+    return found | {"next": next_step(found, typed or shlex.quote(path), settings)}
 
 
 def _rename(found: dict[str, Any], study: str, name: str) -> None:

@@ -85,7 +85,7 @@ def _slices(count: int, asked: tuple[int, int]) -> tuple[int, int]:
     if not 0 <= first <= last < count:
         raise EmptyError(
             "the study has no such slices", found=f"--slice-range = {asked[0]} {asked[1]}",
-            expected=f"FIRST and LAST from 0 to {count - 1}, or from {-count} to -1",
+            expected=f"FIRST and LAST from 0 to {count - 1}, or from {-count} to -1, FIRST not behind LAST",
         )  # fmt: skip
     return first, last + 1
 

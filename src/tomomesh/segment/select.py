@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,10 @@ NAMED = 24
 """Labels that are named where one is missing, at most."""
 MOST = 4096
 """Labels over which a label map is doubted."""
+HIGHEST_LABEL = 2**16
+"""A volume with higher levels is no label map."""
+FLAT = 0.8
+"""Share of equal neighbors, among those that are both over 0, from which levels are labels."""
 
 
 def select(labels: Volume, wanted: Sequence[int]) -> NDArray[np.bool_]:
@@ -67,3 +71,24 @@ def doubted(labels: Volume) -> str:
         return f"the label map holds {voxels.dtype} numbers: it may be a study of gray levels"
     count = len(np.unique(voxels))
     return f"the label map has {count} labels: it may be a study of gray levels" if count > MOST else ""
+
+
+def labels_in(voxels: NDArray[Any]) -> dict[str, int]:
+    """Count the voxels of each label over 0; nothing where the levels do not look like labels.
+
+    Labels are whole numbers in flat regions: neighbors over 0 are mostly equal, which those of an image are not.
+
+    Parameters
+    ----------
+    voxels : (K, J, I[, L]) array
+    """
+    whole = voxels.ndim == 3 and voxels.min() >= 0 and voxels.max() < HIGHEST_LABEL
+    if not whole or (voxels.dtype.kind == "f" and not np.array_equal(voxels, np.rint(voxels))):
+        return {}
+    left, right = voxels[..., :-1], voxels[..., 1:]
+    inside = (left > 0) & (right > 0)
+    pairs = int(np.count_nonzero(inside))
+    if np.count_nonzero((left == right) & inside) < FLAT * pairs:
+        return {}
+    counts = np.bincount(voxels.ravel().astype(np.int64))
+    return {str(label): int(counts[label]) for label in np.flatnonzero(counts) if label > 0}

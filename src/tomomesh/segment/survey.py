@@ -8,6 +8,7 @@ import numpy as np
 
 from ..model.volume import AXES
 from .otsu import histogram, otsu_levels
+from .select import labels_in
 from .window import PRESETS_HU, otsu_thresholds
 
 if TYPE_CHECKING:
@@ -21,10 +22,6 @@ BARS = 32
 """Bars of the printed histogram."""
 LETTERS = (("R", "L"), ("A", "P"), ("I", "S"))
 """Ends of the patient axes, the negative first."""
-HIGHEST_LABEL = 2**16
-"""A volume with higher levels is no label map."""
-FLAT = 0.8
-"""Share of equal neighbors, among those that are both over 0, from which levels are labels."""
 
 CUT_OFF = 0.01
 """A window that takes more than this share of the study's first or last plane goes on beyond it."""
@@ -67,7 +64,7 @@ def survey(volume: Volume) -> dict[str, Any]:
         "highest": high,
         "histogram": histogram(voxels, low, high, BARS).tolist() if high > low else [voxels.size],
         "windows": _windows(volume, low),
-        "labels": _labels(voxels),
+        "labels": labels_in(voxels),
         "notes": list(volume.notes),
         "remarks": list(_remarks(volume)),
     }
@@ -105,23 +102,6 @@ def _finite(limit: Any) -> Any:
     """Return a limit, or one a layer, with None where there is none."""
     found = [value if np.isfinite(value) else None for value in np.ravel(limit).tolist()]
     return found if np.ndim(limit) else found[0]
-
-
-def _labels(voxels: NDArray[Any]) -> dict[str, int]:
-    """Count the voxels of each label; nothing where the levels do not look like labels.
-
-    Labels are whole numbers in flat regions: neighbors over 0 are mostly equal, which those of an image are not.
-    """
-    whole = voxels.ndim == 3 and voxels.min() >= 0 and voxels.max() < HIGHEST_LABEL
-    if not whole or not np.array_equal(voxels, np.rint(voxels)):
-        return {}
-    left, right = voxels[..., :-1], voxels[..., 1:]
-    inside = (left > 0) & (right > 0)
-    pairs = int(np.count_nonzero(inside))
-    if np.count_nonzero((left == right) & inside) < FLAT * pairs:
-        return {}
-    counts = np.bincount(voxels.ravel().astype(np.int64))
-    return {str(label): int(counts[label]) for label in np.flatnonzero(counts) if label > 0}
 
 
 def _remarks(volume: Volume) -> Iterator[str]:
