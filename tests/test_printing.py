@@ -139,6 +139,10 @@ class TestDrain:
         hole = 24 * 9 * np.sin(np.pi / 24) * 2.0  # a cylinder of 48 sides through 2 mm
         assert judged(closed).volume - judged(part).volume == pytest.approx(hole, rel=0.02)
 
+    def test_a_hole_as_wide_as_the_part_is_refused(self) -> None:
+        with pytest.raises(UsageError, match="too wide for the part"):
+            part_of(BOX, hollow=2.0, drain=0.6 * float(np.ptp(BOX.vertices, axis=0).min()))
+
     def test_does_nothing_where_nothing_is_hollow(self) -> None:
         assert part_of(BOX, drain=3.0).faces.tobytes() == BOX.faces.tobytes()
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import UsageError
 from ..measure.winding import pieces_of
 from .base import direction_of
 from .solids import mesh_of, solid_of
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 SIDES = 48
 """Sides of a hole."""
+WIDEST = 0.5
+"""Most of the part's width that a hole may take: a wider one would take the shape away."""
 INSIDE = 1e-6
 """Height over the size of the part from which the wall below a cavity is looked for."""
 
@@ -38,11 +41,22 @@ def drained(mesh: TriMesh, diameter: float, down: str) -> TriMesh:
     -------
     TriMesh
         Closed and 2-manifold. The mesh itself where it has no cavity.
+
+    Raises
+    ------
+    UsageError
+        For a hole that is wide for the part.
     """
     from manifold3d import Manifold
 
     way, solid = direction_of(down), solid_of(mesh)
-    size = float(np.ptp(mesh.vertices, axis=0).max())
+    sides = np.ptp(mesh.vertices, axis=0)
+    size, width = float(sides.max()), float(sides[way == 0].min())
+    if diameter > WIDEST * width:
+        raise UsageError(
+            "the drain is too wide for the part", found=f"--drain = {diameter:g}",
+            expected=f"at most {WIDEST * width:.3g} mm, {WIDEST:.0%} of its width",
+        )  # fmt: skip
     piece, volumes = pieces_of(mesh)
     holes = []
     for inward in np.flatnonzero(volumes < 0):
