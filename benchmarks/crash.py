@@ -18,7 +18,10 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from importlib import import_module
 from pathlib import Path
+from typing import Any
+from unittest import mock
 
 NAMES = ("m.ply", "p.ply", "r.json")
 OLD = b"old"
@@ -49,13 +52,13 @@ def forked(line: list[str], writes: Path | None = None) -> int:
 
     write = outputs.write_surface
 
-    def told(*arguments: object) -> None:
+    def told(*arguments: Any) -> None:
         if writes is not None:
             writes.touch()
-        write(*arguments)  # type: ignore[arg-type]
+        write(*arguments)
 
     for module in (outputs, sys.modules["tomomesh.cli.commands"]):
-        module.write_surface = told  # type: ignore[attr-defined]
+        mock.patch.object(module, "write_surface", told).start()
     os._exit(main(line))
 
 
@@ -90,9 +93,8 @@ def whole(path: Path) -> bool:
 
 
 def kill(count: int, seed: int) -> None:
-    import tomomesh.cli.commands
-    import tomomesh.pipeline  # noqa: F401 - what every run would import is there before it is copied
-
+    for name in ("tomomesh.cli.commands", "tomomesh.pipeline"):  # what every run would import, before it is copied
+        import_module(name)
     rng, tally, torn = random.Random(seed), Counter[str](), 0
     with tempfile.TemporaryDirectory() as place:
         folders = [Path(place, name) for name in ("out", "whole")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,8 +32,12 @@ def write() -> None:
     for group in dict(parameters()):
         table = "\n".join([*HEAD, *(row(entry) for name, entry in parameters() if name == group)])
         marked = re.compile(rf"(<!-- {group} -->\n).*?(<!-- end {group} -->)", re.DOTALL)
-        text = marked.sub(lambda found, table=table: f"{found[1]}{table}\n{found[2]}", text)  # type: ignore[misc]
+        text = marked.sub(partial(_between, table), text)
     PAGE.write_text(text, encoding="utf-8")
+
+
+def _between(table: str, found: re.Match[str]) -> str:
+    return f"{found[1]}{table}\n{found[2]}"
 
 
 def row(entry: Field[Any]) -> str:

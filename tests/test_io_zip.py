@@ -134,7 +134,7 @@ class TestHostile:
         [
             "../out.dcm",
             "a/../../out.dcm",
-            "/tmp/out.dcm",
+            "/out.dcm",
             "..\\out.dcm",
             "C:\\out.dcm",
             "C:out.dcm",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import nibabel
@@ -30,8 +31,6 @@ from tomomesh.spacewise import _untangled
 from tomomesh.surface.squares import squares_of
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
     from tomomesh.phantom import Phantom
@@ -241,8 +240,7 @@ class TestCommandLine:
         read = trimesh.load(mesh)
         assert read.is_watertight
         assert read.euler_number == 2
-        with open(report) as file:  # noqa: PTH123
-            assert json.load(file)["space"]["faces"] == 320
+        assert json.loads(Path(report).read_text())["space"]["faces"] == 320
         assert np.asarray(nibabel.load(labels).dataobj).max() <= 162
         assert len(trimesh.load(points).vertices) == 162
 

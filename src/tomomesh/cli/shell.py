@@ -41,7 +41,7 @@ def completion(shell: str) -> str:
     parser = build_parser()
     for action in _actions(parser):
         if action.metavar in FOLDERS + FILES:
-            action.complete = shtab.DIRECTORY if action.metavar in FOLDERS else shtab.FILE  # type: ignore[attr-defined]
+            vars(action)["complete"] = shtab.DIRECTORY if action.metavar in FOLDERS else shtab.FILE
     return str(shtab.complete(parser, shell))
 
 

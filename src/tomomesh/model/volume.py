@@ -106,14 +106,15 @@ class Volume:
         world = _world_axes(affine[:3, :3])
         order = np.argsort(world)
         canonical = affine[:, [*order, 3]].copy()
-        axes = tuple(int(2 - order[2 - n]) for n in range(3))
-        voxels = np.transpose(stored, (*axes, *range(3, stored.ndim)))
+        k, j, i = (int(2 - order[2 - n]) for n in range(3))
+        voxels = np.transpose(stored, (k, j, i, *range(3, stored.ndim)))
         flips = [bool(canonical[2 - n, 2 - n] < 0) for n in range(3)]
         for n in (n for n in range(3) if flips[n]):
             canonical[:3, 3] += canonical[:3, 2 - n] * (voxels.shape[n] - 1)
             canonical[:3, 2 - n] *= -1
         voxels = voxels[tuple(slice(None, None, -1 if flip else 1) for flip in flips)]
-        grid = Grid(axes, (flips[0], flips[1], flips[2]), affine, stored.shape[:3])  # type: ignore[arg-type]
+        sizes = stored.shape[0], stored.shape[1], stored.shape[2]
+        grid = Grid((k, j, i), (flips[0], flips[1], flips[2]), affine, sizes)
         return cls(voxels, canonical + 0.0, grid, unit, notes)
 
     @property

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 COLUMNS, ROWS = 6, 5
 """Slices of a page."""
+EDGE = 0.03
+"""Share of a slice's width between its border and the scale bar."""
 MOST_LINES = 3
 """Contours of a slice whose measures are written."""
 FLAT = Plane()
@@ -202,6 +204,7 @@ def scale_bar(ax: Axes, bounds: Floats, plane: Plane, color: str = INK) -> None:
     """Put the length that all slices share into a corner of the first."""
     (left, low), (right, high) = bounds
     length = nice_length(float(right - left))
-    foot = np.array([left, low if plane.upward else high])
+    margin = EDGE * float(right - left)
+    foot = np.array([left + margin, low + margin if plane.upward else high - margin])
     lines(ax, np.array([[foot, foot + np.array([length, 0.0])]]), color=color, width=1.6)
-    small_print(ax, f"{length:g} {plane.unit}".strip(), foot, (0, 6), align="left")
+    small_print(ax, f"{length:g} {plane.unit}".strip(), foot, (0, 6), color=color, align="left")

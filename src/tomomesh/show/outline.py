@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 OUTLINE = "#ff7a1a"
+INSIDE = 0.5
+"""Slices by which a cut keeps from the ends of the mesh: in the plane of a cap there is no outline to see."""
 FLAT = Plane()
 
 
@@ -46,12 +48,14 @@ def draw_outlines(images: NDArray[Any], mesh: TriMesh, plane: Plane = FLAT) -> I
     every = np.arange(max(0, int(np.ceil(low[2]))), min(len(images), int(np.floor(high[2])) + 1))
     if not len(every):
         return
+    inset = min(INSIDE, float(high[2] - low[2]) / 2)
     ends = plane.place(np.stack([low, high])[:, :2])
     margin = 0.05 * (ends[1] - ends[0]).max() * np.array([[-1.0], [1.0]])
     span = contrast(gray(images[every[len(every) // 2]]))
     for part in pages(every):
         which = f"Slices {part[0] + 1} to {part[-1] + 1} of {len(images)}"
-        cuts = [plane.place(section(mesh, float(k)).reshape(-1, 2)).reshape(-1, 2, 2) for k in part]
+        heights = np.clip(part, low[2] + inset, high[2] - inset)
+        cuts = [plane.place(section(mesh, float(k)).reshape(-1, 2)).reshape(-1, 2, 2) for k in heights]
         yield _page([gray(images[k]) for k in part], cuts, part, plane, ends + margin, span, which)
 
 
@@ -73,6 +77,6 @@ def _page(
         ax.set_axis_off()
     scale_bar(axes[0], bounds, plane, color="white")
     figure.suptitle(which, x=0.01, ha="left", fontsize=10, fontweight="bold")
-    note = "the mesh where the plane of each slice cuts it"
+    note = "the mesh where the plane of each slice cuts it, at its ends half a slice inside"
     figure.text(0.99, 1 - 0.12 / figure.get_figheight(), note, ha="right", va="top", color=MUTED, fontsize=8)
     return figure
