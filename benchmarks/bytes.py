@@ -15,7 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from tomomesh import TomomeshError, Volume, phantom, read_points, read_volume, reconstruct, reconstruct_points
+from tomomesh import (
+    TomomeshError,
+    Volume,
+    phantom,
+    read_points,
+    read_volume,
+    reconstruct,
+    reconstruct_points,
+)
 from tomomesh.settings import Settings
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -100,7 +108,7 @@ def clouds() -> dict[str, Any]:
 def main() -> None:
     """Print everything."""
     head = phantom()
-    window = {"lower": head.lower, "upper": head.upper}
+    window: dict[str, Any] = {"lower": head.lower, "upper": head.upper}
     color = Volume(np.repeat(head.volume.voxels[..., None], 3, axis=3), head.volume.affine, head.volume.grid)
     for name, changes in STUDIES.items():
         show(name, lambda changes=changes: reconstruct(head.volume, **window, **changes))

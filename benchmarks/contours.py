@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bench import at_most, header, judge, note
-from tomomesh.segment.study import train_study
+from tomomesh.segmentation.training import train_study
 from tomomesh.settings import NetworkSettings
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from bench import at_most, header, holds, note
 from tomomesh import Settings, phantom, reconstruct, write_mesh
 
 if TYPE_CHECKING:
-    from tomomesh.phantom import Phantom
+    from tomomesh.head_phantom import Phantom
     from tomomesh.results import Surface
 
 

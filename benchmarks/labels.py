@@ -13,8 +13,8 @@ from tomomesh.measure.contour import crossings, crossings_between
 from tomomesh.measure.distance import distance_to_surface
 from tomomesh.measure.report import area_samples, compare
 from tomomesh.model.mesh import TriMesh
-from tomomesh.segment.contours.loops import trace
-from tomomesh.segment.contours.train import train_contours
+from tomomesh.segmentation.contours.loops import trace
+from tomomesh.segmentation.contours.train import train_contours
 from tomomesh.settings import NetworkSettings
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from minisom import MiniSom
 from bench import at_least, header, holds, median_times, note
 from tomomesh import phantom, window
 from tomomesh.model.lattice import lattice
-from tomomesh.segment.som.fit import fit
-from tomomesh.segment.study import train_study
+from tomomesh.segmentation.training import train_study
 from tomomesh.settings import NetworkSettings
+from tomomesh.som.fit import fit
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,9 +11,9 @@ import numpy as np
 from bench import at_most, header, holds, judge, note
 from tomomesh.measure.contour import measure_contour
 from tomomesh.model.lattice import lattice
-from tomomesh.segment.even import bridged_edges
-from tomomesh.segment.som.fit import fit
 from tomomesh.settings import NetworkSettings
+from tomomesh.som.even_spacing import bridged_edges
+from tomomesh.som.fit import fit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

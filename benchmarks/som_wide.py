@@ -16,8 +16,8 @@ from minisom import MiniSom
 
 from bench import at_least, header, holds, note
 from tomomesh.model.lattice import lattice
-from tomomesh.segment.som.fit import fit
 from tomomesh.settings import NetworkSettings
+from tomomesh.som.fit import fit
 
 if TYPE_CHECKING:
     from collections.abc import Callable

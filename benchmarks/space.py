@@ -14,8 +14,8 @@ from bench import SHARED, at_most, header, holds, note
 from tomomesh import Volume, phantom, read_volume, reconstruct
 from tomomesh.measure.distance import distance_to_surface
 from tomomesh.model.mesh import TriMesh
-from tomomesh.segment.otsu import otsu_threshold
-from tomomesh.segment.space import pieces_of
+from tomomesh.segmentation.otsu import otsu_threshold
+from tomomesh.segmentation.space import pieces_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,12 +10,12 @@ import numpy as np
 from bench import SHARED, at_most, header, median_times, note
 from study import _surface_nets
 from tomomesh import assess, phantom, read_volume, window
+from tomomesh.isosurface.voxels import boundary, voxel_surface
 from tomomesh.measure.report import compare
 from tomomesh.measure.topology import check_promise
 from tomomesh.model.mesh import TriMesh
-from tomomesh.segment.otsu import otsu_threshold
+from tomomesh.segmentation.otsu import otsu_threshold
 from tomomesh.settings import FitSettings
-from tomomesh.surface.voxels import boundary, voxel_surface
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

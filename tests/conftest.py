@@ -10,11 +10,11 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from numba.core import config
 
+from tomomesh.cuberille.bitmasks import Blocks
+from tomomesh.cuberille.closing import Shell
+from tomomesh.cuberille.faces import Walls, walls
 from tomomesh.model.cubes import keys_of
 from tomomesh.model.mesh import QuadMesh
-from tomomesh.surface.blocks import Blocks
-from tomomesh.surface.shell import Shell
-from tomomesh.surface.walls import Walls, walls
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

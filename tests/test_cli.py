@@ -276,7 +276,7 @@ class TestFaults:
         ]
         ready = tmp_path / "ready"
         program = (
-            "import sys, pathlib, signal, tomomesh.surface.dynamics as d, tomomesh.cli as c\n"
+            "import sys, pathlib, signal, tomomesh.dynamics.mass_spring as d, tomomesh.cli as c\n"
             "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background jobs ignore it
             "rests = d._Motion.rests\n"
             f"def slow(self): pathlib.Path({str(ready)!r}).touch(); return False\n"

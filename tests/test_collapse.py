@@ -7,9 +7,9 @@ import pytest
 import trimesh
 
 from tomomesh import reconstruct_points
+from tomomesh.dynamics.collapse import without_collapse
 from tomomesh.measure.topology import check_promise, topology
 from tomomesh.model.mesh import TriMesh
-from tomomesh.surface.collapse import without_collapse
 
 
 def two_balls() -> TriMesh:

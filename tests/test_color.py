@@ -15,12 +15,12 @@ from PIL import Image
 from tomomesh import Settings, Volume, reconstruct, window
 from tomomesh.cli import main
 from tomomesh.errors import EmptyError, UsageError
-from tomomesh.segment.otsu import otsu_threshold
-from tomomesh.segment.study import train_study
-from tomomesh.segment.survey import survey
-from tomomesh.segment.window import by_layer, choose_window
+from tomomesh.isosurface.voxels import boundary
+from tomomesh.segmentation.otsu import otsu_threshold
+from tomomesh.segmentation.survey import survey
+from tomomesh.segmentation.training import train_study
+from tomomesh.segmentation.window import by_layer, choose_window
 from tomomesh.settings import NetworkSettings, WindowSettings
-from tomomesh.surface.voxels import boundary
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,17 +12,17 @@ from scipy import ndimage
 
 from conftest import sphere, torus
 from studies import shared
+from tomomesh.contours.curves import fine_curve, moments_of
+from tomomesh.contours.known import known_slices
+from tomomesh.contours.rings import outline
+from tomomesh.contours.shape_interpolation import ENDS
+from tomomesh.contours.slices import find_slices
+from tomomesh.contours.stack import ContourSurface, contour_surface
+from tomomesh.contours.tracks import Part, link_slices
 from tomomesh.errors import EmptyError, GeometryError
 from tomomesh.measure.intersections import self_intersections
 from tomomesh.measure.topology import check_promise, topology
 from tomomesh.model.points import PointSet
-from tomomesh.surface.between import ENDS
-from tomomesh.surface.contours import ContourSurface, contour_surface
-from tomomesh.surface.curves import fine_curve, moments_of
-from tomomesh.surface.known import known_slices
-from tomomesh.surface.rings import outline
-from tomomesh.surface.slices import find_slices
-from tomomesh.surface.tracks import Part, link_slices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -305,7 +305,7 @@ class TestSurface:
         assert (topology(made.mesh).components, made.open) == (1, 1)
 
     def test_memory_is_bounded(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("tomomesh.surface.contours.MOST_VOXELS", 50_000)
+        monkeypatch.setattr("tomomesh.contours.stack.MOST_VOXELS", 50_000)
         made = closed(np.concatenate(ball(np.arange(-22.5, 24, 5))))
         assert made.edge > made.asked_edge
         assert made.voxels <= 50_000

@@ -18,7 +18,7 @@ from tomomesh import read_volume, reconstruct, segment
 from tomomesh.cli import main
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.model.volume import Volume
-from tomomesh.segment.crop import crop, inside_roi
+from tomomesh.segmentation.crop import crop, inside_roi
 from tomomesh.settings.crop import CropSettings
 
 if TYPE_CHECKING:

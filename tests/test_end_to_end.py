@@ -22,7 +22,7 @@ from tomomesh.settings import Settings
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tomomesh.phantom import Phantom
+    from tomomesh.head_phantom import Phantom
     from tomomesh.results import Surface
 
 

@@ -13,9 +13,9 @@ import pytest
 
 from conftest import sphere
 from tomomesh.errors import ResourceError
-from tomomesh.surface import forecast
-from tomomesh.surface.forecast import free_memory, require_room, require_room_for_points
-from tomomesh.surface.samples import Samples
+from tomomesh.pointcloud import forecast
+from tomomesh.pointcloud.forecast import free_memory, require_room, require_room_for_points
+from tomomesh.pointcloud.samples import Samples
 
 GIB = 2**30
 
@@ -68,7 +68,7 @@ class TestFreeMemory:
         resource = pytest.importorskip("resource", reason="there is none here")
         program = (
             "import resource, numpy\n"
-            "from tomomesh.surface.forecast import free_memory\n"
+            "from tomomesh.pointcloud.forecast import free_memory\n"
             f"resource.setrlimit(resource.RLIMIT_AS, ({64 * GIB}, resource.RLIM_INFINITY))\n"
             "print(free_memory())"
         )
@@ -120,7 +120,7 @@ class TestMeasured:
             "import re, pathlib\n"
             "from conftest import sphere\n"
             "from tomomesh import reconstruct_points\n"
-            "from tomomesh.surface import forecast as f\n"
+            "from tomomesh.cuberille import forecast as f\n"
             "status = pathlib.Path('/proc/self/status')\n"
             "peak = lambda: 1024 * int(re.search(r'VmHWM:\\s+(\\d+)', status.read_text())[1])\n"
             "reconstruct_points(sphere(1000)); before = peak()\n"

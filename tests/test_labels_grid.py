@@ -17,7 +17,7 @@ from test_cli import fails
 from tomomesh.cli import main
 from tomomesh.errors import GeometryError
 from tomomesh.model.volume import Volume
-from tomomesh.segment.grid import onto_grid
+from tomomesh.segmentation.grid import onto_grid
 
 if TYPE_CHECKING:
     from pathlib import Path

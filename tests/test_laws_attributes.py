@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from conftest import law, seeds
 from tomomesh.model.points import PointSet
-from tomomesh.surface.attributes import carry
+from tomomesh.pointcloud.attributes import carry
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -12,17 +12,17 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from conftest import law, seeds, size
+from tomomesh.cuberille import bitmasks as module
+from tomomesh.cuberille.bitmasks import EDGE, Blocks
+from tomomesh.cuberille.neighbors import OFFSETS
 from tomomesh.errors import ResourceError
-from tomomesh.kernels.boards import flood, neighbor, popcount
+from tomomesh.kernels.cuberille.bitmasks import flood, neighbor, popcount
 from tomomesh.model.cubes import MARGIN, SIDE, keys_of
-from tomomesh.surface import blocks as module
-from tomomesh.surface.blocks import EDGE, Blocks
-from tomomesh.surface.neighbors import OFFSETS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tomomesh.surface.blocks import Board
+    from tomomesh.cuberille.bitmasks import Board
 
     Cells = NDArray[np.int64]
 

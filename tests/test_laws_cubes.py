@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from conftest import keys_in, law, seeds, solids
+from tomomesh.cuberille.neighbors import OFFSETS, dilate, neighbor_table
+from tomomesh.cuberille.partition import is_flat, partition, sampling_distance
 from tomomesh.errors import EmptyError, ResourceError
 from tomomesh.model.cubes import MARGIN, SIDE, cells_of, key_step, keys_of
-from tomomesh.surface.neighbors import OFFSETS, dilate, neighbor_table
-from tomomesh.surface.partition import is_flat, partition, sampling_distance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -13,12 +13,12 @@ from scipy.sparse import diags_array
 from scipy.sparse.linalg import spsolve
 
 from conftest import composed, cuberille_of, law, seeds, size, solids, sphere
+from tomomesh.cuberille.leak_test import CLOSINGS, hold
+from tomomesh.cuberille.partition import partition
+from tomomesh.dynamics.low_pass import adjacency, low_pass
+from tomomesh.dynamics.mass_spring import Fit, fit
 from tomomesh.errors import UsageError
 from tomomesh.settings import FitSettings
-from tomomesh.surface.dynamics import Fit, fit
-from tomomesh.surface.holding import CLOSINGS, hold
-from tomomesh.surface.partition import partition
-from tomomesh.surface.smooth import adjacency, low_pass
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -164,7 +164,7 @@ class TestRest:
 
     @pytest.mark.parametrize("limit", LIMITS)
     def test_is_the_same_for_any_number_of_threads(self, limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("tomomesh.surface.dynamics.BLOCK", 97)
+        monkeypatch.setattr("tomomesh.dynamics.mass_spring.BLOCK", 97)
         points, cell = ball()
         one, two = (rested(points, cell, FitSettings(limit=limit), threads=n)[1] for n in (1, 2))
         assert one.vertices.tobytes() == two.vertices.tobytes()

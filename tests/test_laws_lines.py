@@ -16,9 +16,9 @@ from tomomesh.model.lattice import lattice
 from tomomesh.model.networks import Networks
 from tomomesh.model.points import BRIDGE, CAP, NEURON
 from tomomesh.model.volume import Volume
-from tomomesh.segment.even import bridged_edges, even_spacing
-from tomomesh.segment.polygon import area, distance, inside, lattice_inside
-from tomomesh.segment.sample import Sampling, sample
+from tomomesh.segmentation.polygon import area, distance, inside, lattice_inside
+from tomomesh.segmentation.sample import Sampling, sample
+from tomomesh.som.even_spacing import bridged_edges, even_spacing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

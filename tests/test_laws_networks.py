@@ -13,11 +13,11 @@ from scipy.optimize import linprog
 from conftest import law, seeds, size
 from tomomesh.errors import EmptyError
 from tomomesh.model.lattice import TOPOLOGIES, lattice
-from tomomesh.segment.region import train_region
-from tomomesh.segment.shapes import SHAPES, shape
-from tomomesh.segment.som.fit import fit, match, start_positions
-from tomomesh.segment.study import regions, train_study
+from tomomesh.segmentation.training import regions, train_study
 from tomomesh.settings import FALLS, NetworkSettings
+from tomomesh.som.fit import fit, match, start_positions
+from tomomesh.som.region import train_region
+from tomomesh.som.shapes import SHAPES, shape
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

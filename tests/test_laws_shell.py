@@ -11,19 +11,19 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from conftest import composed, contacts, law, seeds, size, solids
+from tomomesh.cuberille import bitmasks as module
+from tomomesh.cuberille.closing import NEAR, ROOM, Shell, close_shell
+from tomomesh.cuberille.faces import HELD, walls
+from tomomesh.cuberille.leak_test import CLOSINGS, LEAKING, SURE, hold
 from tomomesh.measure.topology import topology
 from tomomesh.model.mesh import TriMesh
-from tomomesh.surface import blocks as module
-from tomomesh.surface.holding import CLOSINGS, LEAKING, SURE, hold
-from tomomesh.surface.shell import NEAR, ROOM, Shell, close_shell
-from tomomesh.surface.walls import HELD, walls
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tomomesh.surface.blocks import Board
-    from tomomesh.surface.holding import Held
-    from tomomesh.surface.walls import Walls
+    from tomomesh.cuberille.bitmasks import Board
+    from tomomesh.cuberille.faces import Walls
+    from tomomesh.cuberille.leak_test import Held
 
     Cells = NDArray[np.int64]
     Solid = NDArray[np.bool_]

@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds, size
+from tomomesh.contours.curves import DENSE, field_of, fine_curve, moments_of
+from tomomesh.contours.rings import outline
+from tomomesh.contours.shape_interpolation import MARGIN
+from tomomesh.contours.slices import find_slices
+from tomomesh.contours.stack import contour_surface
 from tomomesh.measure.topology import check_promise
-from tomomesh.surface.between import MARGIN
-from tomomesh.surface.contours import contour_surface
-from tomomesh.surface.curves import DENSE, field_of, fine_curve, moments_of
-from tomomesh.surface.rings import outline
-from tomomesh.surface.slices import find_slices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -62,7 +62,7 @@ class TestOrder:
     @pytest.mark.parametrize("attraction", ATTRACTIONS)
     def test_nor_do_threads(self, attraction: str, monkeypatch: pytest.MonkeyPatch) -> None:
         for block, size_of_it in (("dynamics.BLOCK", 101), ("drape.BLOCK", 97), ("blocks.SHARE", 3)):
-            monkeypatch.setattr(f"tomomesh.surface.{block}", size_of_it)
+            monkeypatch.setattr(f"tomomesh.cuberille.{block}", size_of_it)
         one, two = (reconstruct_points(sphere(COUNT), threads=n, attraction=attraction) for n in (1, 2))
         assert bytes_of(one) == bytes_of(two)
 

@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from conftest import composed, cuberille_of, law, size, walls_of
+from tomomesh.cuberille.neighbors import DIRECTIONS, FACE_COLUMNS, OFFSETS
+from tomomesh.cuberille.partition import partition
 from tomomesh.measure.topology import topology
 from tomomesh.model.cubes import cells_of, keys_of
-from tomomesh.surface.neighbors import DIRECTIONS, FACE_COLUMNS, OFFSETS
-from tomomesh.surface.partition import partition
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tomomesh.surface.walls import Walls
+    from tomomesh.cuberille.faces import Walls
 
     Solid = NDArray[np.bool_]
     Face = tuple[tuple[int, ...], tuple[int, ...]]

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import cuberille_of, law, solids
+from tomomesh.measure.section import section
 from tomomesh.model.mesh import TriMesh
 from tomomesh.show.outline import draw_outlines
-from tomomesh.surface.section import section
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tomomesh.errors import UsageError
-from tomomesh.phantom import NASAL_OPENING, Head, Phantom, phantom
+from tomomesh.head_phantom import NASAL_OPENING, Head, Phantom, phantom
 
 
 @pytest.fixture(scope="module", params=["mr", "ct"])

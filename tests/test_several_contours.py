@@ -17,13 +17,13 @@ from tomomesh.errors import EmptyError, UsageError
 from tomomesh.measure.contour import crossings, crossings_between, measure_contour
 from tomomesh.model.contours import BIRTH, BRANCH, DEATH, HOLE, MERGE, OUTER, WALL_INNER, WALL_OUTER
 from tomomesh.model.lattice import lattice
-from tomomesh.segment.contours.curved import evened, finely
-from tomomesh.segment.contours.looks import SHORTEST, slices_with_several
-from tomomesh.segment.contours.loops import trace
-from tomomesh.segment.contours.train import drawn, train_contours
-from tomomesh.segment.even import bridged_edges, even_spacing
-from tomomesh.segment.study import regions
+from tomomesh.segmentation.contours.curved import evened, finely
+from tomomesh.segmentation.contours.inputs import SHORTEST, slices_with_several
+from tomomesh.segmentation.contours.loops import trace
+from tomomesh.segmentation.contours.train import drawn, train_contours
+from tomomesh.segmentation.training import regions
 from tomomesh.settings import NetworkSettings, Settings
+from tomomesh.som.even_spacing import bridged_edges, even_spacing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -14,6 +14,8 @@ from studies import affine_of, rotation, shared, write_nifti
 from test_cli import fails
 from tomomesh import reconstruct, reconstruct_points, segment
 from tomomesh.cli import main
+from tomomesh.contours.known import known_slices
+from tomomesh.contours.rings import nested
 from tomomesh.errors import EmptyError, GeometryError, UsageError
 from tomomesh.measure.distance import distance_to_surface
 from tomomesh.measure.report import compare
@@ -22,8 +24,6 @@ from tomomesh.model.contours import SIDES
 from tomomesh.model.mesh import TriMesh
 from tomomesh.model.points import RING, SIDE, TRACK
 from tomomesh.model.volume import Volume
-from tomomesh.surface.known import known_slices
-from tomomesh.surface.rings import nested
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -15,13 +15,13 @@ from scipy.spatial import cKDTree
 from conftest import COMPILED, law, seeds, size
 from tomomesh import reconstruct_points
 from tomomesh.errors import GeometryError
-from tomomesh.kernels.samples import tangents
-from tomomesh.kernels.sheet import unfold
+from tomomesh.kernels.pointcloud.samples import tangents
+from tomomesh.kernels.pointcloud.sheet import unfold
 from tomomesh.measure.topology import check_promise
 from tomomesh.model.mesh import TriMesh
-from tomomesh.surface.borders import borders
-from tomomesh.surface.samples import settle_points
-from tomomesh.surface.trimming import rim, trimmed
+from tomomesh.opensurface.borders import borders
+from tomomesh.opensurface.trimming import rim, trimmed
+from tomomesh.pointcloud.samples import settle_points
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

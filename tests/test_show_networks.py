@@ -16,9 +16,6 @@ from tomomesh.model.contours import HOLE, OUTER, Contour, Contours
 from tomomesh.model.graph import lattice_of
 from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
 from tomomesh.model.networks import Networks
-from tomomesh.segment.region import train_region
-from tomomesh.segment.shapes import shape
-from tomomesh.segment.som.snapshots import snapshots, thinned
 from tomomesh.settings import NetworkSettings
 from tomomesh.show import save
 from tomomesh.show.contact import COLUMNS, ROWS, draw_slices
@@ -26,6 +23,9 @@ from tomomesh.show.film import END_MS, MOST_FRAMES, START_MS, film, film_slice
 from tomomesh.show.maps import SHEETS, draw_maps, laid_flat, u_matrix
 from tomomesh.show.plane import Plane
 from tomomesh.show.topologies import draw_adapted
+from tomomesh.som.region import train_region
+from tomomesh.som.shapes import shape
+from tomomesh.som.snapshots import snapshots, thinned
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -10,8 +10,8 @@ import pytest
 
 from tomomesh import SOM
 from tomomesh.errors import FormatError, UnreadableError, UsageError
-from tomomesh.segment.som.checks import NotFittedError, not_fitted, seed_of
-from tomomesh.segment.som.parameters import Parametrized
+from tomomesh.som.checks import NotFittedError, not_fitted, seed_of
+from tomomesh.som.parameters import Parametrized
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from conftest import law, seeds
 from tomomesh.errors import UsageError
 from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
-from tomomesh.segment.som.measures import (
+from tomomesh.som.measures import (
     dead_neurons,
     distortion,
     neighborhood_preservation,

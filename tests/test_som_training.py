@@ -14,9 +14,9 @@ from conftest import law, seeds, size
 from tomomesh.errors import UsageError
 from tomomesh.model.graph import lattice_of
 from tomomesh.model.lattice import TOPOLOGIES, lattice
-from tomomesh.segment.som.fit import fit, match, start_positions
-from tomomesh.segment.som.schedules import falling, radius_power, schedule_warning
 from tomomesh.settings import FALLS, NetworkSettings
+from tomomesh.som.fit import fit, match, start_positions
+from tomomesh.som.schedules import falling, radius_power, schedule_warning
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

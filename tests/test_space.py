@@ -18,6 +18,7 @@ from skimage.measure import marching_cubes
 from studies import rotation
 from tomomesh import Volume, phantom, reconstruct, segment
 from tomomesh.cli import main
+from tomomesh.dynamics.subdivision import squares_of
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.measure.distance import distance_to_surface
 from tomomesh.measure.intersections import Crossings
@@ -25,15 +26,14 @@ from tomomesh.model.icosphere import icosphere
 from tomomesh.model.lattice import lattice
 from tomomesh.model.mesh import TriMesh
 from tomomesh.model.networks import SpaceNetwork
-from tomomesh.segment.space import MOST, is_wall, pieces_of, train_space
+from tomomesh.segmentation.space import MOST, is_wall, pieces_of, train_space
 from tomomesh.settings import NetworkSettings
 from tomomesh.spacewise import _untangled
-from tomomesh.surface.squares import squares_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tomomesh.phantom import Phantom
+    from tomomesh.head_phantom import Phantom
     from tomomesh.results import Surface
 
 TUBE, RING = 6.0, 15.0

@@ -15,9 +15,11 @@ from scipy.spatial import cKDTree
 
 from conftest import law, seeds, size, sphere
 from tomomesh.cli.summary import of_check
-from tomomesh.kernels.cells import label_components, nearest_points
+from tomomesh.cuberille.neighbors import neighbor_table
+from tomomesh.cuberille.partition import partition
+from tomomesh.kernels.cuberille.cells import label_components, nearest_points
+from tomomesh.kernels.measure.triangles import squared_distance
 from tomomesh.kernels.threads import in_blocks
-from tomomesh.kernels.triangles import squared_distance
 from tomomesh.measure.distance import distance_to_surface, spread_of
 from tomomesh.measure.report import area_samples, assess, compare
 from tomomesh.measure.shape import triangle_shapes
@@ -25,8 +27,6 @@ from tomomesh.measure.topology import welded
 from tomomesh.measure.tree import Tree
 from tomomesh.model.cubes import cells_of
 from tomomesh.model.mesh import TriMesh
-from tomomesh.surface.neighbors import neighbor_table
-from tomomesh.surface.partition import partition
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

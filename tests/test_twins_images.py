@@ -16,10 +16,10 @@ from skimage.segmentation import find_boundaries
 from conftest import law, seeds
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.model.volume import Volume
-from tomomesh.segment.otsu import histogram, otsu_levels, otsu_threshold
-from tomomesh.segment.polygon import distance
-from tomomesh.segment.signal import fills_most, outline
-from tomomesh.segment.window import choose_window, window
+from tomomesh.segmentation.otsu import histogram, otsu_levels, otsu_threshold
+from tomomesh.segmentation.polygon import distance
+from tomomesh.segmentation.signal import fills_most, outline
+from tomomesh.segmentation.window import choose_window, window
 from tomomesh.settings import WindowSettings
 
 if TYPE_CHECKING:

@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds, size
-from tomomesh.kernels import batch as batch_kernels
-from tomomesh.kernels import som as kernels
-from tomomesh.kernels.neighborhoods import BUBBLE, GAUSSIAN, LATERAL, weigh
+from tomomesh.kernels.som import batch as batch_kernels
+from tomomesh.kernels.som import online as kernels
+from tomomesh.kernels.som.neighborhoods import BUBBLE, GAUSSIAN, LATERAL, weigh
 from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
-from tomomesh.segment.som import products
-from tomomesh.segment.som.fit import match
+from tomomesh.som import products
+from tomomesh.som.fit import match
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -18,14 +18,7 @@ from conftest import law, seeds, size
 from tomomesh.errors import InternalCheckError
 from tomomesh.measure.links import Links
 from tomomesh.measure.shape import areas_and_volumes
-from tomomesh.measure.topology import (
-    Topology,
-    check_promise,
-    distinct_positions,
-    face_components,
-    topology,
-    welded,
-)
+from tomomesh.measure.topology import Topology, check_promise, distinct_positions, face_components, topology, welded
 from tomomesh.model.mesh import TriMesh
 
 if TYPE_CHECKING:

@@ -22,6 +22,11 @@ from studies import AFFINES, shared, write_nifti
 from tomomesh.cli import main
 from tomomesh.errors import EmptyError, ResourceError
 from tomomesh.io import read_mesh, read_points, read_volume
+from tomomesh.isosurface import surface_nets as nets
+from tomomesh.isosurface.crossings import CLOSEST
+from tomomesh.isosurface.surface_nets import TENSION, WALL
+from tomomesh.isosurface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
+from tomomesh.isosurface.well_composed import without_contacts
 from tomomesh.measure.intersections import self_intersections
 from tomomesh.measure.report import compare
 from tomomesh.measure.topology import check_promise, topology
@@ -29,13 +34,8 @@ from tomomesh.model.mesh import TriMesh
 from tomomesh.model.points import CAP, NEURON
 from tomomesh.model.volume import Grid, Volume
 from tomomesh.pipeline import reconstruct, segment
-from tomomesh.segment.window import window
+from tomomesh.segmentation.window import window
 from tomomesh.settings import FitSettings
-from tomomesh.surface import nets
-from tomomesh.surface.contacts import without_contacts
-from tomomesh.surface.crossings import CLOSEST
-from tomomesh.surface.nets import TENSION, WALL
-from tomomesh.surface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -164,7 +164,7 @@ class TestLaws:
         volume, mask = volume_of(gray), gray > 0
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(nets, "BLOCK", 7)
-            patch.setattr("tomomesh.surface.contacts.LAYERS", 1)
+            patch.setattr("tomomesh.isosurface.well_composed.LAYERS", 1)
             found = [boundary(volume, mask, lower=0.0, threads=n) for n in (1, 3)]
             made = [voxel_surface(one, FitSettings(), threads=n) for one, n in zip(found, (1, 3), strict=True)]
         assert made[0].mesh.vertices.tobytes() == made[1].mesh.vertices.tobytes()
@@ -334,7 +334,7 @@ class TestSpecial:
         assert peer.GetOutput().GetNumberOfCells() == len(found.net.quads)
 
     def test_what_would_not_fit_is_refused(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("tomomesh.surface.contacts.MOST_CELLS", 100)
+        monkeypatch.setattr("tomomesh.isosurface.well_composed.MOST_CELLS", 100)
         with pytest.raises(ResourceError, match="too large") as refused:
             reconstruct(ball(6), lower=0.0, network="none")
         assert refused.value.exit_code == 7

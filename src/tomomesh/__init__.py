@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "SOM": "segment.som.estimator",
+    "SOM": "som.estimator",
     "PointSet": "model.points",
     "Settings": "settings",
     "TomomeshError": "errors",
@@ -18,14 +16,14 @@ _HOMES = {
     "Volume": "model.volume",
     "assess": "measure.report",
     "fill_mesh": "measure.fill",
-    "phantom": "phantom",
+    "phantom": "head_phantom",
     "read_mesh": "io",
     "read_points": "io",
     "read_volume": "io",
     "reconstruct": "pipeline",
     "reconstruct_points": "pipeline",
     "segment": "pipeline",
-    "window": "segment.window",
+    "window": "segmentation.window",
     "write_mesh": "io",
 }
 
@@ -52,17 +50,17 @@ __all__ = [
 
 if TYPE_CHECKING:
     from .errors import TomomeshError
+    from .head_phantom import phantom
     from .io import read_mesh, read_points, read_volume, write_mesh
     from .measure.fill import fill_mesh
     from .measure.report import assess
     from .model.mesh import TriMesh
     from .model.points import PointSet
     from .model.volume import Volume
-    from .phantom import phantom
     from .pipeline import reconstruct, reconstruct_points, segment
-    from .segment.som.estimator import SOM
-    from .segment.window import window
+    from .segmentation.window import window
     from .settings import Settings
+    from .som.estimator import SOM
 
 
 def __getattr__(name: str) -> Any:
@@ -77,14 +75,3 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     """List the public names, imported or not."""
     return __all__
-
-
-class _Package(ModuleType):
-    """Keep a public name its function's, where a module of the same name is imported too."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in _HOMES and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

@@ -8,30 +8,30 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .cuberille.leak_test import SURE, hold
+from .cuberille.neighbors import once_each
+from .cuberille.partition import cubes_over, is_flat
+from .dynamics.moving_least_squares import Draped, Ring, drape
+from .dynamics.untangle import untangle
 from .errors import EmptyError, GeometryError
 from .measure.intersections import Crossings
 from .model.columns import any_of, box
 from .model.cubes import cells_of, keys_of
 from .model.mesh import QuadMesh, TriMesh
-from .surface.bridges import bridges
-from .surface.drape import Draped, Ring, drape
-from .surface.forecast import require_room, require_room_for_points
-from .surface.gaps import gaps
-from .surface.holding import SURE, hold
-from .surface.neighbors import once_each
-from .surface.partition import cubes_over, is_flat
-from .surface.samples import Samples, settle_points
-from .surface.sheet import open_sheet
-from .surface.untangle import untangle
+from .opensurface.gaps import gaps
+from .opensurface.sheet import open_sheet
+from .pointcloud.bridges import bridges
+from .pointcloud.forecast import require_room, require_room_for_points
+from .pointcloud.samples import Samples, settle_points
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .account import Account
+    from .cuberille.leak_test import Held
+    from .pointcloud.bridges import Bridges
     from .progress import Progress
     from .settings import Settings
-    from .surface.bridges import Bridges
-    from .surface.holding import Held
 
     Floats = NDArray[np.float64]
 

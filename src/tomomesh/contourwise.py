@@ -6,26 +6,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .contours.known import known_slices
+from .contours.slices import find_slices
+from .contours.stack import contour_surface
 from .errors import EmptyError
-from .segment.contours.train import train_contours
-from .segment.sample import sample_contours
-from .segment.study import regions
-from .surface.contours import contour_surface
-from .surface.known import known_slices
-from .surface.slices import find_slices
+from .segmentation.contours.train import train_contours
+from .segmentation.sample import sample_contours
+from .segmentation.training import regions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .account import Account
+    from .contours.slices import Slices
+    from .contours.stack import ContourSurface
     from .model.contours import Contours
     from .model.points import PointSet
     from .model.volume import Volume
     from .progress import Progress
-    from .segment.sample import Sampling
+    from .segmentation.sample import Sampling
     from .settings import Settings
-    from .surface.contours import ContourSurface
-    from .surface.slices import Slices
 
 
 def slices_of(cloud: PointSet, settings: Settings) -> Slices | None:

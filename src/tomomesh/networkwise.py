@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .cuberille.leak_test import CLOSINGS, hold
+from .cuberille.partition import is_flat, partition
+from .dynamics.collapse import without_collapse
+from .dynamics.low_pass import low_pass
+from .dynamics.mass_spring import fit
 from .errors import GeometryError
 from .measure.topology import check_promise
 from .results import Surface
-from .surface.collapse import without_collapse
-from .surface.dynamics import fit
-from .surface.holding import CLOSINGS, hold
-from .surface.partition import is_flat, partition
-from .surface.smooth import low_pass
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,20 +10,20 @@ import numpy as np
 from .account import Account
 from .cloudwise import surface_of_cloud
 from .contourwise import slices_of, slices_of_rings, surface_of_contours
+from .cuberille.partition import sampling_distance
 from .decimation import decimate, faces_under, require_decimation
 from .errors import EmptyError
 from .measure.topology import check_promise
 from .model.columns import box
 from .model.points import PointSet
 from .networkwise import surface_of_networks
+from .pointcloud.samples import distinct
 from .printing.part import make_part, require_printing
 from .progress import Progress, silent
 from .results import NO_CUBES, NO_TRACE, Segmentation, Surface
 from .settings import Settings, without_effect
 from .spacewise import require_surface, surface_of_space
 from .studywise import segment_study
-from .surface.partition import sampling_distance
-from .surface.samples import distinct
 from .voxelwise import mesh_boundary
 
 if TYPE_CHECKING:
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from .contours.slices import Slices
+    from .isosurface.voxels import Boundary
     from .model.mesh import TriMesh
     from .model.volume import Volume
-    from .surface.slices import Slices
-    from .surface.voxels import Boundary
 
 
 def reconstruct(

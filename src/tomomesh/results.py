@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from .isosurface.voxels import Boundary
     from .model.contours import Contours
     from .model.mesh import QuadMesh, TriMesh
     from .model.networks import SpaceNetwork
     from .model.points import PointSet
     from .model.volume import Volume
     from .printing.part import Part
-    from .segment.sample import Sampling
-    from .surface.voxels import Boundary
+    from .segmentation.sample import Sampling
 
 NOTHING = np.empty(0)
 NO_NETWORKS = Networks(

@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .cuberille.partition import partition
+from .dynamics.low_pass import low_pass
+from .dynamics.mass_spring import fit
+from .dynamics.moving_least_squares import Ring, drape
+from .dynamics.subdivision import squares_of
+from .dynamics.untangle import untangle
 from .errors import UsageError
+from .isosurface.voxels import boundary
 from .measure.intersections import Crossings
 from .measure.topology import check_promise
 from .model.columns import any_of
 from .model.mesh import QuadMesh, TriMesh
 from .model.points import PointSet
+from .pointcloud.samples import settle_points
 from .results import NO_CUBES, NO_NETWORKS, NO_TRACE, NOTHING, Segmentation, SpaceFound, Surface
-from .segment.sample import Sampling
-from .segment.space import is_wall, pieces_of, regions_in_space, train_space
+from .segmentation.sample import Sampling
+from .segmentation.space import is_wall, pieces_of, regions_in_space, train_space
 from .settings import SURFACES
-from .surface.drape import Ring, drape
-from .surface.dynamics import fit
-from .surface.partition import partition
-from .surface.samples import settle_points
-from .surface.smooth import low_pass
-from .surface.squares import squares_of
-from .surface.untangle import untangle
-from .surface.voxels import boundary
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from .model.networks import SpaceNetwork
     from .model.trace import Trace
     from .progress import Progress
-    from .segment.chosen import Chosen
+    from .segmentation.selection import Chosen
     from .settings import Settings
 
     Floats = NDArray[np.float64]

@@ -10,14 +10,14 @@ from .contourwise import find_contours
 from .errors import UsageError
 from .model.volume import AXES, Volume, order_along
 from .results import NO_NETWORKS, Segmentation
-from .segment.chosen import Chosen, choose
-from .segment.contours.looks import share_of_holes, slices_with_several
-from .segment.crop import crop, inside_roi
-from .segment.grid import onto_grid
-from .segment.sample import sample
-from .segment.select import doubted
-from .segment.study import regions, train_study
-from .segment.window import by_layer
+from .segmentation.contours.inputs import share_of_holes, slices_with_several
+from .segmentation.crop import crop, inside_roi
+from .segmentation.grid import onto_grid
+from .segmentation.labels import doubted
+from .segmentation.sample import sample
+from .segmentation.selection import Chosen, choose
+from .segmentation.training import regions, train_study
+from .segmentation.window import by_layer
 from .spacewise import segment_in_space
 from .voxelwise import find_boundary, sampled
 

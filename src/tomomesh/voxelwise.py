@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from .isosurface.voxels import boundary, voxel_surface
 from .measure.topology import check_promise
 from .results import NOTHING
-from .segment.sample import Sampling
-from .surface.voxels import boundary, voxel_surface
+from .segmentation.sample import Sampling
 
 if TYPE_CHECKING:
     from .account import Account
+    from .isosurface.voxels import Boundary, VoxelSurface
     from .progress import Progress
-    from .segment.chosen import Chosen
+    from .segmentation.selection import Chosen
     from .settings import Settings
-    from .surface.voxels import Boundary, VoxelSurface
 
 
 def find_boundary(chosen: Chosen, settings: Settings, account: Account) -> Boundary:

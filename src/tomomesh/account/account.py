@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from ..model.mesh import TriMesh
     from ..model.points import PointSet
-    from ..segment.sample import Sampling
+    from ..segmentation.sample import Sampling
     from ..settings import Settings
 
 SECTIONS = (

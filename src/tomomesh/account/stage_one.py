@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..measure.rings import assess_contours
-from ..segment.select import labels_in
-from ..segment.som.schedules import schedule_warning
+from ..segmentation.labels import labels_in
+from ..som.schedules import schedule_warning
 from .ledger import Ledger
 
 if TYPE_CHECKING:
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from ..model.contours import Contours
     from ..model.networks import Networks, SpaceNetwork
     from ..model.volume import Volume
-    from ..segment.chosen import Chosen
-    from ..segment.window import Limit
+    from ..segmentation.selection import Chosen
+    from ..segmentation.window import Limit
 
 LEFT_OUT = 0.01
 """Share of the window in small pieces over which a network in space is warned of."""

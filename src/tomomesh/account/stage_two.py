@@ -12,15 +12,15 @@ from .ledger import Ledger
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..contours.slices import Slices
+    from ..contours.stack import ContourSurface
+    from ..cuberille.leak_test import Held
+    from ..dynamics.moving_least_squares import Draped
+    from ..isosurface.voxels import Boundary, VoxelSurface
     from ..model.mesh import TriMesh
     from ..model.points import PointSet
     from ..model.trace import Trace
-    from ..surface.contours import ContourSurface
-    from ..surface.drape import Draped
-    from ..surface.holding import Held
-    from ..surface.samples import Samples
-    from ..surface.slices import Slices
-    from ..surface.voxels import Boundary, VoxelSurface
+    from ..pointcloud.samples import Samples
 
 DRAWN = 0.9
 """Share of the vertices that must have a point near them, else a result is warned of."""

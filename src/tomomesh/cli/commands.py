@@ -63,7 +63,7 @@ def given_of(chosen: Namespace) -> dict[str, Any]:
 def _demo(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     folder = check_folder(chosen.output)
-    from ..phantom import phantom
+    from ..head_phantom import phantom
     from ..pipeline import reconstruct
 
     with Bars(quiet=chosen.quiet) as progress:
@@ -142,8 +142,8 @@ def _network(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     folder = check_folder(chosen.output)
     check_files(chosen)
-    from ..segment.region import train_region
-    from ..segment.shapes import SHAPES, shape
+    from ..som.region import train_region
+    from ..som.shapes import SHAPES, shape
     from .pictures import film_of_network, pictures_of_network
 
     given = chosen.region in SHAPES
@@ -170,8 +170,8 @@ def _window_of_picture(path: str, settings: Settings) -> NDArray[np.float64]:
     """Return the window's pixels of one picture as (column, -row[, layer]), so that up stays up."""
     import numpy as np
 
-    from ..segment.signal import pixels_of
-    from ..segment.window import by_layer, choose_window, window
+    from ..segmentation.signal import pixels_of
+    from ..segmentation.window import by_layer, choose_window, window
 
     picture = io.read_picture(path)
     lower, upper = choose_window(picture, settings.window)

@@ -61,8 +61,8 @@ def _rename(found: dict[str, Any], study: str, name: str) -> None:
 
 def _surveyed(study: str, settings: Settings, listing: Listing) -> tuple[dict[str, Any], TomomeshError | None]:
     """Return what is in a study, or the error that refuses it; a single file that is broken says nothing more."""
-    from ..segment.crop import crop
-    from ..segment.survey import survey
+    from ..segmentation.crop import crop
+    from ..segmentation.survey import survey
 
     try:
         volume = io.read_volume(study, settings=settings.read)

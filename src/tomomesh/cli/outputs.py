@@ -151,7 +151,7 @@ def _write_mask(surface: Surface, path: str | Path, settings: Settings) -> dict[
 
 def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
     """Return what the format keeps beside the mesh: what is known of the points, and which faces were filled."""
-    from ..surface.attributes import carry
+    from ..pointcloud.attributes import carry
 
     points = surface.points
     kept = {name: values for name, values in points.attributes.items() if io.keeps(output, name)}

@@ -9,8 +9,6 @@ import numpy as np
 from ..model.lattice import Lattice
 from ..model.networks import Networks
 from ..model.points import PointSet
-from ..segment.som.fit import match
-from ..segment.som.snapshots import snapshots
 from ..show import draw_all
 from ..show.film import film
 from ..show.gallery import median_slice
@@ -18,6 +16,8 @@ from ..show.maps import SHEETS, draw_maps
 from ..show.plane import Plane
 from ..show.render import View
 from ..show.topologies import draw_adapted, draw_update_regions
+from ..som.fit import match
+from ..som.snapshots import snapshots
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..results import Segmentation, Surface
-    from ..segment.region import TrainedNetwork
     from ..settings import Settings
+    from ..som.region import TrainedNetwork
 
 FRAMES = 40
 """Most looks at a network that is filmed."""

@@ -15,7 +15,7 @@ from numba.core import config
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
-SOURCES = sha256(b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))).hexdigest()[:12]
+SOURCES = sha256(b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py")))).hexdigest()[:12]
 """What the kernels are: Numba looks at a kernel's own file only, not at the kernels that it calls."""
 CACHE = Path(platformdirs.user_cache_dir("tomomesh")) / f"kernels-numba-{numba.__version__}-{SOURCES}"
 

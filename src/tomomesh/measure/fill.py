@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import GeometryError
-from ..kernels.fill import add_walls
+from ..kernels.measure.fill import add_walls
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

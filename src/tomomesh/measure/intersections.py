@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.intersections import mark_intersections
+from ..kernels.measure.intersections import mark_intersections
 from ..kernels.threads import in_blocks
 from ..model.columns import any_of
 from ..progress import Progress, silent

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.edges import count_misoriented, join_borders, join_corners, join_vertices, order_half_edges
+from ..kernels.measure.edges import count_misoriented, join_borders, join_corners, join_vertices, order_half_edges
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.shapes import edge_shapes, face_shapes, face_sizes
+from ..kernels.measure.shapes import edge_shapes, face_shapes, face_sizes
 from ..kernels.threads import in_blocks
 from .links import Links
 

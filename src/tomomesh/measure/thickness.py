@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.balls import enclose_slabs, grow_balls
+from ..kernels.measure.balls import enclose_slabs, grow_balls
 from ..kernels.threads import in_blocks
 from ..progress import Progress, silent
 from .tree import Tree

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InternalCheckError
-from ..kernels.positions import first_alike
+from ..kernels.measure.positions import first_alike
 from ..model.mesh import TriMesh
 from .links import Links
 from .shape import areas_and_volumes

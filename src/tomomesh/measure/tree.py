@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.bvh import curve_keys, enclose_leaves, enclose_nodes, order_keys
+from ..kernels.measure.bvh import curve_keys, enclose_leaves, enclose_nodes, order_keys
+from ..kernels.measure.triangles import nearest_simplices
 from ..kernels.threads import in_blocks
-from ..kernels.triangles import nearest_simplices
 from ..progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Tree:
     order : (m,) int32 array
         The number that each had before.
     boxes : (4 P, 3) float array
-        See `tomomesh.kernels.bvh`.
+        See `tomomesh.kernels.measure.bvh`.
     """
 
     vertices: Floats

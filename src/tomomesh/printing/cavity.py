@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import EmptyError
+from ..isosurface.voxels import boundary, voxel_surface
+from ..isosurface.well_composed import without_contacts
 from ..model.mesh import TriMesh
 from ..model.volume import Volume
 from ..settings import FitSettings
-from ..surface.contacts import without_contacts
-from ..surface.voxels import boundary, voxel_surface
 from .depth import deep_inside, depth_near
 from .solids import mesh_of, solid_of
 

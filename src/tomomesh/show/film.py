@@ -56,7 +56,7 @@ def film(
     region : (n, 2) or (n, 3) float array
         The input signal.
     codebooks : (s, u, 2) or (s, u, 3) float array
-        Positions of the neurons, the start first; as `tomomesh.segment.som.snapshots.snapshots` keeps them, or a
+        Positions of the neurons, the start first; as `tomomesh.som.snapshots.snapshots` keeps them, or a
         ``callback`` of `tomomesh.SOM`.
     network : Lattice
         Which neurons are neighbors.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..surface.section import section
+from ..measure.section import section
 from .contact import COLUMNS, pages, scale_bar, write_beside
 from .marks import lines
 from .plane import Plane, contrast, gray

@@ -1,0 +1,1 @@
+"""Stacks of contours: their slices, their rings, their insides, and the shape between them."""

@@ -1,0 +1,232 @@
+"""From a stack of contours to a closed surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import pdist, squareform
+
+from ..errors import EmptyError, GeometryError
+from ..isosurface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
+from ..kernels.threads import in_blocks
+from ..model.volume import Grid, Volume
+from ..progress import Progress, silent
+from ..settings import FitSettings
+from .curves import DENSE, fine_curve
+from .rings import Outline, nested, outline
+from .shape_interpolation import Stack, filled_between
+from .tracks import Part, link_slices
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from ..model.mesh import TriMesh
+    from .slices import Slices
+
+    Floats = NDArray[np.float64]
+
+MOST_VOXELS = 60_000_000
+"""Voxels of the interpolated volume, over which they are made larger."""
+COARSER = 1.02
+"""Factor by which they are, as often as it takes."""
+SPRINGS = 0.4
+"""Share of the springs' stiffness: interpolated distances are smooth, and small parts should keep their width."""
+MEASURED = 0.75
+"""Faces farther than this from every point, in slice distances, are filled rather than measured."""
+
+
+@dataclass(frozen=True)
+class ContourSurface:
+    """The surface of a stack of contours.
+
+    Attributes
+    ----------
+    boundary : Boundary
+        The interpolated volume's boundary.
+    rest : VoxelSurface
+        The net around it at rest.
+    filled : (m,) bool array
+        Faces that are far from every point: on the ends of parts, and where slices are missing.
+    slices, contours, open : int
+        Planes, contours, and those among them that did not close by themselves.
+    reach : float
+        Longest gap that was closed, in local sampling distances.
+    edge, asked_edge : float
+        Edge of the voxels, and what it would be without a limit on the memory.
+    voxels : int
+        Voxels interpolated.
+    """
+
+    boundary: Boundary
+    rest: VoxelSurface
+    filled: NDArray[np.bool_]
+    slices: int
+    contours: int
+    open: int
+    reach: float
+    edge: float
+    asked_edge: float
+    voxels: int
+
+    @property
+    def mesh(self) -> TriMesh:
+        """The surface."""
+        return self.rest.mesh
+
+
+def contour_surface(
+    points: Floats,
+    slices: Slices,
+    *,
+    edge: float | None = None,
+    allow_leaks: bool = False,
+    fit: FitSettings | None = None,
+    threads: int = 0,
+    progress: Progress = silent,
+) -> ContourSurface:
+    """Close the surface of a stack of contours.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+    slices : Slices
+        As `find_slices` finds them.
+    edge : float, optional
+        Edge of the voxels; the sampling distance within the slices where not given.
+    allow_leaks : bool
+        Close open contours by their chord.
+    fit : FitSettings, optional
+    threads : int
+    progress : callable
+
+    Returns
+    -------
+    ContourSurface
+
+    Raises
+    ------
+    GeometryError
+        Where a contour does not close; names the height of its slice.
+    EmptyError
+        Where no contour encloses anything.
+    """
+    placed = slices.placed(points)
+    planar = [np.unique(placed[slices.labels == k, :2], axis=0) for k in range(len(slices.heights))]
+    found: list[Outline] = [outline(planar[0][:0])] * len(planar)
+
+    def work(start: int, stop: int) -> None:
+        for k in range(start, stop):
+            rings = [slices.placed(ring)[:, :2] for ring in slices.rings[k]] if slices.rings else []
+            planar[k], found[k] = _known(rings) if rings else _outlined(planar[k], allow_leaks)
+
+    in_blocks(work, len(planar), block=1, threads=threads, done=lambda n: progress("contours", n, len(planar)))
+    _refuse_open(found, slices, allow_leaks)
+    asked = edge or slices.spacing
+    stack = _stack(planar, found, slices, asked)
+    levels = filled_between(stack, threads=threads, progress=progress)
+    np.negative(levels, out=levels)
+    volume = _volume(levels, stack, slices)
+    edges = boundary(volume, levels > 0, lower=0.0, threads=threads)
+    fit = fit or FitSettings()
+    softer = replace(fit, stiffness=SPRINGS * fit.stiffness)
+    rest = voxel_surface(edges, softer, threads=threads, progress=progress)
+    centers = rest.mesh.corners.mean(axis=1)
+    measured = _along(stack, slices) if slices.rings else points
+    away, _ = cKDTree(measured).query(centers, distance_upper_bound=MEASURED * slices.distance)
+    return ContourSurface(
+        edges, rest, np.isinf(away), len(planar),
+        sum(len(outlined.rings) for outlined in found), sum(len(outlined.open) for outlined in found),
+        max(outlined.reach for outlined in found), stack.edge, asked, levels.size,
+    )  # fmt: skip
+
+
+def _known(rings: Sequence[Floats]) -> tuple[Floats, Outline]:
+    """Return the points of rings that are known, each once, and the outline along them."""
+    curves = [ring[(ring != np.roll(ring, 1, axis=0)).any(axis=1)] for ring in rings]
+    return np.concatenate(curves), nested(curves)
+
+
+def _outlined(points: Floats, allow_leaks: bool) -> tuple[Floats, Outline]:
+    """Return the outline of a slice, and its points with those of the chords that close it."""
+    found = outline(points)
+    if not (found.open and allow_leaks):
+        return points, found
+    chords = [_chord(points[numbers]) for numbers in found.open]
+    closed = np.unique(np.concatenate([points, *chords]), axis=0)
+    again = outline(closed)
+    return closed, Outline(again.rings, again.parts, found.open, again.reach)
+
+
+def _chord(curve: Floats) -> Floats:
+    """Return points from one end of an open curve (p, 2) to the other, as far apart as its own."""
+    distance = np.asarray(cKDTree(curve).query(curve, k=[2])[0])
+    tree = minimum_spanning_tree(squareform(pdist(curve)))
+    ways = dijkstra(tree, directed=False)
+    first = int(np.argmax(ways[0]))
+    last = int(np.argmax(ways[first]))
+    way = curve[last] - curve[first]
+    count = int(np.hypot(*way) / np.median(distance))
+    return np.asarray(curve[first] + np.arange(1, count)[:, None] / max(count, 1) * way)
+
+
+def _refuse_open(found: list[Outline], slices: Slices, allow_leaks: bool) -> None:
+    opened = [k for k, outlined in enumerate(found) if outlined.open]
+    if opened and not allow_leaks:
+        middle = slices.origin + slices.heights[opened[0]] * slices.normal
+        raise GeometryError(
+            "a contour of the stack does not close",
+            found=f"slice at {slices.normal @ middle:.6g} along ({', '.join(f'{n:.3g}' for n in slices.normal)}), "
+            f"{len(opened)} of {len(found)} slices",
+            expected="contours whose gaps are narrower than their inside",
+            hint="--allow-leaks, which closes them by their chords",
+        )
+
+
+def _stack(planar: list[Floats], found: list[Outline], slices: Slices, edge: float) -> Stack:
+    """Link the parts of all slices."""
+    parts = [_parts(points, outlined, DENSE * edge) for points, outlined in zip(planar, found, strict=True)]
+    whole = [k for k, inside in enumerate(parts) if inside]
+    if len(whole) < 2:
+        raise EmptyError("the contours enclose nothing", expected="at least two slices with closed contours")
+    kept = [parts[k] for k in whole]
+    heights = slices.heights[whole]
+    stack = Stack(kept, link_slices(kept, heights, edge), heights, edge)
+    while np.prod(stack.shape) > MOST_VOXELS:
+        stack = replace(stack, edge=COARSER * stack.edge)
+    return stack
+
+
+def _along(stack: Stack, slices: Slices) -> Floats:
+    """Return places about a voxel apart along the curves of all slices, in space."""
+    step = round(1 / DENSE)
+    curves = [
+        (curve[::step], h)
+        for h, parts in zip(stack.heights, stack.slices, strict=True)
+        for p in parts
+        for curve in p.curves
+    ]
+    placed = np.concatenate([np.column_stack([curve, np.full(len(curve), height)]) for curve, height in curves])
+    return np.asarray(slices.origin + placed @ slices.axes)
+
+
+def _parts(points: Floats, outlined: Outline, distance: float) -> list[Part]:
+    """Draw the rings of a slice finely, and gather those around one part; ordered by the parts' places."""
+    curves: dict[int, list[Floats]] = {}
+    for ring, part in zip(outlined.rings, outlined.parts, strict=True):
+        curves.setdefault(part, []).append(fine_curve(points[ring], distance))
+    parts = [part for part in map(Part.within, curves.values()) if part.moments.area > 0]
+    return sorted(parts, key=lambda part: tuple(part.moments.center))
+
+
+def _volume(levels: NDArray[np.float32], stack: Stack, slices: Slices) -> Volume:
+    """Place the interpolated voxels in space."""
+    affine = np.eye(4)
+    affine[:3, :3] = slices.axes.T * stack.edge
+    affine[:3, 3] = slices.origin + slices.axes.T @ stack.low
+    return Volume(levels, affine, Grid((0, 1, 2), (False, False, False), affine))

@@ -1,0 +1,1 @@
+"""PointSet -> cubes -> closed shell -> square faces: partition, closing, leak test, cuberille."""

@@ -1,0 +1,130 @@
+"""Close the gaps of a shell of cubes, and find what it keeps the outside from.
+
+Topology comes from a coarser scale than geometry: the cubes are dilated until the outside no longer reaches the
+inside, and what was added is taken away again from the outside only (a morphological closing).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.cuberille.bitmasks import compose, flood
+from ..kernels.cuberille.cells import label_components
+from ..model.cubes import keys_of
+from .bitmasks import Blocks
+from .neighbors import FACE_COLUMNS, neighbor_table
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .bitmasks import Board
+
+NEAR = 2
+"""Steps, beyond twice the dilation, from enclosed space within which an occupied cube counts as near it: noise may
+make a shell two cubes thick, and a dilation leaves little of what is enclosed."""
+ROOM = 0.005
+"""Cubes of a piece of enclosed space, over the occupied ones, under which it is a pocket."""
+
+
+@dataclass(frozen=True)
+class Shell:
+    """A closed set of cubes, and what became of the space around it.
+
+    Attributes
+    ----------
+    blocks : Blocks
+    occupied : board
+        Cubes that hold points.
+    solid : board
+        The objects, filled: all that the outside does not reach.
+    witnesses : board
+        Occupied cubes that tell of an inside: near space that the dilation left empty and the outside does not
+        reach.
+    within : (c, 3) int64 array
+        Occupied cubes inside the objects, that belong to nothing that the outside reaches: objects in cavities.
+    closing : int
+        Cubes by which the shell was dilated and eroded.
+    added : int
+        Cubes that were filled to make the solid well composed.
+    """
+
+    blocks: Blocks
+    occupied: Board
+    solid: Board
+    witnesses: Board
+    within: NDArray[np.int64]
+    closing: int
+    added: int
+
+
+def close_shell(cells: NDArray[np.int64], closing: int, *, threads: int = 0) -> Shell:
+    """Dilate the shell, let the outside in, and take back from the outside what the dilation added.
+
+    Parameters
+    ----------
+    cells : (c, 3) int64 array
+        Positions (x, y, z) of the cubes that hold points, or that are known to lie on the surface.
+    closing : int
+        Cubes by which the shell is dilated.
+    threads : int
+
+    Returns
+    -------
+    Shell
+        Its solid is well composed: no two of its cubes, nor two empty ones, touch along an edge or at a corner
+        only, so that its surface is a 2-manifold.
+
+    Notes
+    -----
+    The outside takes back no cube that lines enclosed space, or the erosion would open what the dilation closed.
+    """
+    blocks = Blocks.around(cells, closing + NEAR, threads=threads)
+    occupied = blocks.board_of(cells)
+    dilated = blocks.grown(occupied, closing)
+    outside = blocks.beyond()
+    flood(~dilated, blocks.table, outside)
+    enclosed = ~(dilated | outside)
+    lining = blocks.grown(enclosed)
+    outside = blocks.spread(outside, dilated & ~occupied & ~lining, closing)
+    solid, added = _well_composed(blocks, ~outside)
+    reached = blocks.grown(outside) & dilated
+    flood(dilated, blocks.table, reached)
+    within = blocks.cells(occupied & ~reached)
+    near = blocks.spread(_roomy(blocks, enclosed, ROOM * len(cells)), solid, 2 * closing + NEAR)
+    return Shell(blocks, occupied, solid, occupied & near, within, closing, added)
+
+
+def _roomy(blocks: Blocks, enclosed: Board, least: float) -> Board:
+    """Leave out the small pieces of enclosed space: pockets in a thick wall tell of no inside."""
+    large = blocks.empty()
+    large[len(blocks) :] = enclosed[len(blocks) :]
+    flood(enclosed, blocks.table, large)
+    cells = blocks.cells(enclosed & ~large)
+    if len(cells) == 0:
+        return large
+    keys = keys_of(cells)
+    order = np.argsort(keys)
+    labels = np.full(len(keys), -1, np.int32)
+    table = np.ascontiguousarray(neighbor_table(keys[order])[:, FACE_COLUMNS])
+    label_components(table, np.ones(len(keys), np.bool_), labels)
+    kept = (np.bincount(labels) >= least)[labels]
+    return large | blocks.board_of(cells[order][kept])
+
+
+def _well_composed(blocks: Blocks, solid: Board) -> tuple[Board, int]:
+    """Fill contacts along edges and at corners until there are none; return how many cubes that took.
+
+    What is filled may shut a pocket off from the outside, which then belongs to the solid.
+    """
+    total = 0
+    while True:
+        filled, near = solid.copy(), blocks.grown(solid) & ~solid
+        added = compose(solid, blocks.table, near, filled, 0, len(blocks))
+        if not added:
+            return solid, total
+        outside = blocks.beyond()
+        flood(~filled, blocks.table, outside)
+        solid, total = ~outside, total + added

@@ -1,0 +1,1 @@
+"""The dynamic mesh: masses on springs, drawn to points or to the surface under them, and taken back where it folds."""

@@ -1,0 +1,54 @@
+"""Undo the fit where it made vertices meet or a component fall flat."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from .low_pass import adjacency
+
+if TYPE_CHECKING:
+    from ..model.mesh import TriMesh
+
+CLOSE = 1e-4
+"""Distance, over the median edge, under which two vertices count as meeting: far above what 32 bits lose."""
+BACK = 1 / 16
+"""Share of the way back to its smoothed place that a vertex takes where it meets another."""
+MOST = 32
+"""Steps back, after which a vertex is all but there."""
+
+
+def without_collapse(smoothed: TriMesh, fitted: TriMesh) -> tuple[TriMesh, int]:
+    """Keep vertices apart, and components from falling flat.
+
+    Vertices that are drawn to the same point may come to rest at one place, and a small component whose vertices
+    are all drawn to a few points may turn inside out. The first go back a little towards their smoothed places,
+    the second all the way.
+
+    Parameters
+    ----------
+    smoothed, fitted : TriMesh
+        The same faces before and after the fit.
+
+    Returns
+    -------
+    mesh : TriMesh
+    collapsed : int
+        Components taken back to their smoothed shape.
+    """
+    count, label = connected_components(adjacency(smoothed.edges, len(smoothed.vertices)), directed=False)
+    owner = label[smoothed.faces[:, 0]]
+    before, after = (np.bincount(owner, mesh.face_volumes, count) for mesh in (smoothed, fitted))
+    turned = before * after <= 0
+    vertices = np.where(turned[label][:, None], smoothed.vertices, fitted.vertices)
+    ends = smoothed.vertices[smoothed.edges]
+    close = CLOSE * float(np.median(np.sqrt(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1))))
+    for _ in range(MOST):
+        meeting = np.unique(cKDTree(vertices).query_pairs(close, output_type="ndarray"))
+        if len(meeting) == 0:
+            break
+        vertices[meeting] += BACK * (smoothed.vertices[meeting] - vertices[meeting])
+    return fitted.moved(vertices), int(turned.sum())

@@ -1,0 +1,1 @@
+"""The boundary of a window's own voxels, where gray levels cross its bounds."""

@@ -1,0 +1,130 @@
+"""Triangles from the squares of a net, without self-intersections, and placed in space."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.isosurface.diagonals import NEITHER, OPEN, allow_diagonals, choose_diagonals
+from ..kernels.threads import in_blocks
+from ..model.mesh import TriMesh
+from .surface_nets import BLOCK
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .crossings import Crossings
+    from .surface_nets import Net, Rest
+
+ROUNDS = (0, 1, 0)
+"""Squares of even and of odd number choose in turn, with regard to those that have chosen; more change little."""
+
+
+def triangulated(
+    net: Net, rest: Rest, crossings: Crossings, affine: NDArray[np.float64], threads: int = 0
+) -> tuple[TriMesh, TriMesh, NDArray[np.int32]]:
+    """Split every square by the diagonal that bends it least, and place the net before and after in space.
+
+    Where neither diagonal would keep a square between its two voxels, it is split into four at its crossing. So no
+    two faces meet but at their sides: a square stays in the octahedron of its two voxels and its four vertices, each
+    in a cell of its own, and the octahedra do not overlap (after Ju & Udeshi 2006).
+
+    Parameters
+    ----------
+    net : Net
+    rest : Rest
+    crossings : Crossings
+    affine : (4, 4) float array
+        Voxel indices to millimeters.
+    threads : int
+
+    Returns
+    -------
+    start, mesh : TriMesh
+        The same faces over the vertices before and after: two a square in the order of the squares, then the other
+        two of those that are split into four, whose crossings are the last vertices.
+    fours : (f,) int32 array
+        The squares that are split into four.
+    """
+    before, after = (placed(indices, affine, threads) for indices in (rest.start, rest.positions))
+    choice = _diagonals(net, rest, crossings, after, threads)
+    halves = _halves(net.quads, choice, threads)
+    fours = np.flatnonzero(choice == NEITHER).astype(np.int32)
+    quarters = _quarters(net.quads[fours], len(after))
+    halves[fours] = quarters[:, :2]
+    faces = np.concatenate([halves.reshape(-1, 3), quarters[:, 2:].reshape(-1, 3)])
+    faces = faces if right_handed(affine) else np.ascontiguousarray(faces[:, ::-1])
+    added = placed(crossings.positions[fours], affine, threads)
+    start, mesh = (TriMesh(np.concatenate([vertices, added]), faces) for vertices in (before, after))
+    return start, mesh, fours
+
+
+def _diagonals(
+    net: Net, rest: Rest, crossings: Crossings, after: NDArray[np.float64], threads: int
+) -> NDArray[np.uint8]:
+    """Choose a diagonal for every square, (q,): 0, 1 or `NEITHER`."""
+    allowed = np.empty(len(net.quads), np.uint8)
+
+    def allow(start: int, stop: int) -> None:
+        allow_diagonals(rest.positions, net.quads, crossings.positions, net.directions, allowed, start, stop)
+
+    in_blocks(allow, len(allowed), block=BLOCK, threads=threads)
+    choice = np.where(allowed > 0, OPEN, NEITHER).astype(np.uint8)
+    for parity in ROUNDS:
+        choice = _chosen(net, after, allowed, choice, parity, threads)
+    return choice
+
+
+def _chosen(
+    net: Net,
+    after: NDArray[np.float64],
+    allowed: NDArray[np.uint8],
+    choice: NDArray[np.uint8],
+    parity: int,
+    threads: int,
+) -> NDArray[np.uint8]:
+    """Let the squares of even or odd number choose."""
+    chosen = np.empty_like(choice)
+
+    def work(start: int, stop: int) -> None:
+        choose_diagonals(after, net.quads, net.fans, allowed, choice, chosen, parity, start, stop)
+
+    in_blocks(work, len(choice), block=BLOCK, threads=threads)
+    return chosen
+
+
+def _halves(quads: NDArray[np.int32], choice: NDArray[np.uint8], threads: int) -> NDArray[np.int64]:
+    """Split squares (q, 4) by the diagonal from corner 0 or 1 into two triangles each: (q, 2, 3)."""
+    halves = np.empty((len(quads), 6), np.int64)
+
+    def work(start: int, stop: int) -> None:
+        turned = (choice[start:stop] == 1)[:, None]
+        part = quads[start:stop]
+        halves[start:stop] = np.where(turned, part[:, [1, 2, 3, 1, 3, 0]], part[:, [0, 1, 2, 0, 2, 3]])
+
+    in_blocks(work, len(quads), block=BLOCK, threads=threads)
+    return halves.reshape(-1, 2, 3)
+
+
+def _quarters(quads: NDArray[np.int32], first: int) -> NDArray[np.int64]:
+    """Split squares (q, 4) into four triangles each at centers that are numbered from `first`: (q, 4, 3)."""
+    centers = np.broadcast_to(first + np.arange(len(quads))[:, None], quads.shape)
+    return np.stack([quads, np.roll(quads, -1, axis=1), centers], axis=2).astype(np.int64)
+
+
+def placed(indices: NDArray[np.float64], affine: NDArray[np.float64], threads: int = 0) -> NDArray[np.float64]:
+    """Carry indices (n, 3) to millimeters; in blocks, for which one thread is quicker than a matrix library's many."""
+    found, turn = np.empty_like(indices), np.ascontiguousarray(affine[:3, :3].T)
+
+    def work(start: int, stop: int) -> None:
+        np.matmul(indices[start:stop], turn, out=found[start:stop])
+        found[start:stop] += affine[:3, 3]
+
+    in_blocks(work, len(indices), block=BLOCK, threads=threads)
+    return found
+
+
+def right_handed(affine: NDArray[np.float64]) -> bool:
+    """Tell whether the axes of the indices are right-handed in space."""
+    return bool(np.linalg.det(affine[:3, :3]) > 0)

@@ -1,0 +1,169 @@
+"""The window's boundary itself as a surface, without networks: gray levels interpolated at the window's bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import ndimage
+
+from ..kernels.cuberille.cells import label_components
+from ..model.mesh import QuadMesh
+from ..model.points import PointSet
+from ..progress import Progress, silent
+from .crossings import Crossings, Levels, crossings
+from .diagonals import placed, right_handed, triangulated
+from .surface_nets import Net, Rest, net_around, settle
+from .well_composed import without_contacts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.mesh import TriMesh
+    from ..model.volume import Volume
+    from ..settings import FitSettings
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """The faces between the voxels of a window and those outside, and where the gray levels cross its bounds.
+
+    Attributes
+    ----------
+    volume : Volume
+    net : Net
+    crossings : Crossings
+        One a face.
+    added : int
+        Voxels added so that no two touch along an edge or at a corner alone.
+    """
+
+    volume: Volume
+    net: Net
+    crossings: Crossings
+    added: int
+
+    @cached_property
+    def points(self) -> PointSet:
+        """The crossings in patient millimeters."""
+        none = np.full(len(self.net.quads), -1, np.int32)
+        return PointSet(placed(self.crossings.positions, self.volume.affine), none, none, self.crossings.kinds)
+
+    @cached_property
+    def cuberille(self) -> QuadMesh:
+        """The faces themselves; ``cubes`` are the numbers of the voxels (K, J, I) behind them."""
+        net, (_, rows, columns) = self.net, self.volume.shape
+        outward = slice(None, None, 1 if right_handed(self.volume.affine) else -1)
+        x, y, z = net.inner.T.astype(np.int64)
+        corners = placed(net.low + 0.5, self.volume.affine)
+        return QuadMesh(corners, net.quads[:, outward].astype(np.int64), (z * rows + y) * columns + x)
+
+    @cached_property
+    def volumes(self) -> NDArray[np.int64]:
+        """Signed volume of every surface in voxels, exactly: the sum of x over its faces across x; (s,)."""
+        label = np.full(len(self.net.links), -1, np.int32)
+        count = label_components(self.net.links, np.ones(len(label), np.bool_), label)
+        across = np.flatnonzero(self.net.directions < 2)
+        upward = self.net.directions[across] == 1
+        height = np.where(upward, self.net.inner[across, 0] + 1, -self.net.inner[across, 0])
+        owner = label[self.net.quads[across, 0]]
+        return np.bincount(owner, height, count).astype(np.int64)
+
+    @property
+    def cavities(self) -> int:
+        """Linings of cavities among the surfaces."""
+        return int((self.volumes < 0).sum())
+
+
+def boundary(
+    volume: Volume,
+    mask: NDArray[np.bool_],
+    *,
+    lower: float | NDArray[np.float64] = -np.inf,
+    upper: float | NDArray[np.float64] = np.inf,
+    layers: str = "all",
+    surface: str = "all",
+    threads: int = 0,
+) -> Boundary:
+    """Find the boundary of a window, and where the gray levels cross its bounds.
+
+    Parameters
+    ----------
+    volume : Volume
+    mask : (K, J, I) bool array
+        The voxels with lower < k <= upper, one at least. What surrounds the volume is background.
+    lower, upper : float or (L,) float array
+    layers : {"all", "any"}
+        Whether a voxel is kept where all its layers lie in their windows, or one at least.
+    surface : {"all", "outer"}
+        All surfaces, or those that nothing surrounds.
+    threads : int
+
+    Returns
+    -------
+    Boundary
+        A closed 2-manifold.
+
+    Raises
+    ------
+    ResourceError
+        Where the boundary would not fit into the memory.
+    """
+    levels, padded = Levels(volume.voxels, lower, upper, layers), np.pad(mask, 1)
+    joined = without_contacts(padded, lambda voxels: levels.excess(voxels - np.int32(1)), threads)
+    net = net_around(_filled(joined) if surface == "outer" else joined, threads)
+    x, y, z = (net.inner + 1).T
+    found = crossings(levels, net.inner, net.steps, ~padded[z, y, x])
+    return Boundary(volume, net, found, int(np.count_nonzero(joined) - np.count_nonzero(padded)))
+
+
+def _filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Fill what the outside does not reach; a mask without contacts stays without them."""
+    background, _ = ndimage.label(~mask)
+    return np.asarray(background != background[0, 0, 0])
+
+
+@dataclass(frozen=True)
+class VoxelSurface:
+    """A net at rest in patient millimeters.
+
+    Attributes
+    ----------
+    smoothed, mesh : TriMesh
+        The surface before and after the fit, with the same faces.
+    nearest : (n,) int32 array
+        A crossing that draws each vertex.
+    rest : Rest
+    """
+
+    smoothed: TriMesh
+    mesh: TriMesh
+    nearest: NDArray[np.int32]
+    rest: Rest
+
+
+def voxel_surface(
+    found: Boundary, settings: FitSettings, *, threads: int = 0, progress: Progress = silent
+) -> VoxelSurface:
+    """Let a net around the voxels come to rest on the crossings, and split its squares into triangles.
+
+    Parameters
+    ----------
+    found : Boundary
+    settings : FitSettings
+        Stiffness, tolerance and most steps.
+    threads : int
+    progress : callable
+
+    Returns
+    -------
+    VoxelSurface
+        Closed, 2-manifold, outward but for the linings of cavities, and without self-intersections.
+    """
+    net = found.net
+    rest = settle(net, found.crossings, settings, threads=threads, progress=progress)
+    smoothed, mesh, fours = triangulated(net, rest, found.crossings, found.volume.affine, threads)
+    nearest = np.concatenate([net.fans[:, 0], fours])
+    return VoxelSurface(smoothed, mesh, nearest, rest)

@@ -1,0 +1,1 @@
+"""Cubes as rising keys, and as bits."""

@@ -1,0 +1,1 @@
+"""Springs, squares, and projections onto the surface under samples."""

@@ -1,0 +1,158 @@
+"""Loops over the squares of a net, whose vertices each stay in a cell of their own: by which diagonal to split them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..compile import kernel
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+APART = 1e-9
+"""Volume over which four points count as turning the right way, in cells: far above what rounding leaves."""
+NEITHER, OPEN = 2, 3
+"""What is chosen for a square that no diagonal may split, and for one that is still to be split."""
+
+
+@kernel("void(f8[:,::1], i4[:,::1], i8, i8, i8, f8[::1])")
+def half_normal(
+    places: NDArray[np.float64], quads: NDArray[np.int32], f: int, turn: int, half: int, normal: NDArray[np.float64]
+) -> None:
+    """Write the normal of half a square, as long as twice its area.
+
+    Square f (of (q, 4), over places (n, 3)) is split between its corners `turn` and `turn` + 2; half 0 has the corner
+    after the first of them.
+    """
+    a, b, c = quads[f, turn], quads[f, turn + 1 + half], quads[f, (turn + 2 + half) % 4]
+    for axis in range(3):
+        p, q = (axis + 1) % 3, (axis + 2) % 3
+        first = (places[b, p] - places[a, p]) * (places[c, q] - places[a, q])
+        normal[axis] = first - (places[b, q] - places[a, q]) * (places[c, p] - places[a, p])
+
+
+@kernel("void(f8[:,::1], i4[:,::1], f8[:,::1], u1[::1], u1[::1], i8, i8)")
+def allow_diagonals(
+    positions: NDArray[np.float64],
+    quads: NDArray[np.int32],
+    crossings: NDArray[np.float64],
+    directions: NDArray[np.uint8],
+    allowed: NDArray[np.uint8],
+    start: int,
+    stop: int,
+) -> None:
+    """Find the diagonals whose two triangles keep the inner voxel of a square behind them, and the outer before.
+
+    Parameters
+    ----------
+    positions : (n, 3) float array
+        The vertices, in voxels.
+    quads : (q, 4) int32 array
+    crossings : (q, 3) float array
+        A place on the line between the two voxels of each square.
+    directions : (q,) uint8 array
+        The direction of that line, from inside to outside.
+    allowed : (q,) uint8 array
+        Result: 1 for the diagonal between corners 0 and 2, and 2 for that between 1 and 3, added.
+    start, stop : int
+        Squares to work on.
+
+    Notes
+    -----
+    The two voxels and the four vertices around the line between them make an octahedron. Where the triangles keep the
+    voxels apart they lie inside it.
+    """
+    normal = np.empty(3)
+    for f in range(start, stop):
+        axis, sign = directions[f] >> 1, 1.0 if directions[f] & 1 else -1.0
+        low = np.floor(crossings[f, axis]) - crossings[f, axis]
+        allowed[f] = 0
+        for turn in range(2):
+            least = np.inf
+            for half in range(2):
+                half_normal(positions, quads, f, turn, half, normal)
+                here = 0.0
+                for n in range(3):
+                    here += normal[n] * (crossings[f, n] - positions[quads[f, turn], n])
+                here += normal[axis] * low
+                least = min(least, -sign * here, sign * (here + normal[axis]))
+            if least > APART:
+                allowed[f] += 1 << turn
+
+
+@kernel("i8(i4[:,::1], i4[:,::1], i8, i8)")
+def across(quads: NDArray[np.int32], fans: NDArray[np.int32], f: int, side: int) -> int:
+    """Return the square beyond a side of square f times four, plus the number of its own side there."""
+    a, b = quads[f, side], quads[f, (side + 1) % 4]
+    for n in range(fans.shape[1]):
+        g = fans[a, n]
+        for other in range(4):
+            if g >= 0 and quads[g, other] == b and quads[g, (other + 1) % 4] == a:
+                return int(4 * g + other)
+    return -1
+
+
+@kernel("f8(f8[::1], f8[::1])")
+def bend(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Return 1 - cos of the angle between two vectors."""
+    dot = square = length = 0.0
+    for axis in range(3):
+        dot += one[axis] * other[axis]
+        square += one[axis] * one[axis]
+        length += other[axis] * other[axis]
+    return float(1.0 - dot / np.sqrt(max(square * length, 1e-300)))
+
+
+@kernel("void(f8[:,::1], i4[:,::1], i4[:,::1], u1[::1], u1[::1], u1[::1], i8, i8, i8)")
+def choose_diagonals(
+    placed: NDArray[np.float64],
+    quads: NDArray[np.int32],
+    fans: NDArray[np.int32],
+    allowed: NDArray[np.uint8],
+    choice: NDArray[np.uint8],
+    chosen: NDArray[np.uint8],
+    parity: int,
+    start: int,
+    stop: int,
+) -> None:
+    """Choose the diagonal of every other square by which it bends least, in itself and towards its four neighbors.
+
+    Parameters
+    ----------
+    placed : (n, 3) float array
+        The vertices in space.
+    quads : (q, 4) int32 array
+    fans : (n, 6) int32 array
+        The squares around each vertex, then -1.
+    allowed : (q,) uint8 array
+        See `allow_diagonals`.
+    choice : (q,) uint8 array
+        How the squares are split: 0 or 1 for the diagonal from that corner, `NEITHER` or `OPEN`. Neighbors that are
+        not split have no say.
+    chosen : (q,) uint8 array
+        Result.
+    parity : int
+        0 or 1: the squares of even or odd number choose, the others keep what they have.
+    start, stop : int
+        Squares to work on.
+    """
+    own, other, bends = np.empty((2, 2, 3)), np.empty(3), np.empty(2)
+    for f in range(start, stop):
+        chosen[f] = choice[f]
+        if f & 1 != parity or allowed[f] == 0:
+            continue
+        for turn in range(2):
+            for half in range(2):
+                half_normal(placed, quads, f, turn, half, own[turn, half])
+            bends[turn] = bend(own[turn, 0], own[turn, 1]) if allowed[f] >> turn & 1 else np.inf
+        for side in range(4):
+            beyond = across(quads, fans, f, side)
+            turned = int(choice[beyond >> 2])
+            if turned >= NEITHER:
+                continue
+            half_normal(placed, quads, beyond >> 2, turned, (beyond - turned & 3) >> 1, other)
+            for turn in range(2):
+                bends[turn] += bend(own[turn, (side - turn & 3) >> 1], other)
+        chosen[f] = bends[1] < bends[0]

@@ -1,0 +1,173 @@
+"""Loops over the voxels of a mask, and over the cells between eight voxels that hold its surface.
+
+The corners of a cell are numbered x + 2 y + 4 z; bit n of its case is set where corner n is inside. Directions are
+numbered -x, +x, -y, +y, -z, +z.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..compile import kernel
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@kernel("i8(b1[:,:,::1], i8, i8, i8)")
+def column_of_corners(mask: NDArray[np.bool_], z: int, y: int, x: int) -> int:
+    """Return the bits of the four corners of a cell that have the smaller x."""
+    near = int(mask[z, y, x]) | int(mask[z, y + 1, x]) << 2
+    return near | int(mask[z + 1, y, x]) << 4 | int(mask[z + 1, y + 1, x]) << 6
+
+
+@kernel("void(b1[:,:,::1], b1[::1], i8[::1], i8, i8)")
+def count_cells(
+    mask: NDArray[np.bool_], wanted: NDArray[np.bool_], count: NDArray[np.int64], start: int, stop: int
+) -> None:
+    """Count the cells of some cases in each layer between two slices.
+
+    Parameters
+    ----------
+    mask : (K, J, I) bool array
+    wanted : (256,) bool array
+        The cases to count.
+    count : (K - 1,) int64 array
+        Result.
+    start, stop : int
+        Layers to work on.
+    """
+    for z in range(start, stop):
+        found = 0
+        for y in range(mask.shape[1] - 1):
+            left = column_of_corners(mask, z, y, 0)
+            for x in range(mask.shape[2] - 1):
+                right = column_of_corners(mask, z, y, x + 1)
+                found += wanted[left | right << 1]
+                left = right
+        count[z] = found
+
+
+@kernel("void(b1[:,:,::1], b1[::1], i8[::1], i4[:,::1], u1[::1], i8, i8)")
+def list_cells(
+    mask: NDArray[np.bool_],
+    wanted: NDArray[np.bool_],
+    first: NDArray[np.int64],
+    cells: NDArray[np.int32],
+    cases: NDArray[np.uint8],
+    start: int,
+    stop: int,
+) -> None:
+    """List the cells of some cases in the order of z, then y, then x.
+
+    Parameters
+    ----------
+    mask, wanted, start, stop
+        As in `count_cells`.
+    first : (K - 1,) int64 array
+        Cells in the layers before.
+    cells : (n, 3) int32 array
+        Result: the voxel (x, y, z) in the lowest corner of each cell.
+    cases : (n,) uint8 array
+        Result.
+    """
+    for z in range(start, stop):
+        n = first[z]
+        for y in range(mask.shape[1] - 1):
+            left = column_of_corners(mask, z, y, 0)
+            for x in range(mask.shape[2] - 1):
+                right = column_of_corners(mask, z, y, x + 1)
+                case = left | right << 1
+                if wanted[case]:
+                    cells[n, 0], cells[n, 1], cells[n, 2] = x, y, z
+                    cases[n] = case
+                    n += 1
+                left = right
+
+
+@kernel("void(u1[::1], i4[:,::1], i8[::1], i4[:,::1], u1[::1], i8, i8)")
+def list_faces(
+    cases: NDArray[np.uint8],
+    table: NDArray[np.int32],
+    first: NDArray[np.int64],
+    quads: NDArray[np.int32],
+    directions: NDArray[np.uint8],
+    start: int,
+    stop: int,
+) -> None:
+    """List the square faces between voxels inside and outside.
+
+    A face crosses the line between two voxels, and its corners are the four cells around that line. The cell whose
+    lowest corner is one of the two voxels owns the face.
+
+    Parameters
+    ----------
+    cases : (n,) uint8 array
+    table : (n, 6) int32 array
+        Neighboring cells by direction.
+    first : (n,) int64 array
+        Faces of the cells before.
+    quads : (q, 4) int32 array
+        Result: the cells around, counter-clockwise seen from outside where the axes are right-handed.
+    directions : (q,) uint8 array
+        Result: the direction from inside to outside.
+    start, stop : int
+        Cells to work on.
+    """
+    for v in range(start, stop):
+        f = first[v]
+        low = cases[v] & 1
+        for axis in range(3):
+            if cases[v] >> (1 << axis) & 1 == low:
+                continue
+            b, c = (axis + 1) % 3, (axis + 2) % 3
+            before = table[v, 2 * b]
+            beside = table[v, 2 * c]
+            quads[f, 0] = v
+            quads[f, 1] = before if low else beside
+            quads[f, 2] = table[before, 2 * c]
+            quads[f, 3] = beside if low else before
+            directions[f] = 2 * axis + low
+            f += 1
+
+
+@kernel("void(u1[::1], i4[:,::1], i8[::1], i4[:,::1], i8, i8)")
+def list_fans(
+    cases: NDArray[np.uint8],
+    table: NDArray[np.int32],
+    first: NDArray[np.int64],
+    fans: NDArray[np.int32],
+    start: int,
+    stop: int,
+) -> None:
+    """List the faces around every cell.
+
+    Parameters
+    ----------
+    cases, table, first, start, stop
+        As in `list_faces`.
+    fans : (n, 6) int32 array
+        Result: the faces that have the cell as a corner, then -1.
+
+    Notes
+    -----
+    In a well-composed set a cell has six faces at most.
+    """
+    for v in range(start, stop):
+        n = 0
+        for edge in range(12):
+            axis = edge >> 2
+            b, c = (axis + 1) % 3, (axis + 2) % 3
+            up, on = edge & 1, edge >> 1 & 1
+            corner = up << b | on << c
+            if cases[v] >> corner & 1 == cases[v] >> (corner | 1 << axis) & 1:
+                continue
+            owner = table[v, 2 * b + 1] if up else v
+            owner = table[owner, 2 * c + 1] if on else owner
+            rank = first[owner]
+            for earlier in range(axis):
+                rank += (cases[owner] ^ cases[owner] >> (1 << earlier)) & 1
+            fans[v, n] = rank
+            n += 1
+        fans[v, n:] = -1

@@ -1,0 +1,1 @@
+"""Triangles: distances, edges, shapes, intersections."""

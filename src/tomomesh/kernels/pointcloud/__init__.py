@@ -1,0 +1,1 @@
+"""Neighbors of points, their spacing, and where they end."""

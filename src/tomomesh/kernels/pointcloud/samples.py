@@ -1,0 +1,326 @@
+"""Loops over points and their neighbors, sought among cubes that are sorted into blocks of 8 x 8 x 8.
+
+The points stand in the order of their blocks, and within a block of their cubes along x, then y, then z. *Blocks*
+are the keys of the occupied ones, rising; the points of cube c of block b are ``start[512 b + c]`` up to
+``start[512 b + c + 1]``. A *frame* is the (4,) array of the lowest corner of cell (0, 0, 0) and the edge of the
+cubes. `tomomesh.pointcloud.search` makes all three.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..compile import kernel
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+
+BITS = 18
+"""Bits of a block's key for each axis."""
+SIGHT = 2.5
+"""Standard deviations of a Gaussian weight that are looked at."""
+MOST = 1024
+"""Neighbors that are looked at; more of them, in a cloud of repeated points, change nothing."""
+ENOUGH, TRIES, WIDER = 9, 3, 1.25
+"""Neighbors that a quadratic needs, how often it looks for them, and how much farther each time."""
+STEEP = 0.35
+"""Slope over which a neighbor does not belong to the surface under a plane."""
+ALIKE = 0.5
+"""Cosine of the angle between normals over which points belong to one sheet."""
+BEND = 8.0
+"""How fast a neighbor's weight falls with 1 - cosine of the angle between the normals."""
+
+
+@kernel("i8(i8[::1], i8)")
+def block_number(blocks: Integers, wanted: int) -> int:
+    """Return the number of a block among the rising ones, -1 where it is not there."""
+    low, high = 0, len(blocks)
+    while low < high:
+        middle = (low + high) >> 1
+        if blocks[middle] < wanted:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < len(blocks) and blocks[low] == wanted else -1
+
+
+@kernel("i8(f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], f8, i8[::1])")
+def gather(
+    points: Floats,
+    blocks: Integers,
+    start: NDArray[np.int32],
+    frame: Floats,
+    place: Floats,
+    radius: float,
+    found: Integers,
+) -> int:
+    """List the points (their first three columns) within a radius of a place; return how many, at most all of `found`.
+
+    Notes
+    -----
+    Cubes that follow each other along x within a block are one range of points.
+    """
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+    for axis in range(3):
+        low[axis] = np.int64(np.floor(max((place[axis] - radius - frame[axis]) / frame[3], 0.0)))
+        high[axis] = np.int64(np.floor((place[axis] + radius - frame[axis]) / frame[3]))
+    count = 0
+    for bz in range(low[2] >> 3, (high[2] >> 3) + 1):
+        for by in range(low[1] >> 3, (high[1] >> 3) + 1):
+            for bx in range(low[0] >> 3, (high[0] >> 3) + 1):
+                block = block_number(blocks, (((bz << BITS) | by) << BITS) | bx)
+                if block < 0:
+                    continue
+                first, last = max(low[0] - 8 * bx, 0), min(high[0] - 8 * bx, 7)
+                for z in range(max(low[2] - 8 * bz, 0), min(high[2] - 8 * bz, 7) + 1):
+                    for y in range(max(low[1] - 8 * by, 0), min(high[1] - 8 * by, 7) + 1):
+                        row = 512 * block + 64 * z + 8 * y
+                        for p in range(start[row + first], start[row + last + 1]):
+                            squared = 0.0
+                            for axis in range(3):
+                                squared += (points[p, axis] - place[axis]) ** 2
+                            if squared <= radius * radius and count < len(found):
+                                found[count] = p
+                                count += 1
+    return count
+
+
+@kernel("void(f8[:,::1], f8[::1])")
+def smallest_axis(matrix: Floats, axis: Floats) -> None:
+    """Find the eigenvector (3,) of the smallest eigenvalue of a symmetric (3, 3) matrix by Jacobi's rotations.
+
+    The matrix is overwritten: its smallest diagonal entry becomes that eigenvalue.
+    """
+    vectors = np.eye(3)
+    for _ in range(8):
+        off = matrix[0, 1] ** 2 + matrix[0, 2] ** 2 + matrix[1, 2] ** 2
+        if off <= 1e-24 * (matrix[0, 0] ** 2 + matrix[1, 1] ** 2 + matrix[2, 2] ** 2):
+            break
+        for i in range(2):
+            for j in range(i + 1, 3):
+                if matrix[i, j] == 0.0:
+                    continue
+                ratio = (matrix[j, j] - matrix[i, i]) / (2 * matrix[i, j])
+                t = 1 / (abs(ratio) + np.sqrt(ratio * ratio + 1))
+                t = -t if ratio < 0 else t
+                c = 1 / np.sqrt(t * t + 1)
+                s = t * c
+                for k in range(3):
+                    a, b = matrix[k, i], matrix[k, j]
+                    matrix[k, i], matrix[k, j] = c * a - s * b, s * a + c * b
+                for k in range(3):
+                    a, b = matrix[i, k], matrix[j, k]
+                    matrix[i, k], matrix[j, k] = c * a - s * b, s * a + c * b
+                    a, b = vectors[k, i], vectors[k, j]
+                    vectors[k, i], vectors[k, j] = c * a - s * b, s * a + c * b
+    least = 0
+    for i in range(1, 3):
+        if matrix[i, i] < matrix[least, least]:
+            least = i
+    matrix[0, 0] = matrix[least, least]
+    for k in range(3):
+        axis[k] = vectors[k, least]
+
+
+@kernel("void(f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], f8[:,::1], i8, i8)")
+def fit_planes(
+    points: Floats,
+    blocks: Integers,
+    start: NDArray[np.int32],
+    frame: Floats,
+    width: Floats,
+    planes: Floats,
+    begin: int,
+    end: int,
+) -> None:
+    """Fit a plane to the neighbors of each point, with Gaussian weights (Hoppe et al. 1992).
+
+    Parameters
+    ----------
+    points : (p, 4) float array
+        Position and mass.
+    blocks, start, frame : arrays
+    width : (p,) float array
+        Standard deviation of the weights; points where it is 0 are passed over.
+    planes : (p, 5) float array
+        Result: unit normal of either sign, height of the plane over the point along it, and the root mean square
+        distance of the neighbors from the plane.
+    begin, end : int
+        Points to work on.
+    """
+    found, weights = np.empty(MOST, np.int64), np.empty(MOST)
+    spread, mean = np.empty((3, 3)), np.empty(3)
+    for p in range(begin, end):
+        if width[p] == 0.0:
+            continue
+        count = gather(points, blocks, start, frame, points[p], SIGHT * width[p], found)
+        total = 0.0
+        mean[:] = 0.0
+        for n in range(count):
+            q = found[n]
+            squared = 0.0
+            for axis in range(3):
+                squared += (points[q, axis] - points[p, axis]) ** 2
+            weights[n] = points[q, 3] * np.exp(-0.5 * squared / (width[p] * width[p]))
+            total += weights[n]
+            for axis in range(3):
+                mean[axis] += weights[n] * (points[q, axis] - points[p, axis])
+        for axis in range(3):
+            mean[axis] /= total
+        spread[:] = 0.0
+        for n in range(count):
+            q = found[n]
+            for i in range(3):
+                for j in range(i + 1):
+                    a = points[q, i] - points[p, i] - mean[i]
+                    b = points[q, j] - points[p, j] - mean[j]
+                    spread[i, j] += weights[n] * a * b
+        for i in range(3):
+            for j in range(i):
+                spread[j, i] = spread[i, j]
+        smallest_axis(spread, planes[p, :3])
+        planes[p, 3] = mean[0] * planes[p, 0] + mean[1] * planes[p, 1] + mean[2] * planes[p, 2]
+        planes[p, 4] = np.sqrt(max(spread[0, 0], 0.0) / total)
+
+
+@kernel("b1(f8[:,::1], f8[::1])")
+def solve(matrix: Floats, right: Floats) -> bool:
+    """Solve a symmetric positive system by Cholesky's factors, in place; tell whether it could be solved."""
+    size = len(right)
+    for i in range(size):
+        for j in range(i + 1):
+            rest = matrix[i, j]
+            for k in range(j):
+                rest -= matrix[i, k] * matrix[j, k]
+            if i == j:
+                if rest <= 1e-12:
+                    return False
+                matrix[i, i] = np.sqrt(rest)
+            else:
+                matrix[i, j] = rest / matrix[j, j]
+    for i in range(size):
+        for k in range(i):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            right[i] -= matrix[k, i] * right[k]
+        right[i] /= matrix[i, i]
+    return True
+
+
+@kernel("void(f8[::1], f8[:,::1])")
+def tangents(normal: Floats, axes: Floats) -> None:
+    """Find two unit vectors (2, 3) that are perpendicular to a unit normal (3,) and to each other."""
+    least = 0
+    for axis in range(1, 3):
+        if abs(normal[axis]) < abs(normal[least]):
+            least = axis
+    length = np.sqrt(1 - normal[least] ** 2)
+    one, two = (least + 1) % 3, (least + 2) % 3
+    axes[0, least] = 0.0
+    axes[0, one], axes[0, two] = -normal[two] / length, normal[one] / length
+    for axis in range(3):
+        one, two = (axis + 1) % 3, (axis + 2) % 3
+        axes[1, axis] = normal[one] * axes[0, two] - normal[two] * axes[0, one]
+
+
+@kernel("void(f8[:,::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], b1[::1], f8[:,::1], i8, i8)")
+def settle(
+    points: Floats,
+    planes: Floats,
+    blocks: Integers,
+    start: NDArray[np.int32],
+    frame: Floats,
+    width: Floats,
+    stray: NDArray[np.bool_],
+    settled: Floats,
+    begin: int,
+    end: int,
+) -> None:
+    """Move each point onto a quadratic fitted to the heights of its neighbors over its plane.
+
+    Which neighbors count, and how much, is told by their own planes, so that another sheet nearby or the far side
+    of an edge has no say; what they say are their measured positions.
+
+    Parameters
+    ----------
+    points : (p, 4) float array
+        Position and mass.
+    planes : (p, 5) float array
+        From `fit_planes`.
+    blocks, start, frame : arrays
+    width : (p,) float array
+        Standard deviation of the weights.
+    stray : (p,) bool array
+        Points that are not looked at.
+    settled : (p, 7) float array
+        Result: position, unit normal, and the root mean square distance of the neighbors from the quadratic.
+    begin, end : int
+        Points to work on.
+    """
+    found, axes = np.empty(MOST, np.int64), np.empty((2, 3))
+    matrix, right, terms, rows = np.empty((6, 6)), np.empty(6), np.empty(6), np.empty((MOST, 4))
+    for p in range(begin, end):
+        h = width[p]
+        tangents(planes[p, :3], axes)
+        used = 0
+        for _ in range(TRIES):
+            count = gather(points, blocks, start, frame, points[p], SIGHT * h + abs(planes[p, 3]), found)
+            used = 0
+            for n in range(count):
+                q = found[n]
+                if stray[q]:
+                    continue
+                same = height = raw = u = v = 0.0
+                for axis in range(3):
+                    normal = planes[p, axis]
+                    moved = points[q, axis] + planes[q, 3] * planes[q, axis] - points[p, axis] - planes[p, 3] * normal
+                    same += normal * planes[q, axis]
+                    height += normal * moved
+                    raw += normal * (points[q, axis] - points[p, axis])
+                    u += axes[0, axis] * moved
+                    v += axes[1, axis] * moved
+                flat = u * u + v * v
+                if abs(same) < ALIKE or abs(height) > 2 * planes[p, 4] + STEEP * np.sqrt(flat):
+                    continue
+                rows[used, 0], rows[used, 1], rows[used, 2] = u / h, v / h, (raw - planes[p, 3]) / h
+                bent = 0.5 * (flat + height * height) / (h * h) + BEND * (1 - abs(same))
+                rows[used, 3] = points[q, 3] * np.exp(-bent)
+                used += 1
+            if used >= ENOUGH:
+                break
+            h *= WIDER
+        h = h / WIDER if used < ENOUGH else h
+        matrix[:] = 0.0
+        right[:] = 0.0
+        total = 0.0
+        for n in range(used):
+            u, v, w = rows[n, 0], rows[n, 1], rows[n, 3]
+            terms[0], terms[1], terms[2], terms[3], terms[4], terms[5] = 1.0, u, v, u * u, u * v, v * v
+            total += w
+            for i in range(6):
+                weighted = w * terms[i]
+                right[i] += weighted * rows[n, 2]
+                for j in range(i + 1):
+                    matrix[i, j] += weighted * terms[j]
+        for i in range(6):
+            matrix[i, i] += 1e-6 * total
+        if used < 8 or not solve(matrix, right):
+            right[:] = 0.0
+        squares = 0.0
+        for n in range(used):
+            u, v = rows[n, 0], rows[n, 1]
+            bend = right[3] * u * u + right[4] * u * v + right[5] * v * v
+            squares += rows[n, 3] * (rows[n, 2] - right[0] - right[1] * u - right[2] * v - bend) ** 2
+        settled[p, 6] = h * np.sqrt(squares / max(total, 1e-300))
+        length = np.sqrt(1 + right[1] ** 2 + right[2] ** 2)
+        for axis in range(3):
+            settled[p, axis] = points[p, axis] + (planes[p, 3] + h * right[0]) * planes[p, axis]
+            tilt = right[1] * axes[0, axis] + right[2] * axes[1, axis]
+            settled[p, 3 + axis] = (planes[p, axis] - tilt) / length

@@ -1,0 +1,204 @@
+"""Kohonen's batch rule: every neuron to the neighborhood-weighted mean of the inputs (Kohonen 1991)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..compile import kernel
+from .online import best_matching_units
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+COLUMNS = 64
+"""Columns of the totals that are added together."""
+
+
+@kernel("void(f8[:,::1], f8[::1], i4[::1], f4[::1], f8[:,::1])")
+def sum_by_winner(
+    inputs: NDArray[np.float64],
+    amounts: NDArray[np.float64],
+    winners: NDArray[np.int32],
+    squared: NDArray[np.float32],
+    totals: NDArray[np.float64],
+) -> None:
+    """Add up what each neuron won.
+
+    Parameters
+    ----------
+    inputs : (d, n) float array
+    amounts : (n,) float array
+        Weight of each input.
+    winners : (n,) int array
+    squared : (n,) float array
+        Squared distance of each input to its winner.
+    totals : (u, d + 2) float array
+        Result: the weighted sums of the inputs, of 1, and of the distances, each in the order of the inputs.
+    """
+    d = len(inputs)
+    x, y = inputs[0], inputs[1]
+    totals[:] = 0.0
+    for n in range(len(winners)):
+        c, amount = winners[n], amounts[n]
+        totals[c, 0] += amount * x[n]
+        totals[c, 1] += amount * y[n]
+        for axis in range(2, d):
+            totals[c, axis] += amount * inputs[axis, n]
+        totals[c, d] += amount
+        totals[c, d + 1] += amount * np.sqrt(squared[n])
+
+
+@kernel("f8(f8[:,::1], f8[:,::1], i4[:,::1], f8[::1], f8[:,::1])")
+def move_to_means(
+    codebook: NDArray[np.float64],
+    totals: NDArray[np.float64],
+    hops: NDArray[np.int32],
+    neighborhood: NDArray[np.float64],
+    box: NDArray[np.float64],
+) -> float:
+    """Move each neuron to sum_c h(hops(c, i)) S_c / sum_c h(hops(c, i)) n_c, and no farther than the box.
+
+    Parameters
+    ----------
+    codebook : (d, u) float array
+        Changed in place; a neuron that no input reaches stays.
+    totals : (u, d + 2) float array
+        S_c and n_c of each neuron, see `sum_by_winner`.
+    hops : (u, u) int array
+        Symmetric.
+    neighborhood : (h,) float array
+        h by the number of hops.
+    box : (2, d) float array
+        Lowest and highest input along each axis.
+
+    Returns
+    -------
+    float
+        The largest distance that a neuron moved.
+
+    Notes
+    -----
+    Sums run over the winners in their order.
+    """
+    d, u = codebook.shape
+    reached, share, moved = np.zeros(u), np.empty(u), np.zeros(u)
+    sums = np.zeros((d, u))
+    for c in range(u):
+        won = totals[c, d]
+        if won > 0.0:
+            for i in range(u):
+                share[i] = neighborhood[hops[c, i]]
+                reached[i] += share[i] * won
+            for axis in range(d):
+                total, row = totals[c, axis], sums[axis]
+                for i in range(u):
+                    row[i] += share[i] * total
+    for axis in range(d):
+        for i in range(u):
+            if reached[i] > 0.0:
+                place = min(max(sums[axis, i] / reached[i], box[0, axis]), box[1, axis])
+                moved[i] += (place - codebook[axis, i]) ** 2
+                codebook[axis, i] = place
+    return float(np.sqrt(moved.max()))
+
+
+@kernel("void(f8[:,::1], i4[:,::1], f8[::1], f8[:,::1])")
+def add_shares(
+    totals: NDArray[np.float64],
+    hops: NDArray[np.int32],
+    neighborhood: NDArray[np.float64],
+    sums: NDArray[np.float64],
+) -> None:
+    """Add up sum_c h(hops(i, c)) totals_c for each neuron i, for totals of many columns.
+
+    Parameters
+    ----------
+    totals : (u, k) float array
+    hops : (u, u) int array
+    neighborhood : (h,) float array
+        h by the number of hops.
+    sums : (u, k) float array
+        Result.
+
+    Notes
+    -----
+    In the order of c, `COLUMNS` columns at a time, whose totals stay in the second cache.
+    """
+    u, k = totals.shape
+    for start in range(0, k, COLUMNS):
+        some = totals[:, start : start + COLUMNS].copy()
+        for i in range(u):
+            own = sums[i, start : start + COLUMNS]
+            own[:] = 0.0
+            for c in range(u):
+                share = neighborhood[hops[i, c]]
+                if share != 0.0:
+                    row = some[c]
+                    for column in range(len(own)):
+                        own[column] += share * row[column]
+
+
+@kernel("i8(f8[:,::1], f8[:,::1], f8[::1], i4[:,::1], f8[:,::1], f8[:,::1], f8, i8, f8[:,::1])")
+def train_batch(
+    codebook: NDArray[np.float64],
+    inputs: NDArray[np.float64],
+    amounts: NDArray[np.float64],
+    hops: NDArray[np.int32],
+    neighborhoods: NDArray[np.float64],
+    box: NDArray[np.float64],
+    tolerance: float,
+    settled: int,
+    history: NDArray[np.float64],
+) -> int:
+    """Match and move, again and again.
+
+    Parameters
+    ----------
+    codebook : (d, u) float array
+        Changed in place.
+    inputs : (d, n) float array
+    amounts : (n,) float array
+        Weight of each input, none negative.
+    hops : (u, u) int array
+    neighborhoods : (epochs, h) float array
+        Neighborhood of each epoch by the number of hops.
+    box : (2, d) float array
+        Lowest and highest input along each axis.
+    tolerance : float
+        No more epochs after one in which no neuron moved farther than this,
+    settled : int
+        counted from this epoch on.
+    history : (epochs, 2) float array
+        Result: quantization error before, and largest move in, each epoch that was run.
+
+    Returns
+    -------
+    int
+        Epochs that were run.
+
+    Notes
+    -----
+    Two axes at least. Winners are sought in single precision, relative to the first input; everything else is
+    double.
+    """
+    d, u = codebook.shape
+    winners = np.empty(inputs.shape[1], np.int32)
+    squared = np.empty(inputs.shape[1], np.float32)
+    totals = np.empty((u, d + 2))
+    near_inputs = np.empty(inputs.shape, np.float32)
+    near_codebook = np.empty((d, u), np.float32)
+    for axis in range(d):
+        near_inputs[axis] = inputs[axis] - inputs[axis, 0]
+    amount = amounts.sum()
+    for epoch in range(len(neighborhoods)):
+        for axis in range(d):
+            near_codebook[axis] = codebook[axis] - inputs[axis, 0]
+        best_matching_units(near_codebook, near_inputs, winners, squared)
+        sum_by_winner(inputs, amounts, winners, squared, totals)
+        history[epoch, 0] = totals[:, d + 1].sum() / amount
+        history[epoch, 1] = move_to_means(codebook, totals, hops, neighborhoods[epoch], box)
+        if history[epoch, 1] <= tolerance and epoch >= settled:
+            return epoch + 1
+    return len(neighborhoods)

@@ -1,0 +1,196 @@
+"""An open surface as a sheet with borders: shell of cubes -> one of its two walls -> drape -> cut along the borders.
+
+The samples are carried on beyond their borders by an apron, and the cubes are dilated once: so the shell has no
+holes but those that are wide, and both walls reach over the borders. They come apart where the apron ends; the one
+that is kept is laid over the samples, and what lies beyond the borders is cut away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..cuberille.closing import close_shell
+from ..cuberille.faces import walls
+from ..cuberille.leak_test import Held
+from ..cuberille.neighbors import dilate
+from ..cuberille.partition import cubes_over
+from ..dynamics.moving_least_squares import Draped, Ring, drape
+from ..dynamics.untangle import untangle
+from ..errors import GeometryError
+from ..model.columns import any_of
+from ..model.cubes import cells_of
+from ..model.mesh import TriMesh
+from .borders import borders
+from .sides import Side, one_side
+from .trimming import trimmed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..dynamics.untangle import Tangled
+    from ..pointcloud.bridges import Bridges
+    from ..pointcloud.samples import Samples
+    from ..progress import Progress
+    from ..settings import Settings
+    from .borders import Borders
+
+    Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
+
+CLOSINGS = (0, 1, 2)
+"""Closings that are tried until the two walls come apart, cubes."""
+APRON = 0.7
+"""How far a sheet is carried on beyond its borders, in the radius of the disks there."""
+TIP = 0.8
+"""Share of the apron from which the walls are cut away."""
+DENSE = 0.5
+"""Distance of the places on the apron, cube edges."""
+OVER = 0.4
+"""How far a sheet reaches beyond its outermost samples, cube edges: half of that is where points thrown at random
+end before their surface does."""
+EVEN = 3
+"""Passes of the low-pass filter over the heights along whose zero the sheet is cut."""
+SHIFT = 0.9
+"""Share of a height by which that filter may change it: none changes its sign, or narrow strips would be cut."""
+SNAP = (0.3, 0.1, 0.02)
+"""Share of an edge over which a vertex moves to the cut; the first that lets no face pass through another."""
+
+
+@dataclass(frozen=True)
+class OpenSheet:
+    """A sheet with borders; positions are relative to where the samples' are.
+
+    Attributes
+    ----------
+    held : Held
+        The shell and both its walls.
+    cubes : int
+        Cubes of the shell before it was closed.
+    lattice : (n, 3) float array
+        Vertices of the wall that is kept.
+    quads : (q, 4) int64 array
+        Its squares.
+    cells : (q, 3) int64 array
+        The cube behind each square.
+    smoothed : TriMesh
+        The wall after the low-pass filter.
+    mesh : TriMesh
+        The sheet: a consistently oriented 2-manifold with borders.
+    filled : (m,) bool array
+        Faces that lie where there are no samples.
+    crossing : (m,) bool array
+        Faces that pass through others.
+    draped : Draped
+    taken_back : int
+        Vertices that do not lie where the fit had them.
+    """
+
+    held: Held
+    cubes: int
+    lattice: Floats
+    quads: Integers
+    cells: Integers
+    smoothed: TriMesh
+    mesh: TriMesh
+    filled: NDArray[np.bool_]
+    crossing: NDArray[np.bool_]
+    draped: Draped
+    taken_back: int
+
+
+def open_sheet(
+    samples: Samples,
+    spanned: Bridges,
+    cell: Floats,
+    settings: Settings,
+    tangled: Tangled,
+    progress: Progress,
+) -> OpenSheet:
+    """Turn the samples of an open surface into a one-sided sheet.
+
+    Parameters
+    ----------
+    samples : Samples
+    spanned : Bridges
+        What spans the narrow holes between them.
+    cell : (3,) float array
+        Edge of the cubes along each axis.
+    settings : Settings
+    tangled : callable
+        Marks the faces (m,) of a mesh that pass through others.
+    progress : callable
+
+    Returns
+    -------
+    OpenSheet
+        A hole stays open where a ball of five sampling distances fits through; narrower ones are closed. A surface
+        without borders becomes a closed mesh.
+
+    Raises
+    ------
+    GeometryError
+        Where both sides of the surface are one.
+    """
+    threads, edge = settings.run.threads, float(cell.min())
+    found, samples = borders(samples, edge, threads=threads)
+    wall = _wall(samples, spanned, found, cell, settings)
+    ring = wall.side.ring
+    draped = drape(wall.start, ring, samples, edge, settings.fit, threads=threads, progress=progress)
+    mesh, taken_back, _ = untangle(TriMesh(draped.vertices, draped.faces), wall.start, ring, tangled)
+    height = np.minimum(found.depths(mesh.vertices, threads=threads) + OVER * edge, 2 * edge)
+    even = ring.smoothed(np.repeat(height[:, None], 3, axis=1), EVEN)[:, 0]
+    most = SHIFT * np.abs(height)
+    even = height + np.clip(even - height, -most, most)
+    for near in SNAP:
+        sheet, source = trimmed(mesh, even, near)
+        crossing = tangled(sheet)
+        if not crossing.any():
+            break
+    filled = any_of(draped.filled[mesh.faces])[source]
+    quads, smoothed = ring.quads.astype(np.int64), TriMesh(wall.smoothed, mesh.faces)
+    return OpenSheet(
+        wall.held, wall.cubes, wall.lattice, quads, wall.cells, smoothed, sheet, filled, crossing,
+        draped, taken_back,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Wall:
+    """One wall of a shell: vertices (n, 3) on the lattice, smoothed, and where the fit starts; cubes of squares."""
+
+    held: Held
+    cubes: int
+    lattice: Floats
+    smoothed: Floats
+    start: Floats
+    cells: Integers
+    side: Side
+
+
+def _wall(samples: Samples, spanned: Bridges, found: Borders, cell: Floats, settings: Settings) -> _Wall:
+    """Return one of the two walls around the sheet, from the narrowest closing that keeps them apart."""
+    edge = float(cell.min())
+    apron, share = found.apron(APRON, DENSE * edge)
+    lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places, apron]), cell)
+    cells = cells_of(dilate(np.unique(keys), 1))
+    for closing in CLOSINGS:
+        shell = close_shell(cells, closing, threads=settings.run.threads)
+        both = walls(shell)
+        ring = Ring(both.quads, len(both.corners), settings.run.threads)
+        lattice = lowest + both.corners * cell
+        smoothed = ring.smoothed(lattice, settings.cubes.smoothing)
+        start = smoothed - edge * ring.normals(smoothed)
+        side = one_side(start, ring, samples, apron, share >= TIP, edge, largest=settings.cubes.largest)
+        if side is not None:
+            kept, held = side.vertices, Held(shell, both, both.least_two_sided)
+            return _Wall(held, len(cells), lattice[kept], smoothed[kept], start[kept], both.cells[side.quads], side)
+    raise GeometryError(
+        "the two sides of the surface do not come apart: it has one side only, as a Moebius strip, or its borders "
+        "are lost in the noise",
+        found=f"cell = {edge:.4g}, {found.count} border(s)",
+        expected="a surface with two sides",
+        hint="a larger --cell",
+    )

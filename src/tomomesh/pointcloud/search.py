@@ -1,0 +1,88 @@
+"""Sort points into cubes, so that kernels find the neighbors of a place in a few ranges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import ResourceError
+from ..kernels.measure.bvh import order_keys
+from ..kernels.pointcloud.samples import BITS
+from ..model.columns import box
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+EDGE = 8
+"""Cubes along a block."""
+
+
+@dataclass(frozen=True)
+class Index:
+    """Points in the order of their cubes, block by block (see `tomomesh.kernels.pointcloud.samples`).
+
+    Attributes
+    ----------
+    order : (p,) int64 array
+        Numbers of the points, cube by cube; within a cube as they came.
+    groups : (c + 1,) int64 array
+        The points of the q-th occupied cube are ``order[groups[q]:groups[q + 1]]``.
+    blocks : (b,) int64 array
+        Occupied blocks of 8 x 8 x 8 cubes, rising.
+    start : (512 b + 1,) int32 array
+        The points of cube c of block b are ``order[start[512 b + c]:start[512 b + c + 1]]``.
+    frame : (4,) float array
+        Lowest corner of cell (0, 0, 0), and the edge of the cubes.
+    """
+
+    order: NDArray[np.int64]
+    groups: NDArray[np.int64]
+    blocks: NDArray[np.int64]
+    start: NDArray[np.int32]
+    frame: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, positions: NDArray[np.float64], edge: float) -> Index:
+        """Sort points (p, 3) into cubes of an edge.
+
+        Raises
+        ------
+        ResourceError
+            Where the points reach farther than cubes can be numbered.
+        """
+        origin, highest = box(positions)
+        widest = float((highest - origin).max())
+        most = EDGE << BITS
+        if widest / edge >= most:
+            raise ResourceError(
+                "the points lie too far apart for their spacing",
+                found=f"extent = {widest:g}",
+                expected=f"at most {most * edge:g}",
+                hint="leaving far points out",
+            )
+        x, y, z = ((positions - origin) / edge).astype(np.int64).T
+        local = ((z % EDGE) * EDGE + y % EDGE) * EDGE + x % EDGE
+        keys = ((((z // EDGE << BITS) | y // EDGE) << BITS) | x // EDGE) * EDGE**3 + local
+        order = np.empty(len(keys), np.int32)
+        order_keys(keys, order)
+        keys = keys[order]
+        groups = np.append(np.flatnonzero(np.append(True, keys[1:] != keys[:-1])), len(keys))
+        cubes = keys[groups[:-1]]
+        blocks, block = _numbered(cubes // EDGE**3)
+        count = np.zeros(len(blocks) * EDGE**3 + 1, np.int32)
+        count[block * EDGE**3 + cubes % EDGE**3 + 1] = np.diff(groups)
+        start = np.cumsum(count, dtype=np.int32)
+        return cls(order.astype(np.int64), groups, blocks, start, np.append(origin, edge))
+
+    @property
+    def cells(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
+        """What kernels take: blocks, start and frame."""
+        return self.blocks, self.start, self.frame
+
+
+def _numbered(rising: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return each of some rising numbers once, and which of these each is."""
+    new = np.append(True, rising[1:] != rising[:-1])
+    return rising[new], np.cumsum(new) - 1

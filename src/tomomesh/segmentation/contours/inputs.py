@@ -1,0 +1,219 @@
+"""What each of several networks is shown of its slice, and where it starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import ndimage
+
+from ...kernels.threads import in_blocks
+from ...model.contours import HOLE, OUTER
+from ...som.starts import moments
+from ..signal import SOLID, outline, pixels_of
+from .loops import Loop, Patch, trace
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+FEWEST, SIDES_EACH = 12, 2
+"""Neurons that a ring has at least, and pixel sides of its outline for each."""
+SHORTEST = FEWEST * SIDES_EACH
+"""Pixel sides of the shortest outline that gets a ring: about 6 pixels across."""
+SIDES_MOST = 8
+"""Pixel sides of an outline for each neuron of a loop at most: fewer neurons would cut thin walls and bays across."""
+BESIDE = 0.1
+"""Share of the largest component's box that another one covers to be a structure of its own."""
+TOUCHING = np.ones((3, 3), bool)
+"""Pixels that touch at a corner are of one component."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What one ring is shown.
+
+    Attributes
+    ----------
+    shown : (n, 2) float array
+        Inputs as pixel columns and rows.
+    line : (p, 2) float array or None
+        A closed line to start on; None starts as the settings say.
+    inside : Patch
+        The pixels that it should enclose.
+    side : int
+    perimeter : int
+        Pixel sides of its outline.
+    outlined : bool
+        Whether it is shown an outline, not the window's pixels.
+    least : int
+        Neurons that it has at least, as far as its outline has room for them.
+    """
+
+    shown: NDArray[np.float64]
+    line: NDArray[np.float64] | None
+    inside: Patch
+    side: int
+    perimeter: int
+    outlined: bool
+
+    least: int = FEWEST
+
+    @property
+    def most(self) -> int:
+        """Neurons that it can have at most."""
+        return min(self.perimeter // SIDES_EACH, len(self.shown))
+
+
+def looks_at_loops(plane: NDArray[np.bool_]) -> tuple[list[Look], int]:
+    """Show each ring one closed outline of the window: the middles of the pixels inside and outside.
+
+    Parameters
+    ----------
+    plane : (J, I) bool array
+
+    Returns
+    -------
+    looks : list of Look
+    dropped : int
+        Outlines of fewer than `SHORTEST` pixel sides.
+    """
+    loops = trace(plane)
+    kept = [loop for loop in loops if len(loop) >= SHORTEST]
+    return [look_at_loop(loop, OUTER if loop.area > 0 else HOLE) for loop in kept], len(loops) - len(kept)
+
+
+def look_at_loop(loop: Loop, side: int) -> Look:
+    """Show a ring the outline itself, and let it start there."""
+    least = max(FEWEST, len(loop) // SIDES_MOST)
+    return Look(loop.middles, loop.middles, loop.filled(), side, len(loop), outlined=True, least=least)
+
+
+@dataclass(frozen=True)
+class Component:
+    """One connected component of the window in a slice.
+
+    Attributes
+    ----------
+    body : int
+        The connected component of the whole window that it belongs to.
+    low : (2,) int64 array
+        Its first pixel (column, row).
+    pixels : (j, i) bool array
+    """
+
+    body: int
+    low: NDArray[np.int64]
+    pixels: NDArray[np.bool_]
+
+    @property
+    def ellipse(self) -> float:
+        """Area of the ellipse that has the same second moments."""
+        spread = moments(np.ascontiguousarray(pixels_of(self.pixels).T))[1] + np.eye(2) / 12
+        return float(4 * np.pi * np.sqrt(np.linalg.det(spread)))
+
+    def look(self, *, solid: bool) -> Look:
+        """Show a ring the outline of a solid, or the pixels of a wall."""
+        loop = max(trace(self.pixels), key=lambda found: found.area)
+        shown = outline(self.pixels) if solid else pixels_of(self.pixels)
+        inside = loop.filled()
+        patch = Patch(inside.low + self.low, inside.pixels)
+        return Look(shown + self.low, None, patch, OUTER, len(loop), outlined=solid)
+
+
+def components_of(plane: NDArray[np.bool_], bodies: NDArray[np.int32]) -> tuple[list[Component], int]:
+    """Part the window of a slice into its connected components.
+
+    Parameters
+    ----------
+    plane : (J, I) bool array
+    bodies : (J, I) int32 array
+        The numbers of the connected components of the whole window.
+
+    Returns
+    -------
+    components : list of Component
+    dropped : int
+        Components whose outer border has fewer than `SHORTEST` pixel sides.
+    """
+    labels, _ = ndimage.label(plane, TOUCHING)
+    found = []
+    boxes = ndimage.find_objects(labels)
+    for number, (rows, columns) in enumerate(boxes, 1):
+        if 2 * (rows.stop - rows.start + columns.stop - columns.start) >= SHORTEST:
+            pixels = labels[rows, columns] == number
+            body = int(bodies[rows, columns][pixels][0])
+            found.append(Component(body, np.array([columns.start, rows.start]), pixels))
+    return found, len(boxes) - len(found)
+
+
+def solids(components: Sequence[Component]) -> set[int]:
+    """Return the bodies that are solids, and not walls, over all their slices; see `signal.fills_most`."""
+    filled: dict[int, float] = {}
+    for one in components:
+        more = np.count_nonzero(one.pixels) - SOLID * one.ellipse
+        filled[one.body] = filled.get(one.body, 0.0) + more
+    return {body for body, more in filled.items() if more > 0}
+
+
+def slices_with_several(mask: NDArray[np.bool_], threads: int = 0) -> int:
+    """Count the slices in which components of the window lie side by side, for which one network is too few.
+
+    A component counts where its box covers at least `BESIDE` of the largest one's and lies in no other; they are
+    looked at in pixels twice as wide.
+
+    Parameters
+    ----------
+    mask : (K, J, I) bool array
+    threads : int
+    """
+    several = np.zeros(len(mask), bool)
+
+    def work(start: int, stop: int) -> None:
+        for k in range(start, stop):
+            several[k] = _side_by_side(mask[k])
+
+    in_blocks(work, len(mask), block=8, threads=threads)
+    return int(several.sum())
+
+
+def share_of_holes(mask: NDArray[np.bool_], threads: int = 0) -> float:
+    """Return the area of the holes in the slices of a window over its own, which an outline fills, in coarse pixels.
+
+    Parameters
+    ----------
+    mask : (K, J, I) bool array
+    threads : int
+    """
+    areas = np.zeros((len(mask), 2))
+
+    def work(start: int, stop: int) -> None:
+        for k in range(start, stop):
+            coarse = _coarse(mask[k])
+            areas[k] = ndimage.binary_fill_holes(coarse).sum(), coarse.sum()
+
+    in_blocks(work, len(mask), block=8, threads=threads)
+    filled, own = areas.sum(axis=0)
+    return float(filled / max(own, 1.0) - 1.0)
+
+
+def _coarse(plane: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return a plane in pixels twice as wide."""
+    rows, columns = plane.shape[0] // 2 * 2, plane.shape[1] // 2 * 2
+    coarse = plane[:rows:2, :columns:2] | plane[1:rows:2, :columns:2]
+    return np.asarray(coarse | plane[:rows:2, 1:columns:2] | plane[1:rows:2, 1:columns:2])
+
+
+def _side_by_side(plane: NDArray[np.bool_]) -> bool:
+    labels, count = ndimage.label(_coarse(plane), TOUCHING)
+    if count < 2:
+        return False
+    boxes = np.array([[(one.start, one.stop) for one in box] for box in ndimage.find_objects(labels)])
+    sizes = (boxes[:, :, 1] - boxes[:, :, 0]).prod(axis=1)
+    large = boxes[sizes >= BESIDE * sizes.max()]
+    within = ((large[:, None, :, 0] >= large[None, :, :, 0]) & (large[:, None, :, 1] <= large[None, :, :, 1])).all(
+        axis=2
+    )
+    return bool((within.sum(axis=1) == 1).sum() > 1)

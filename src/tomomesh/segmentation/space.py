@@ -1,0 +1,96 @@
+"""Train one network in space, on the voxels of a whole window."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from ..errors import EmptyError
+from ..model.lattice import lattice
+from ..model.networks import SpaceNetwork
+from ..som.fit import fit
+from .signal import closed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..settings import NetworkSettings
+
+MOST = 40_000
+"""Inputs a network in space is shown at most: every n-th, in the order of slices, rows and columns, beyond."""
+HOLLOW = 2.0
+"""Times its own pixels that a window must enclose, slice by slice, to count as a wall.
+
+Measured: skulls 2.4 and 4.3; heads, white matter, ventricles and a torus of tube over ring 0.4 1.0 to 1.4.
+"""
+PIECE = 0.05
+"""Voxels of a piece of the window over those of the largest, under which it is left out."""
+
+
+def is_wall(mask: NDArray[np.bool_]) -> bool:
+    """Tell whether a window (K, J, I) is a wall around something, like a skull, whose middle the network shall take."""
+    enclosed = sum(int(np.count_nonzero(closed(plane)[0])) for plane in mask if plane.any())
+    return enclosed > HOLLOW * int(np.count_nonzero(mask))
+
+
+def pieces_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], int]:
+    """Leave out the small pieces of a window (K, J, I); return also how many pieces it then has."""
+    labels, _ = ndimage.label(mask, np.ones((3, 3, 3), bool))
+    sizes = np.bincount(labels.ravel())
+    sizes[0] = 0
+    kept = sizes >= PIECE * sizes.max()
+    kept[0] = False
+    return kept[labels], int(kept.sum())
+
+
+def train_space(
+    inputs: NDArray[np.float64], settings: NetworkSettings, *, outlined: bool, seed: int = 0
+) -> SpaceNetwork:
+    """Train one network on places in patient millimeters.
+
+    Parameters
+    ----------
+    inputs : (n, 3) float array
+        Voxels of a window, or its boundary; at most `MOST` are shown, evenly taken.
+    settings : NetworkSettings
+        A torus starts along the principal axes, since the hole has to be where the object's is.
+    outlined : bool
+        Whether they are a boundary. Then none counts as stray: what lies far off is in a bay.
+    seed : int
+
+    Returns
+    -------
+    SpaceNetwork
+
+    Raises
+    ------
+    EmptyError
+        With fewer inputs than neurons.
+    """
+    graph = lattice(settings.network, settings.neuron_count)
+    if len(inputs) < len(graph):
+        raise EmptyError(
+            "the window has fewer places than the network has neurons", found=f"{len(inputs)} places",
+            expected=f"at least {len(graph)}", hint="a wider window, or fewer --neurons",
+        )  # fmt: skip
+    shown = inputs[:: -(-len(inputs) // MOST)]
+    shown = shown if len(shown) >= len(graph) else inputs
+    start = "axes" if (settings.network, settings.start) == ("torus", "ellipse") else settings.start
+    asked = replace(settings, start=start, trim=0.0 if outlined else settings.trim)
+    origin = shown.mean(axis=0)
+    fitted = fit(shown - origin, graph, asked, np.random.default_rng(seed))
+    return SpaceNetwork(graph, fitted.codebook + origin, outlined, len(shown), int((~fitted.kept).sum()))
+
+
+def regions_in_space(
+    mask: NDArray[np.bool_], places: NDArray[np.float64], network: SpaceNetwork, threads: int = 0
+) -> NDArray[np.uint16]:
+    """Give every voxel of a window (K, J, I) its winner's number plus 1; `places` (n, 3) are the voxels in mm."""
+    labels = np.zeros(mask.shape, np.uint16)
+    _, winners = cKDTree(network.codebook).query(places, workers=threads or -1)
+    labels[mask] = winners + 1
+    return labels

@@ -1,0 +1,124 @@
+"""What is in a study, and what to do with it: the answer to ``tomomesh inspect``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..model.volume import AXES
+from .labels import labels_in
+from .otsu import histogram, otsu_levels
+from .window import PRESETS_HU, otsu_thresholds
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from ..model.volume import Volume
+
+BARS = 32
+"""Bars of the printed histogram."""
+LETTERS = (("R", "L"), ("A", "P"), ("I", "S"))
+"""Ends of the patient axes, the negative first."""
+
+CUT_OFF = 0.01
+"""A window that takes more than this share of the study's first or last plane goes on beyond it."""
+OBLONG = 0.01
+"""Part by which the sides of a pixel may differ without a remark."""
+THICK = 5
+"""Pixels that slices may be apart without a remark."""
+
+
+def survey(volume: Volume) -> dict[str, Any]:
+    """Describe a study without any patient data.
+
+    Parameters
+    ----------
+    volume : Volume
+
+    Returns
+    -------
+    dict
+        Size, spacing, frame, tilt, the range and histogram of the gray levels, suggested windows and the share of the
+        voxels in each, the labels of a label map, the reader's notes, and remarks on what a mesh of it will show.
+    """
+    voxels = volume.voxels
+    low, high = float(voxels.min()), float(voxels.max())
+    return {
+        "slices_rows_columns": list(volume.shape),
+        "layers": volume.layers,
+        "spacing_mm": list(volume.spacing_mm),
+        "slice_distance_mm": volume.slice_distance_mm,
+        "tilt_deg": _tilt(volume),
+        "stored_plane": AXES[volume.stored_axis],
+        "default_plane": AXES[volume.thickest_axis()],
+        "stored_axes": _stored_axes(volume),
+        "corner_mm": volume.affine[:3, 3].tolist(),
+        "affine": volume.affine.tolist(),
+        "size_mm": (np.array(volume.spacing_mm) * volume.shape[::-1]).tolist(),
+        "type": str(voxels.dtype),
+        "gray_unit": volume.unit,
+        "lowest": low,
+        "highest": high,
+        "histogram": histogram(voxels, low, high, BARS).tolist() if high > low else [voxels.size],
+        "windows": _windows(volume, low),
+        "labels": labels_in(voxels),
+        "notes": list(volume.notes),
+        "remarks": list(_remarks(volume)),
+    }
+
+
+def _tilt(volume: Volume) -> float:
+    """Return the angle between the way from slice to slice, as they are stored, and their normal."""
+    columns, rows, step = volume.grid.affine[:3, :3].T
+    normal = np.cross(columns, rows)
+    cosine = abs(step @ normal) / np.linalg.norm(step) / np.linalg.norm(normal)
+    return float(np.degrees(np.arccos(min(1.0, cosine))))
+
+
+def _windows(volume: Volume, low: float) -> dict[str, dict[str, Any]]:
+    """Suggest lower limits: Otsu's, those between three and four classes, and for CT those of the presets."""
+    limits: dict[str, Any] = {"otsu": otsu_thresholds(volume)}
+    if volume.layers == 1:
+        for classes in (3, 4):
+            limit = otsu_levels(volume.voxels, classes)[-1]
+            limits |= {} if limit in limits.values() else {f"otsu of {classes}": limit}
+    if low < 0:
+        limits |= {name: lower for name, (lower, _) in PRESETS_HU.items()}
+    return {name: _window(volume.voxels, limit) for name, limit in limits.items()}
+
+
+def _window(voxels: NDArray[Any], limit: Any) -> dict[str, Any]:
+    """Say which share of the voxels a window takes, and at which ends of the study it is cut off."""
+    inside = voxels > limit
+    ends = [(2 - n, end) for n in range(3) for end in (0, -1)]
+    cut = [LETTERS[axis][end] for axis, end in ends if inside.take(end, 2 - axis).mean() > CUT_OFF]
+    return {"lower": _finite(limit), "share": float(np.mean(inside)), "cut_off_at": cut}
+
+
+def _finite(limit: Any) -> Any:
+    """Return a limit, or one a layer, with None where there is none."""
+    found = [value if np.isfinite(value) else None for value in np.ravel(limit).tolist()]
+    return found if np.ndim(limit) else found[0]
+
+
+def _remarks(volume: Volume) -> Iterator[str]:
+    """Say what a mesh of the study will show that nobody may expect."""
+    columns, rows, step = np.sqrt((volume.grid.affine[:3, :3] ** 2).sum(axis=0))
+    if abs(columns - rows) > OBLONG * min(columns, rows):
+        yield f"pixels are not square, {columns:.4g} x {rows:.4g} mm: the mesh keeps the distances"
+    apart = step / max(columns, rows)
+    if apart > THICK:
+        yield f"slices are {apart:.1f} pixels apart: what lies between them is interpolated"
+    if 1 in volume.shape:
+        yield "one slice: the mesh will be a slab of its thickness"
+
+
+def _stored_axes(volume: Volume) -> str:
+    """Return the directions in which the stored columns, rows and slices run, as ``LPS``."""
+    letters = {}
+    for n in range(3):
+        letters[volume.grid.axes[n]] = LETTERS[2 - n][0 if volume.grid.flipped[n] else 1]
+    return "".join(letters[axis] for axis in (2, 1, 0))

@@ -1,0 +1,185 @@
+"""The two ways to train: input by input, or all inputs at once, epoch after epoch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.som import batch as batch_kernels
+from ..kernels.som import online as kernels
+from ..kernels.som.neighborhoods import LATERAL, weigh
+from . import products as wide
+from .history import History
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from ..model.lattice import Lattice
+    from .inputs import Shown
+
+    Floats = NDArray[np.float64]
+
+SETTLED = 0.1
+"""Share over its last value under which the radius has settled: a network at rest may stop, little is to come."""
+GATHERED = 4_000_000
+"""Numbers of presentations that are laid out at once."""
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Who looks on.
+
+    Attributes
+    ----------
+    tolerance : float
+        The training ends after an epoch in which no neuron moved farther, once the radius has settled.
+    callback : callable or None
+        Told the codebook (u, d) and the number of the epoch.
+    record : bool
+        Whether every epoch is measured, where that costs time.
+    axes : int
+        How many of the codebook's axes are real.
+    """
+
+    tolerance: float
+    callback: Callable[[Floats, int], None] | None
+    record: bool
+    axes: int
+
+    def tell(self, codebook: Floats, epoch: int) -> None:
+        """Show a copy of the codebook (d, u)."""
+        if self.callback is not None:
+            self.callback(codebook[: self.axes].T.copy(), epoch)
+
+
+def train_online(
+    codebook: Floats,
+    shown: Shown,
+    lattice: Lattice,
+    shape: int,
+    alpha: Floats,
+    radius: Floats,
+    rng: np.random.Generator,
+    watch: Watch,
+) -> History:
+    """Present inputs drawn in proportion to their weights (eq. 1, 2).
+
+    Parameters
+    ----------
+    codebook : (d, u) float array
+        Changed in place.
+    shown : Shown
+    lattice : Lattice
+    shape : int
+        The neighborhood, see `tomomesh.kernels.som.neighborhoods`.
+    alpha, radius : (t,) float arrays
+        One presentation each.
+    rng : Generator
+    watch : Watch
+
+    Returns
+    -------
+    History
+        Empty where nothing asks for it.
+    """
+    order = _drawn(shown, len(radius), rng)
+    watched = watch.record or watch.callback is not None or watch.tolerance > 0
+    epoch = len(shown) if watched else len(order)
+    rows: list[tuple[float, float, float, float]] = []
+    for start in range(0, len(order), epoch):
+        stop = min(start + epoch, len(order))
+        before = codebook.copy()
+        _present(codebook, shown, lattice, shape, order[start:stop], alpha[start:stop], radius[start:stop])
+        if watched:
+            watch.tell(codebook, len(rows))
+            move = float(np.sqrt(((codebook - before) ** 2).sum(axis=0).max()))
+            rows.append((_error(codebook, shown) if watch.record else np.nan, move, radius[stop - 1], alpha[stop - 1]))
+            if move <= watch.tolerance and radius[stop - 1] <= radius[-1] * (1 + SETTLED):
+                break
+    return History(*np.array(rows).reshape(-1, 4).T)
+
+
+def _box(shown: Shown, shape: int) -> Floats:
+    """Return what inhibition may drive no neuron out of; means of inputs stay among them without."""
+    if shape == LATERAL:
+        return shown.box
+    return np.repeat([[-np.inf], [np.inf]], shown.inputs.shape[1], axis=1)
+
+
+def _drawn(shown: Shown, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Draw inputs in proportion to their weights."""
+    at = rng.random(count)
+    if shown.weights is None:
+        return (at * len(shown)).astype(np.int64)
+    steps = np.cumsum(shown.weights)
+    drawn = np.searchsorted(steps, at * steps[-1], side="right")
+    return np.asarray(np.minimum(drawn, len(steps) - 1), np.int64)
+
+
+def _present(
+    codebook: Floats,
+    shown: Shown,
+    lattice: Lattice,
+    shape: int,
+    order: NDArray[np.int64],
+    alpha: Floats,
+    radius: Floats,
+) -> None:
+    """Lay the presentations out in their order, many at once, and learn them."""
+    step = max(GATHERED // len(codebook), 1)
+    for start in range(0, len(order), step):
+        some = slice(start, start + step)
+        kernels.train_online(
+            codebook, shown.rows.take(order[some], axis=0), lattice.hops, lattice.nearest_first, lattice.within,
+            alpha[some], radius[some], shape, _box(shown, shape),
+        )  # fmt: skip
+
+
+def _error(codebook: Floats, shown: Shown) -> float:
+    _, squared = match(codebook, shown.by_axis)
+    return float(np.average(np.sqrt(squared, dtype=np.float64), weights=shown.weights))
+
+
+def match(codebook: Floats, by_axis: Floats) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return the winner of each input and the squared distance to it (eq. 1); arrays are (d, u) and (d, n), d > 1.
+
+    In single precision, relative to the first neuron, or to their middle in over `wide.WIDE` dimensions.
+    """
+    if len(codebook) > wide.WIDE:
+        return wide.best_matching_units(codebook.T, by_axis.T)
+    first = codebook[:, :1]
+    winners, squared = np.empty(by_axis.shape[1], np.int32), np.empty(by_axis.shape[1], np.float32)
+    near_codebook, near_inputs = (np.ascontiguousarray(places - first, np.float32) for places in (codebook, by_axis))
+    kernels.best_matching_units(near_codebook, near_inputs, winners, squared)
+    return winners, squared
+
+
+def train_batch(
+    codebook: Floats, shown: Shown, lattice: Lattice, shape: int, radius: Floats, watch: Watch, first_epoch: int = 0
+) -> History:
+    """Move the neurons to the neighborhood-weighted means of the inputs, once for each radius (epochs,).
+
+    The other parameters are those of `train_online`. Epochs are numbered from `first_epoch`.
+    """
+    neighborhoods = np.zeros((len(radius), lattice.farthest + 1))
+    for weights, reach in zip(neighborhoods, radius, strict=True):
+        weigh(weights, reach, 1.0, shape)
+    settled = int(np.argmax(radius <= radius[-1] * (1 + SETTLED)))
+    run = wide.train_batch if len(codebook) > wide.WIDE else batch_kernels.train_batch
+    rows, box = np.empty((len(radius), 2)), _box(shown, shape)
+    step = len(radius) if watch.callback is None else 1
+    done = 0
+    while done < len(radius):
+        some = slice(done, done + step)
+        done += run(
+            codebook, shown.by_axis, shown.amounts, lattice.hops, neighborhoods[some], box,
+            watch.tolerance, settled - done, rows[some],
+        )  # fmt: skip
+        watch.tell(codebook, first_epoch + done - 1)
+        if rows[done - 1, 1] <= watch.tolerance and done > settled:
+            break
+    return History(rows[:done, 0], rows[:done, 1], radius[:done], np.ones(done))

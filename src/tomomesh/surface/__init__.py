@@ -1,1 +1,0 @@
-"""PointSet -> TriMesh: partition, closing, cuberille, low-pass filter, dynamic mesh."""
