@@ -19,7 +19,7 @@ from studies import rotation
 from tomomesh import Volume, phantom, reconstruct, segment
 from tomomesh.cli import main
 from tomomesh.dynamics.subdivision import squares_of
-from tomomesh.errors import EmptyError, UsageError
+from tomomesh.errors import EmptyError, GeometryError, UsageError
 from tomomesh.measure.distance import distance_to_surface
 from tomomesh.measure.intersections import Crossings
 from tomomesh.model.icosphere import icosphere
