@@ -1,7 +1,4 @@
-"""GLB, binary glTF 2.0, which browsers and 3D viewers show.
-
-Written with the standard library: a file is one JSON text and one block of numbers, and the text must say here what no
-general exporter knows, the frame. trimesh judges the files in the tests.
+"""GLB, binary glTF 2.0, which browsers and 3D viewers show, through trimesh.
 
 The numbers are those of the mesh; the node's matrix carries them to what glTF demands, meters with y up and z to the
 front, and ``extras`` of the mesh name unit and frame.
@@ -9,9 +6,6 @@ front, and ``extras`` of the mesh name unit and frame.
 
 from __future__ import annotations
 
-import json
-import struct
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,8 +17,6 @@ from .written import single
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from ..model.mesh import TriMesh
     from .fields import Fields
     from .written import Written
@@ -35,32 +27,6 @@ METERS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
 TURNS = {"LPS": ((1, 0, 0), (0, 0, 1), (0, -1, 0)), "RAS": ((-1, 0, 0), (0, 0, 1), (0, 1, 0))}
 """Frame to the rows of its rotation to +x left, +y superior, +z anterior; others stay as they are."""
 
-COMPONENTS = {"<f4": 5126, "<u4": 5125, "|u1": 5121}
-"""NumPy's types of numbers to glTF's codes."""
-
-SHAPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
-
-VERTEX_BUFFER, INDEX_BUFFER = 34962, 34963
-
-
-@dataclass
-class Block:
-    """The file's block of numbers while it grows, and the JSON that says what is where."""
-
-    data: bytearray = field(default_factory=bytearray)
-    views: list[dict[str, Any]] = field(default_factory=list)
-    accessors: list[dict[str, Any]] = field(default_factory=list)
-
-    def add(self, values: NDArray[Any], target: int, **more: Any) -> int:
-        """Append an array (n,), or (n, 3 or 4), and return the number of its accessor."""
-        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": values.nbytes, "target": target}
-        self.data += np.ascontiguousarray(values).tobytes()
-        self.views.append(view)
-        width = values.shape[1] if values.ndim == 2 else 1
-        kind = {"componentType": COMPONENTS[values.dtype.str], "type": SHAPES[width]}
-        self.accessors.append({"bufferView": len(self.views) - 1, "count": len(values), **kind, **more})
-        return len(self.accessors) - 1
-
 
 def write_glb(mesh: TriMesh, path: str | Path, beside: Written) -> None:
     """Write 32-bit coordinates, colors, and other fields at vertices as 32-bit attributes ``_NAME``.
@@ -70,43 +36,41 @@ def write_glb(mesh: TriMesh, path: str | Path, beside: Written) -> None:
     OutputError
         Where 32 bits cannot keep the vertices apart.
     """
-    block = Block()
-    places = single(mesh.vertices, path, kind="GLB").astype("<f4")
-    box = {"min": places.min(axis=0).tolist(), "max": places.max(axis=0).tolist()}
-    corners = block.add(mesh.faces.ravel().astype("<u4"), INDEX_BUFFER)
-    attributes = {"POSITION": block.add(places, VERTEX_BUFFER, **box)} | _attributes(block, beside.vertex_fields)
-    scene = _scene(beside, {"attributes": attributes, "indices": corners, "mode": 4})
-    numbers = {"bufferViews": block.views, "accessors": block.accessors, "buffers": [{"byteLength": len(block.data)}]}
-    text = json.dumps({**scene, **numbers}, separators=(",", ":")).encode("ascii")
-    chunks = _chunk(b"JSON", text, b" ") + _chunk(b"BIN\0", bytes(block.data), b"\0")
+    import trimesh
+    from trimesh.exchange.gltf import export_glb
+
+    colors, attributes = _at_vertices(beside.vertex_fields)
+    body = trimesh.Trimesh(
+        single(mesh.vertices, path, kind="GLB"),
+        mesh.faces,
+        vertex_colors=colors,
+        vertex_attributes=attributes,
+        metadata={"unit": beside.unit, "frame": beside.frame},
+        process=False,
+    )
+    scene = trimesh.Scene()
+    scene.add_geometry(body, node_name="mesh", geom_name="mesh", transform=_to_gltf(beside))
+    data = export_glb(scene, include_normals=False, tree_postprocessor=lambda tree: _finish(tree, beside))
     with replacing(path) as file:
-        file.write(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+        file.write(data)
 
 
-def _attributes(block: Block, fields: Fields) -> dict[str, int]:
-    colors = named_colors(fields)
-    found = {}
-    if colors:
-        opaque = np.concatenate([colors[1], np.full((len(colors[1]), 1), 255, np.uint8)], axis=1)
-        found["COLOR_0"] = block.add(opaque, VERTEX_BUFFER, normalized=True)
-    for name, values in fields.items():
-        if not colors or name not in colors[0]:
-            found[f"_{name.upper()}"] = block.add(values.astype("<f4"), VERTEX_BUFFER)
-    return found
+def _at_vertices(fields: Fields) -> tuple[Any, Fields]:
+    """Part the colors, None where there are none, from the other fields."""
+    names, colors = named_colors(fields) or ([], None)
+    return colors, {f"_{name.upper()}": values.astype("<f4") for name, values in fields.items() if name not in names}
 
 
-def _scene(beside: Written, triangles: dict[str, Any]) -> dict[str, Any]:
+def _to_gltf(beside: Written) -> Any:
     matrix = np.eye(4)
     matrix[:3, :3] = METERS.get(beside.unit, 1.0) * np.array(TURNS.get(beside.frame, np.eye(3)))
-    return {
-        "asset": {"version": "2.0", "generator": beside.head},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "matrix": (matrix.T + 0.0).ravel().tolist()}],
-        "meshes": [{"primitives": [triangles], "extras": {"unit": beside.unit, "frame": beside.frame}}],
-    }
+    return matrix
 
 
-def _chunk(kind: bytes, data: bytes, filler: bytes) -> bytes:
-    data += filler * (-len(data) % 4)
-    return struct.pack("<I4s", len(data), kind) + data
+def _finish(tree: dict[str, Any], beside: Written) -> None:
+    """Name the program, and drop the bounds of attributes, which glTF does not need: JSON has no word for NaN."""
+    tree["asset"]["generator"] = beside.head
+    attributes = tree["meshes"][0]["primitives"][0]["attributes"]
+    for number in (number for name, number in attributes.items() if name.startswith("_")):
+        for bound in ("min", "max"):
+            tree["accessors"][number].pop(bound, None)
