@@ -1,7 +1,8 @@
-"""PCD, the Point Cloud Library's format: text, binary, and binary compressed."""
+"""PCD, the Point Cloud Library's format: text, binary, and through pypcd4 binary compressed."""
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import dataclass
 from itertools import accumulate
@@ -11,9 +12,9 @@ import numpy as np
 
 from ..errors import FormatError
 from .colors import packed_colors
+from .extras import required
 from .fields import AXES, split_fields
 from .limits import require_bytes, require_memory, require_rows
-from .lzf import decompress
 from .source import third_party, whole
 from .text import parse_rows, typed
 
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 
 PADDING = "_"
 """The name of fields that hold nothing."""
+
+LZF_RATIO = 88
+"""No LZF stream holds more than this many times its own bytes: its longest copy, 264 bytes, takes three."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,22 @@ class Header:
     def starts(self) -> list[int]:
         """The first column of each field in a text, and the number of columns last."""
         return [0, *accumulate(math.prod(kind.shape) for _, kind in self.fields)]
+
+    @property
+    def numbered(self) -> bytes:
+        """The header that pypcd4 is given: it cuts names short, and draws some for padding, so each is a number."""
+        kinds = [kind for _, kind in self.fields]
+        rows = {
+            "VERSION": [".7"],
+            "FIELDS": range(len(kinds)),
+            "SIZE": [kind.base.itemsize for kind in kinds],
+            "TYPE": [kind.base.kind.upper() for kind in kinds],
+            "COUNT": [math.prod(kind.shape) for kind in kinds],
+            "WIDTH": [self.count],
+            "POINTS": [self.count],
+            "DATA": [self.data],
+        }
+        return "".join(f"{word} {' '.join(map(str, values))}\n" for word, values in rows.items()).encode("ascii")
 
     @property
     def promised(self) -> int:
@@ -137,22 +157,27 @@ def _read_binary(data: bytes, header: Header, file: str) -> Fields:
 
 
 def _read_compressed(data: bytes, header: Header, file: str) -> Fields:
-    """Read one field after the other, under LZF."""
+    """Read one field after the other through pypcd4; of several values, those of a point are side by side."""
+    _check_compressed(data, header, file)
+    pypcd4 = required("pypcd4", file=file)
+    with third_party("pypcd4", file):
+        rows = pypcd4.PointCloud.from_fileobj(io.BytesIO(header.numbered + data[header.length :])).pc_data
+    columns = iter(rows.dtype.names)
+    found: Fields = {}
+    for name, kind in header.fields:
+        blocks = [rows[next(columns)] for _ in range(math.prod(kind.shape))]
+        found[name] = np.concatenate(blocks).reshape(-1, *kind.shape)
+    return found
+
+
+def _check_compressed(data: bytes, header: Header, file: str) -> None:
+    """Compare the two sizes in front of an LZF stream with the file, the header, what LZF can hold, and the memory."""
     require_bytes(8, len(data) - header.length, file=file)
     packed, size = (int(number) for number in np.frombuffer(data, "<u4", 2, header.length))
-    start = header.length + 8
-    require_bytes(packed, len(data) - start, file=file)
+    require_bytes(packed, len(data) - header.length - 8, file=file)
     require_bytes(header.promised, size, file=file)
+    require_bytes(size, packed * LZF_RATIO, file=file)
     require_memory(size, file=file)
-    with third_party("the LZF decoder", file):
-        plain = decompress(data[start : start + packed], size)
-    columns: Fields = {}
-    at = 0
-    for name, kind in header.fields:
-        values = np.frombuffer(plain, kind.base, header.count * math.prod(kind.shape), at)
-        columns[name] = values.reshape(-1, *kind.shape)
-        at += header.count * kind.itemsize
-    return columns
 
 
 READERS = {"ascii": _read_ascii, "binary": _read_binary, "binary_compressed": _read_compressed}

@@ -42,9 +42,9 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
     path : path
         ``.ply`` (text or binary); ``.xyz``, ``.txt`` or ``.csv`` (the columns named x, y and z, else the first
         three); ``.npy`` with an (n, 3) array or named fields; ``.npz`` with ``points`` or the like; ``.pcd``;
-        ``.las``, ``.laz`` and ``.e57`` (with the extra ``clouds``); or the vertices of ``.obj``, ``.off`` and
-        ``.stl`` (its equal positions become one vertex); or a DICOM RT Structure Set, of which one structure's
-        contours are taken.
+        ``.las``, ``.laz`` and ``.e57`` (with the extra ``clouds``, which compressed ``.pcd`` needs too); or the
+        vertices of ``.obj``, ``.off`` and ``.stl`` (its equal positions become one vertex); or a DICOM RT Structure
+        Set, of which one structure's contours are taken.
     settings : CloudSettings, optional
         What to do where the file leaves a choice.
 
