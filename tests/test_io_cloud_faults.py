@@ -134,7 +134,7 @@ class TestArrays:
         at = raw.index(b"PK\x01\x02")
         raw[at + 24 : at + 28] = b"\xfe\xff\xff\xff"  # the directory's word for the size, just below ZIP64's mark
         (tmp_path / "c.npz").write_bytes(raw)
-        monkeypatch.setattr("tomomesh.io.limits.physical_memory", lambda: 2**31)
+        monkeypatch.setattr("tomomesh.io.files.limits.physical_memory", lambda: 2**31)
         with pytest.raises(ResourceError):
             read_points(tmp_path / "c.npz")
 

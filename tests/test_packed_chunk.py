@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from tomomesh.io import packed_chunk
-from tomomesh.io.packed_chunk import promised_bytes
+from tomomesh.io.volumes.zarr import packed_chunk
+from tomomesh.io.volumes.zarr.packed_chunk import promised_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ...errors import FormatError, TomomeshError, UnreadableError
-from ..source import first_bytes, third_party
-from .dataset import read_dataset
-from .header import Frame, frames_of
-from .kinds import no_image
+from ..files.source import first_bytes, third_party
+from .headers.dataset import read_dataset
+from .headers.header import Frame, frames_of
+from .headers.kinds import no_image
 
 if TYPE_CHECKING:
     from pathlib import Path
