@@ -92,3 +92,8 @@ def test_it_refuses_what_is_no_entry(sections: Any) -> None:
 )
 def test_lengths_with_a_gap_between_them(cells: Any, valid: bool) -> None:
     assert JUDGE.is_valid({"cubes": {"cell_mm": cells}}) is valid
+
+
+@pytest.mark.parametrize(("name", "valid"), [("Liver", True), ("1", True), ("", False), (" \t", False), (1, False)])
+def test_texts_are_not_blank(name: Any, valid: bool) -> None:
+    assert JUDGE.is_valid({"cloud": {"structure": name}}) is valid

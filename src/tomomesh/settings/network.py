@@ -10,7 +10,8 @@ from .parameter import Group, param
 SURFACES = ("sphere", "torus")
 """Networks with faces: closed surfaces, which live in space."""
 IN_SLICE, IN_SPACE = 58, 2562
-"""Neurons where none are asked for: the paper's of a slice, and those of an icosahedron divided 16-fold."""
+"""Neurons where none are asked for: the paper's of a slice, and those of an icosahedron with edges divided 16-fold:
+10 x 16^2 + 2."""
 FALLS = ("linear", "power", "exponential", "inverse")
 """How a learning rate or a radius may fall."""
 

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
 INVALID = ("cartesianInvalidState", "sphericalInvalidState")
-COLOR = ("colorRed", "colorGreen", "colorBlue")
+E57_COLORS = ("colorRed", "colorGreen", "colorBlue")
 
-CHUNK = 1 << 17
-"""Points read at a time: a count that lies is found before much is allocated."""
+POINTS_AT_ONCE = 1 << 17
+"""Points read at a time, a megabyte a field: a count that lies is found before much is allocated."""
 
 
 def read_e57(path: Path) -> Cloud:
@@ -52,7 +52,7 @@ def _read_scan(pye57: Any, image: Any, scan: Any, file: str) -> Cloud:
     axes = next((axes for axes in (CARTESIAN, SPHERICAL) if set(axes) <= set(header.point_fields)), None)
     if axes is None:
         raise FormatError("a scan has no positions", file=file, expected="cartesian or spherical coordinates")
-    wanted = [*axes, *COLOR, "intensity", INVALID[axes == SPHERICAL]]
+    wanted = [*axes, *E57_COLORS, "intensity", INVALID[axes == SPHERICAL]]
     columns = _columns(pye57, image, header, [name for name in wanted if name in header.point_fields])
     require_rows(header.point_count, len(columns[axes[0]]), "points", file=file)
     valid = columns.pop(wanted[-1], np.zeros(len(columns[axes[0]]))) == 0
@@ -65,9 +65,9 @@ def _read_scan(pye57: Any, image: Any, scan: Any, file: str) -> Cloud:
 def _columns(pye57: Any, image: Any, header: Any, names: list[str]) -> Fields:
     """Read fields of a scan, chunk after chunk."""
     buffers = pye57.libe57.VectorSourceDestBuffer()
-    chunk = {name: np.empty(CHUNK) for name in names}
+    chunk = {name: np.empty(POINTS_AT_ONCE) for name in names}
     for name, array in chunk.items():
-        buffers.append(pye57.libe57.SourceDestBuffer(image, name, array, CHUNK, True, True))
+        buffers.append(pye57.libe57.SourceDestBuffer(image, name, array, POINTS_AT_ONCE, True, True))
     parts: list[Fields] = []
     with closing(header.points.reader(buffers)) as reader:
         while count := reader.read():

@@ -25,10 +25,10 @@ HEAD = struct.Struct("<4s90xHII")
 """The beginning of a header: its mark, its own bytes, those up to the points, and how many records are between."""
 
 RECORD_BYTES = 54
-"""Least bytes of one of those records."""
+"""Least bytes of one of those records: their headers (LAS 1.4, variable length records)."""
 
-CHUNK = 1 << 18
-"""Points read at a time: a count that lies is found before much is allocated."""
+POINTS_AT_ONCE = 1 << 18
+"""Points read at a time, at most 17 MB of them: a count that lies is found before much is allocated."""
 
 
 def read_las(path: Path) -> Cloud:
@@ -46,7 +46,7 @@ def read_las(path: Path) -> Cloud:
         _check_promises(path, reader.header)
         names = [name for name in reader.header.point_format.dimension_names if name in CARRIED]
         names += reader.header.point_format.extra_dimension_names
-        chunks = [_columns(chunk, names) for chunk in reader.chunk_iterator(CHUNK)]
+        chunks = [_columns(chunk, names) for chunk in reader.chunk_iterator(POINTS_AT_ONCE)]
         require_rows(reader.header.point_count, sum(len(chunk[""]) for chunk in chunks), "points", file=file)
     if not chunks:
         return np.empty((0, 3)), {}

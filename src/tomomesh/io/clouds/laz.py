@@ -17,8 +17,8 @@ RECORD = struct.Struct("<H10xI")
 UNCHUNKED = 1
 """The compressor of the first LASzip, all points in one run."""
 
-LAYERS = {6: 9, 7: 10, 8: 11, 9: 10, 10: 12}
-"""Layers of a chunk for the point formats that have them; each extra byte has one more."""
+CHUNK_LAYERS = {6: 9, 7: 10, 8: 11, 9: 10, 10: 12}
+"""Layers of a chunk for the point formats that have them (LASzip's format); each extra byte has one more."""
 
 
 def check_chunks(path: Path, header: Any) -> None:
@@ -47,7 +47,7 @@ def check_chunks(path: Path, header: Any) -> None:
         # every chunk begins with a point as it is
         require_bytes(count * header.point_format.size, held, file=str(path))
         require_rows(header.point_count, count * points_each, "points in its chunks", file=str(path))
-        if header.point_format.id in LAYERS:
+        if header.point_format.id in CHUNK_LAYERS:
             _check_layers(file, start, header, held, str(path))
 
 
@@ -64,7 +64,7 @@ def _count(file: IO[bytes], start: int) -> int:
 
 def _check_layers(file: IO[bytes], start: int, header: Any, held: int, name: str) -> None:
     """Step from chunk to chunk: a point, how many there are, the length of each layer, the layers."""
-    layers = LAYERS[header.point_format.id] + header.point_format.num_extra_bytes
+    layers = CHUNK_LAYERS[header.point_format.id] + header.point_format.num_extra_bytes
     head = struct.Struct(f"<{1 + layers}I")
     at, left = start + 8, header.point_count
     while left > 0:

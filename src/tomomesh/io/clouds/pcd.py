@@ -33,7 +33,7 @@ LZF_RATIO = 88
 
 
 @dataclass(frozen=True)
-class Header:
+class PcdHeader:
     """What a PCD file promises.
 
     Attributes
@@ -95,7 +95,7 @@ def read_pcd(path: Path) -> Cloud:
     return split_fields(_unpacked(columns), file=file)
 
 
-def _header(data: bytes, file: str) -> Header:
+def _header(data: bytes, file: str) -> PcdHeader:
     """Read the header.
 
     Raises
@@ -114,7 +114,7 @@ def _header(data: bytes, file: str) -> Header:
         count = int(words["POINTS"][0]) if "POINTS" in words else width * height
         if count < 0 or count != width * height:
             raise ValueError(count)
-        header = Header(_fields(words), count, height > 1, words["DATA"][0], length, len(lines))
+        header = PcdHeader(_fields(words), count, height > 1, words["DATA"][0], length, len(lines))
     except (KeyError, IndexError, ValueError, TypeError):
         raise FormatError("the PCD header cannot be understood", file=file) from None
     if not set(AXES) <= {name for name, kind in header.fields if not kind.shape}:
@@ -133,7 +133,7 @@ def _fields(words: dict[str, list[str]]) -> tuple[tuple[str, np.dtype[Any]], ...
     return tuple(zip(names, types, strict=True))
 
 
-def _read_ascii(data: bytes, header: Header, file: str) -> Fields:
+def _read_ascii(data: bytes, header: PcdHeader, file: str) -> Fields:
     *starts, width = header.starts
     require_bytes(2 * header.count * width - 1, len(data) - header.length, file=file)
     lines = data[header.length :].decode("ascii", "replace").splitlines()[: header.count]
@@ -148,7 +148,7 @@ def _read_ascii(data: bytes, header: Header, file: str) -> Fields:
     return columns
 
 
-def _read_binary(data: bytes, header: Header, file: str) -> Fields:
+def _read_binary(data: bytes, header: PcdHeader, file: str) -> Fields:
     """Read one point after the other."""
     require_bytes(header.promised, len(data) - header.length, file=file)
     numbered = [(f"{number}", kind.base, kind.shape) for number, (_, kind) in enumerate(header.fields)]
@@ -156,7 +156,7 @@ def _read_binary(data: bytes, header: Header, file: str) -> Fields:
     return {name: rows[f"{number}"] for number, (name, _) in enumerate(header.fields)}
 
 
-def _read_compressed(data: bytes, header: Header, file: str) -> Fields:
+def _read_compressed(data: bytes, header: PcdHeader, file: str) -> Fields:
     """Read one field after the other through pypcd4; of several values, those of a point are side by side."""
     _check_compressed(data, header, file)
     pypcd4 = required("pypcd4", file=file)
@@ -170,7 +170,7 @@ def _read_compressed(data: bytes, header: Header, file: str) -> Fields:
     return found
 
 
-def _check_compressed(data: bytes, header: Header, file: str) -> None:
+def _check_compressed(data: bytes, header: PcdHeader, file: str) -> None:
     """Compare the two sizes in front of an LZF stream with the file, the header, what LZF can hold, and the memory."""
     require_bytes(8, len(data) - header.length, file=file)
     packed, size = (int(number) for number in np.frombuffer(data, "<u4", 2, header.length))

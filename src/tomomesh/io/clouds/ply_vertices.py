@@ -11,14 +11,14 @@ from ...errors import FormatError
 from ..fields import AXES, split_fields
 from ..files.limits import require_bytes, require_rows
 from ..files.source import whole
-from ..meshes.ply import CODES, ORDERS, parse_header
+from ..meshes.ply import BYTE_ORDERS, TYPE_CODES, parse_header
 from ..text import parse_rows, typed
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from ..fields import Cloud, Fields
-    from ..meshes.ply import Element, Header
+    from ..meshes.ply import PlyElement, PlyHeader
 
 
 def read_ply(path: Path) -> Cloud:
@@ -40,7 +40,7 @@ def read_ply(path: Path) -> Cloud:
     return split_fields(read(data, header, before, vertex, file), file=file)
 
 
-def _text_rows(data: bytes, header: Header, before: tuple[Element, ...], vertex: Element, file: str) -> Fields:
+def _text_rows(data: bytes, header: PlyHeader, before: tuple[PlyElement, ...], vertex: PlyElement, file: str) -> Fields:
     first = sum(element.count for element in before)
     lines = data[header.length :].decode("ascii", "replace").splitlines()[first : first + vertex.count]
     rows = parse_rows(
@@ -55,8 +55,10 @@ def _text_rows(data: bytes, header: Header, before: tuple[Element, ...], vertex:
     return {name: column if name in AXES else typed(column, kind) for name, kind, column in columns}
 
 
-def _binary_rows(data: bytes, header: Header, before: tuple[Element, ...], vertex: Element, file: str) -> Fields:
-    order, start = ORDERS[header.format], header.length
+def _binary_rows(
+    data: bytes, header: PlyHeader, before: tuple[PlyElement, ...], vertex: PlyElement, file: str
+) -> Fields:
+    order, start = BYTE_ORDERS[header.format], header.length
     try:
         for element in before:
             start = _end(data, start, element, order)
@@ -68,13 +70,13 @@ def _binary_rows(data: bytes, header: Header, before: tuple[Element, ...], verte
     return {name: rows[name] for name in vertex.names}
 
 
-def _end(data: bytes, start: int, element: Element, order: str) -> int:
+def _end(data: bytes, start: int, element: PlyElement, order: str) -> int:
     """Return where the rows of an element end that begin at `start`."""
     types = element.types(order)
     if not element.has_lists:
         return start + element.count * sum(kind.itemsize for kind in types)
     words = element.properties
-    items = [np.dtype(CODES[one[2]]).itemsize if one[0] == "list" else 0 for one in words]
+    items = [np.dtype(TYPE_CODES[one[2]]).itemsize if one[0] == "list" else 0 for one in words]
     lengths = [struct.Struct((order or "=") + kind.char) for kind in types]
     for _ in range(element.count):
         for length, item in zip(lengths, items, strict=True):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ...settings import ReadSettings
-    from .headers.header import Frame
+    from .headers.header import ImageFrame
 
 
 def read_dicom(files: list[Path], settings: ReadSettings, *, study: str, others: Counter[str] | None = None) -> Volume:
@@ -101,7 +101,7 @@ def list_stacks(files: list[Path]) -> list[int]:
 
 
 def _decoded(
-    frames: list[Frame], decode: Decoder, settings: ReadSettings, study: str
+    frames: list[ImageFrame], decode: Decoder, settings: ReadSettings, study: str
 ) -> tuple[Stack, Gray, tuple[str, ...]]:
     """Stack and decode slices; those whose pixels turn out to be broken are refused, or left out and the rest stacked.
 

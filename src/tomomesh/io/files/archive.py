@@ -19,18 +19,19 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 MOST_MEMBERS = 2**16
-"""Most files of an archive."""
+"""Most files of an archive: one more than zip can list without its extension of 64 bits."""
 
 DIRECTORY_BYTES = 512 * MOST_MEMBERS
-"""Longest table of contents: it is read into the memory whole."""
+"""Longest table of contents, which is read into the memory whole: an entry has 46 bytes and its name."""
 
-RATIO = 500
-"""An archive that promises more than this many times its own bytes is a bomb; label maps stay below."""
+BOMB_RATIO = 500
+"""An archive that promises more than this many times its own bytes is a bomb: deflate reaches 1,032, label maps stay
+below."""
 
-SMALL = 2**26
-"""Bytes from which on the ratio counts."""
+SMALL_BYTES = 2**26
+"""Unpacked bytes from which on the ratio counts: what is smaller does no harm."""
 
-TAIL = 2**16 + 200
+TAIL_BYTES = 2**16 + 200
 """The table's length stands among the last bytes of an archive, before a comment of at most 64 KiB."""
 
 
@@ -75,7 +76,7 @@ def _unpack(path: Path, folder: Path) -> None:
 def _check_table(path: Path) -> None:
     """Refuse a table of contents that is too long, before it is read."""
     with path.open("rb") as file:
-        file.seek(max(path.stat().st_size - TAIL, 0))
+        file.seek(max(path.stat().st_size - TAIL_BYTES, 0))
         tail = file.read()
     short, wide = tail.rfind(b"PK\x05\x06"), tail.rfind(b"PK\x06\x06")
     lengths = [int.from_bytes(tail[short + 12 : short + 16], "little")] if short >= 0 else []
@@ -105,8 +106,8 @@ def _check_size(members: list[zipfile.ZipInfo], path: Path, folder: Path) -> Non
     promised, packed = sum(member.file_size for member in members), path.stat().st_size
     if len(members) > MOST_MEMBERS:
         raise _too_much("files", str(len(members)), str(MOST_MEMBERS), path)
-    if promised > max(RATIO * packed, SMALL):
-        raise _too_much("unpacked size", f"{promised} bytes", f"{RATIO} times the archive's {packed} bytes", path)
+    if promised > max(BOMB_RATIO * packed, SMALL_BYTES):
+        raise _too_much("unpacked size", f"{promised} bytes", f"{BOMB_RATIO} times the archive's {packed} bytes", path)
     require_memory(promised, file=str(path))
     if promised > (free := shutil.disk_usage(folder).free):
         raise _too_much("unpacked size", f"{promised} bytes", f"{free} bytes, the free space for it", path)

@@ -16,7 +16,7 @@ PLACE = re.compile(r"%0?[0-9]{0,2}d")
 """The place of a number in a pattern of names."""
 
 MOST_FILES = 2**16
-"""Most files that one header may name."""
+"""Most files that one header may name: one a slice, and no stack has so many slices."""
 
 
 def beside(header: Path, name: str) -> Path:

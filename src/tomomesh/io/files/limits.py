@@ -7,7 +7,7 @@ import os
 from ...errors import FormatError, ResourceError
 
 FALLBACK_BYTES = 16 * 2**30
-"""The limit where the machine does not say how much memory it has."""
+"""The limit where the machine does not say how much memory it has, as Windows does not: that of a usual workstation."""
 
 
 def require_memory(promised: int, *, file: str) -> None:

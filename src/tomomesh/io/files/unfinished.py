@@ -13,7 +13,7 @@ from typing import IO, TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-NAMES = ".tomomesh-*.tmp"
+HIDDEN_NAMES = ".tomomesh-*.tmp"
 """What an unfinished file is called for as long as it needs a name of its own."""
 
 OPEN_FILES = Path("/proc/self/fd")
@@ -34,7 +34,7 @@ def unfinished(target: Path) -> Iterator[IO[bytes]]:
     OSError
         Where the file cannot be written.
     """
-    hidden = target.with_name(NAMES.replace("*", secrets.token_hex(8)))
+    hidden = target.with_name(HIDDEN_NAMES.replace("*", secrets.token_hex(8)))
     nameless = _nameless(target.parent)
     try:
         with nameless or _named(hidden) as file:
@@ -92,7 +92,7 @@ def sweep(folder: Path) -> None:
     if sys.platform == "win32":
         return
     with suppress(OSError):
-        for path in folder.glob(NAMES):
+        for path in folder.glob(HIDDEN_NAMES):
             _remove_if_dead(path)
 
 

@@ -21,12 +21,14 @@ if TYPE_CHECKING:
 PLAIN, GZIP, ZLIB, BZIP2 = "raw", "gzip", "zlib", "bzip2"
 
 RATIOS = {PLAIN: 1, GZIP: 1032, ZLIB: 1032, BZIP2: 2**21}
-"""No stream of a packing holds more than this many times its own bytes."""
+"""No stream of a packing holds more than this many times its own bytes: zlib's own limit (its technical details), and
+the power of two above what bzip2 makes of zeros, 1.3 million to one (measured)."""
 
 SURPLUS_BYTES = 2**26
-"""A packed stream that goes on for longer after its voxels is taken for a bomb."""
+"""A packed stream that goes on for longer after its voxels is a bomb: these are a slice of 8,192 squared bytes."""
 
-CHUNK = 2**24
+BYTES_AT_ONCE = 2**24
+"""Bytes that are asked for together."""
 
 
 class _Zlib(io.RawIOBase):
@@ -123,7 +125,7 @@ def fill(data: NDArray[Any], stream: Any, *, file: str) -> None:
         Where a packed stream goes on far beyond them.
     """
     done = 0
-    while done < len(data) and (count := stream.readinto(data.data[done : done + CHUNK])):
+    while done < len(data) and (count := stream.readinto(data.data[done : done + BYTES_AT_ONCE])):
         done += count
     require_bytes(len(data), done, file=file)
     if isinstance(stream, (gzip.GzipFile, bz2.BZ2File, _Zlib)):

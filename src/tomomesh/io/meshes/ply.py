@@ -24,26 +24,26 @@ if TYPE_CHECKING:
     from .through_trimesh import Arrays
     from .written import Written
 
-NAMES = {
+TYPE_NAMES = {
     "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
     "i4": "int", "u4": "uint", "f4": "float", "f8": "double",
 }  # fmt: skip
 """NumPy's codes of the types of properties to PLY's names."""
 
-CODES = {
-    **{name: code for code, name in NAMES.items()},
+TYPE_CODES = {
+    **{name: code for code, name in TYPE_NAMES.items()},
     **{f"{word}{8 * size}": f"{word[0]}{size}" for word in ("int", "uint") for size in (1, 2, 4)},
     "float32": "f4",
     "float64": "f8",
 }
 """Every name of a type to NumPy's code."""
 
-ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 """The formats to their byte orders."""
 
 
 @dataclass(frozen=True)
-class Element:
+class PlyElement:
     """One kind of row: its name, how many there are, and the words that declare each property."""
 
     name: str
@@ -63,7 +63,7 @@ class Element:
     def types(self, order: str) -> list[np.dtype[Any]]:
         """Return the type of each property; of a list, that of its length."""
         kinds = [words[1] if words[0] == "list" else words[0] for words in self.properties]
-        return [np.dtype(order + CODES[kind]) for kind in kinds]
+        return [np.dtype(order + TYPE_CODES[kind]) for kind in kinds]
 
     def least_bytes(self, text: bool) -> int:
         """Return the fewest bytes that all rows can take: lists are empty, numbers have one digit."""
@@ -72,31 +72,31 @@ class Element:
 
 
 @dataclass(frozen=True)
-class Header:
+class PlyHeader:
     """What a PLY file promises.
 
     Attributes
     ----------
     format : str
-        One of `ORDERS`.
-    elements : tuple of Element
+        One of `BYTE_ORDERS`.
+    elements : tuple of PlyElement
         In the order of the file.
     length : int
         Bytes up to the first row.
     """
 
     format: str
-    elements: tuple[Element, ...]
+    elements: tuple[PlyElement, ...]
     length: int
 
-    def before(self, name: str) -> tuple[tuple[Element, ...], Element]:
+    def before(self, name: str) -> tuple[tuple[PlyElement, ...], PlyElement]:
         """Return an element by its name, an empty one where there is none, and those before it."""
         names = [one.name for one in self.elements]
         at = names.index(name) if name in names else len(names)
-        return self.elements[:at], (*self.elements, Element(name, 0, ()))[at]
+        return self.elements[:at], (*self.elements, PlyElement(name, 0, ()))[at]
 
 
-def parse_header(data: bytes, *, file: str) -> Header:
+def parse_header(data: bytes, *, file: str) -> PlyHeader:
     """Read a PLY header and compare what it promises with what the file holds.
 
     Raises
@@ -110,7 +110,7 @@ def parse_header(data: bytes, *, file: str) -> Header:
     if end < 0 or length == 0 or len(lines) < 2 or lines[0] != ["ply"]:
         raise FormatError("the file has no PLY header", file=file, expected="ply ... end_header")
     try:
-        header = Header(_format(lines), tuple(_elements(lines)), length)
+        header = PlyHeader(_format(lines), tuple(_elements(lines)), length)
         text = header.format == "ascii"
         promised = sum(element.least_bytes(text) for element in header.elements)
     except (IndexError, KeyError, ValueError):
@@ -122,12 +122,12 @@ def parse_header(data: bytes, *, file: str) -> Header:
 
 def _format(lines: list[list[str]]) -> str:
     name = next((words[1] for words in lines if words[:1] == ["format"]), "")
-    if name not in ORDERS:
+    if name not in BYTE_ORDERS:
         raise ValueError(name)
     return name
 
 
-def _elements(lines: list[list[str]]) -> list[Element]:
+def _elements(lines: list[list[str]]) -> list[PlyElement]:
     found: list[tuple[str, int, list[tuple[str, ...]]]] = []
     for words in lines:
         if words[:1] == ["element"]:
@@ -136,7 +136,7 @@ def _elements(lines: list[list[str]]) -> list[Element]:
             found.append((words[1], int(words[2]), []))
         elif words[:1] == ["property"]:
             found[-1][2].append(tuple(words[1:]))
-    return [Element(name, count, tuple(properties)) for name, count, properties in found]
+    return [PlyElement(name, count, tuple(properties)) for name, count, properties in found]
 
 
 def read_ply_mesh(data: bytes, file: str) -> Arrays:
@@ -189,7 +189,7 @@ def write_ply(
 
 def _storable(column: NDArray[Any]) -> NDArray[Any]:
     """Return a column in a type that PLY has."""
-    if column.dtype.str[1:] in NAMES:
+    if column.dtype.str[1:] in TYPE_NAMES:
         return column
     if column.dtype.kind == "f":
         return column.astype(np.float32 if column.dtype.itemsize < 4 else np.float64)
@@ -205,4 +205,4 @@ def _rows(columns: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
 
 
 def _properties(columns: Mapping[str, NDArray[Any]]) -> list[str]:
-    return [f"property {NAMES[column.dtype.str[1:]]} {name}" for name, column in columns.items()]
+    return [f"property {TYPE_NAMES[column.dtype.str[1:]]} {name}" for name, column in columns.items()]

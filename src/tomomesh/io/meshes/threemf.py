@@ -47,6 +47,7 @@ FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 """The date of every member, so that the bytes repeat; a zip knows none before."""
 
 COLORS_ID, MESH_ID = 1, 2
+"""Numbers of the two resources of a file; any will do."""
 
 
 def write_3mf(mesh: TriMesh, path: str | Path, beside: Written) -> None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ..fields import Fields
     from .written import Written
 
-KINDS = {
+VTK_TYPES = {
     "i1": "Int8", "u1": "UInt8", "i2": "Int16", "u2": "UInt16", "i4": "Int32", "u4": "UInt32",
     "i8": "Int64", "u8": "UInt64", "f4": "Float32", "f8": "Float64",
 }  # fmt: skip
@@ -111,8 +111,10 @@ def _section(name: str, arrays: Fields) -> Iterator[str]:
 
 def _array(name: str, values: NDArray[Any]) -> str:
     """Return an array: its bytes behind their count, in letters."""
-    values = values if values.dtype.str[1:] in KINDS else values.astype(np.float64)
+    values = values if values.dtype.str[1:] in VTK_TYPES else values.astype(np.float64)
     raw = np.ascontiguousarray(values, values.dtype.newbyteorder("<")).tobytes()
     data = base64.b64encode(len(raw).to_bytes(8, "little") + raw).decode("ascii")
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
-    return f'<DataArray type="{KINDS[values.dtype.str[1:]]}" Name="{name}"{width} format="binary">{data}</DataArray>'
+    return (
+        f'<DataArray type="{VTK_TYPES[values.dtype.str[1:]]}" Name="{name}"{width} format="binary">{data}</DataArray>'
+    )

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SLICES = (".dcm", ".ima", *FAMILIES)
 """Suffixes of files that may be one slice of several."""
-HEADERS = (".nhdr", ".mhd", ".hdr", ".hdr.gz")
+DETACHED_HEADERS = (".nhdr", ".mhd", ".hdr", ".hdr.gz")
 """Suffixes of headers whose voxels lie in other files beside them."""
 PAGES = (".tif", ".tiff")
 """Suffixes of files that hold one slice, or all pages of a study."""
@@ -144,7 +144,7 @@ def _slices_in(folder: Path, top: Path, wanted: int | None) -> list[Study]:
 
 def _beside(path: Path) -> tuple[Path, ...]:
     """Return the files that a volume may be read from: a header may name any file in its folder."""
-    return tuple(regular_files(path.parent)[0]) if suffix_of(path) in HEADERS else (path,)
+    return tuple(regular_files(path.parent)[0]) if suffix_of(path) in DETACHED_HEADERS else (path,)
 
 
 def _joined(path: Path, top: Path) -> str:

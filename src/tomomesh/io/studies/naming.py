@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 LONGEST = 200
-"""Bytes of a name, so that a suffix still fits into what file systems allow."""
+"""Bytes of a name, so that a suffix still fits into the 255 that file systems allow."""
 
 
 def distinct_names(short: Sequence[str], full: Sequence[str]) -> list[str]:

@@ -18,8 +18,15 @@ UNTURNED = "no directions in the file: columns to the left, rows to the back, sl
 NOT_GIVEN = "--spacing is not used: the file holds its own"
 """Notes on where a frame came from."""
 
+SPACING_HINT = "--spacing x y z"
+"""What to try where a file does not say how far its voxels are apart."""
+
 SMALLEST_SPACING = 1e-6
-"""Shorter distances of voxels are taken for a broken header; in the file's own unit."""
+"""Shorter distances of voxels are taken for a broken header; in the file's own unit. In mm it is a nanometer, below the
+voxels of light, X-rays and scanning electrons."""
+
+LEAST_VOLUME = 1e-3
+"""An affine whose unit columns span less is flat: one axis is within .06 degrees of the plane of the others."""
 
 
 def check_spacing(values: Sequence[float], fields: Sequence[str], *, file: str, hint: str) -> None:
@@ -54,7 +61,7 @@ def check_affine(affine: NDArray[np.float64], *, file: str, hint: str) -> None:
         lengths = np.sqrt((columns**2).sum(axis=0))
     if np.isfinite(affine).all() and lengths.min() >= SMALLEST_SPACING:
         volume = abs(float(np.linalg.det(columns / lengths)))
-        if volume >= 1e-3:
+        if volume >= LEAST_VOLUME:
             return
     raise GeometryError(
         "the affine is singular",
@@ -76,7 +83,7 @@ def required_spacing(
         Where none was.
     """
     if spacing is None:
-        raise GeometryError(what, file=file, expected="the distance of the voxels in mm", hint="--spacing x y z")
+        raise GeometryError(what, file=file, expected="the distance of the voxels in mm", hint=SPACING_HINT)
     return spacing
 
 

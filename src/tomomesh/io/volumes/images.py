@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 FAMILIES = {".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF", ".jpg": "JPEG", ".jpeg": "JPEG"}
 """Suffixes of slices, and the format behind each."""
 
-COLOR = {"RGB": "RGB", "RGBA": "RGB", "P": "RGB", "1": "L", "LA": "L"}
+CONVERTED_MODES = {"RGB": "RGB", "RGBA": "RGB", "P": "RGB", "1": "L", "LA": "L"}
 """Pillow's modes that are turned into another before they are read."""
 
-GRAY = ("L", "I", "F", "I;16", "I;16B", "I;16L")
+GRAY_MODES = ("L", "I", "F", "I;16", "I;16B", "I;16L")
 """Pillow's modes of one channel."""
 
 
@@ -72,7 +72,7 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
     stack = np.empty((len(ordered), *first.shape), first.dtype)
     for k, path in enumerate(ordered):
         pixels = _pixels(path)
-        _check_alike(pixels, first, path.name, ordered[0].name)
+        _check_same_kind(pixels, first, path.name, ordered[0].name)
         stack[k] = pixels
     voxels, notes = without_holes(stack, file=folder)
     note = f"{len(ordered)} {kinds[0]} slices in the order of their names: columns left, rows back, slices up"
@@ -116,8 +116,8 @@ def _pixels(path: Path) -> NDArray[Any]:
             if getattr(image, "n_frames", 1) > 1:
                 raise FormatError("the file holds several pages", file=path.name, expected="one slice a file")
             image.load()
-            pixels = np.asarray(image.convert(COLOR[image.mode]) if image.mode in COLOR else image)
-            if image.mode not in COLOR and image.mode not in GRAY:
+            pixels = np.asarray(image.convert(CONVERTED_MODES[image.mode]) if image.mode in CONVERTED_MODES else image)
+            if image.mode not in CONVERTED_MODES and image.mode not in GRAY_MODES:
                 raise FormatError(
                     "the slice's colors cannot be read",
                     file=path.name,
@@ -127,7 +127,7 @@ def _pixels(path: Path) -> NDArray[Any]:
     return native(pixels, file=path.name)
 
 
-def _check_alike(pixels: NDArray[Any], first: NDArray[Any], name: str, first_name: str) -> None:
+def _check_same_kind(pixels: NDArray[Any], first: NDArray[Any], name: str, first_name: str) -> None:
     if pixels.shape[:2] != first.shape[:2]:
         raise GeometryError(
             f"the slice differs in size from {first_name}",

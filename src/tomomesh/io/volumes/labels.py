@@ -23,7 +23,7 @@ LABEL_WRITERS = (".nii", ".nii.gz")
 """Suffixes in which labels are written."""
 
 LARGEST_SIDE = 32767
-"""NIfTI-1 keeps its sizes in 16 bits."""
+"""NIfTI-1 keeps its sizes in 16 bits with a sign."""
 
 
 def write_labels(labels: NDArray[np.uint16], volume: Volume, path: str | Path) -> None:

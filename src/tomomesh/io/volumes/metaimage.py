@@ -15,7 +15,7 @@ from ...errors import FormatError, GeometryError
 from ...model.volume import Volume
 from ..files.detached import beside, check_count, numbered
 from ..files.unpack import PLAIN, ZLIB
-from .affine import GIVEN, UNTURNED, check_affine, check_spacing, passed_over, required_spacing, upright
+from .affine import GIVEN, SPACING_HINT, UNTURNED, check_affine, check_spacing, passed_over, required_spacing, upright
 from .raster import TEXT, Raster, floats_of, gray_or_color, header_bytes, read_raster, sizes_of
 
 if TYPE_CHECKING:
@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...settings import ReadSettings
+    from .raster import HeaderFields
 
-TYPES = {
+META_TYPES = {
     "MET_CHAR": "i1", "MET_UCHAR": "u1", "MET_SHORT": "i2", "MET_USHORT": "u2", "MET_INT": "i4", "MET_UINT": "u4",
     "MET_LONG": "i4", "MET_ULONG": "u4", "MET_LONG_LONG": "i8", "MET_ULONG_LONG": "u8",
     "MET_FLOAT": "f4", "MET_DOUBLE": "f8",
@@ -36,12 +37,8 @@ DIRECTIONS = ("TransformMatrix", "Rotation", "Orientation")
 ORIGINS = ("Offset", "Position", "Origin")
 """Names of one field, in the order in which they are looked for."""
 
-LAST = re.compile(rb"^[ \t]*ElementDataFile[ \t]*=[^\n]*(\n|\Z)", re.MULTILINE)
+LAST_LINE = re.compile(rb"^[ \t]*ElementDataFile[ \t]*=[^\n]*(\n|\Z)", re.MULTILINE)
 """The line that ends the header."""
-
-HINT = "--spacing x y z"
-
-Fields = dict[str, str]
 
 
 def read_metaimage(path: Path, settings: ReadSettings) -> Volume:
@@ -75,9 +72,9 @@ def read_metaimage(path: Path, settings: ReadSettings) -> Volume:
     return Volume.from_stored(voxels, affine, notes=notes + more)
 
 
-def _parse(start: bytes, name: str) -> tuple[Fields, int]:
+def _parse(start: bytes, name: str) -> tuple[HeaderFields, int]:
     """Return the fields, and the bytes up to the voxels."""
-    last = LAST.search(start)
+    last = LAST_LINE.search(start)
     lines = start[: last.end() if last else 0].decode("utf-8", "replace").splitlines()
     fields = {key.strip(): value.strip() for key, _, value in (line.partition("=") for line in lines)}
     missing = [field for field in ("NDims", "DimSize", "ElementType") if field not in fields]
@@ -91,7 +88,7 @@ def _parse(start: bytes, name: str) -> tuple[Fields, int]:
     return fields, last.end()
 
 
-def _sizes(fields: Fields, name: str) -> tuple[int, ...]:
+def _sizes(fields: HeaderFields, name: str) -> tuple[int, ...]:
     """Return the sizes of columns, rows and slices."""
     if fields["NDims"] not in ("2", "3", "4"):
         raise FormatError("the sizes of the volume are invalid", file=name, found=f"NDims = {fields['NDims'][:80]}")
@@ -104,16 +101,16 @@ def _sizes(fields: Fields, name: str) -> tuple[int, ...]:
     return sizes[:3]
 
 
-def _channels(fields: Fields, name: str) -> int:
+def _channels(fields: HeaderFields, name: str) -> int:
     return sizes_of([fields.get("ElementNumberOfChannels", "1")], 1, "ElementNumberOfChannels", file=name)[0]
 
 
-def _frame(fields: Fields, settings: ReadSettings, name: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+def _frame(fields: HeaderFields, settings: ReadSettings, name: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Return the affine in millimeters, LPS, and notes."""
     spacing = _numbers(fields, ("ElementSpacing", "ElementSize"), 1, name)
     if spacing is None:
         return upright(required_spacing(settings.spacing, file=name)), (GIVEN,)
-    check_spacing(spacing.tolist(), [f"ElementSpacing[{n}]" for n in range(3)], file=name, hint=HINT)
+    check_spacing(spacing.tolist(), [f"ElementSpacing[{n}]" for n in range(3)], file=name, hint=SPACING_HINT)
     matrix, origin = _numbers(fields, DIRECTIONS, 2, name), _numbers(fields, ORIGINS, 1, name)
     affine = np.eye(4)
     affine[:3, :3] = (np.eye(3) if matrix is None else matrix.T) * spacing
@@ -123,7 +120,7 @@ def _frame(fields: Fields, settings: ReadSettings, name: str) -> tuple[NDArray[n
     return affine, notes + passed_over(settings.spacing)
 
 
-def _numbers(fields: Fields, names: tuple[str, ...], rank: int, name: str) -> NDArray[np.float64] | None:
+def _numbers(fields: HeaderFields, names: tuple[str, ...], rank: int, name: str) -> NDArray[np.float64] | None:
     """Return the first field that is there: 3 numbers, or 3 x 3, of as many dimensions as the file has."""
     field = next((one for one in names if one in fields), "")
     if not field:
@@ -137,13 +134,13 @@ def _numbers(fields: Fields, names: tuple[str, ...], rank: int, name: str) -> ND
     return numbers.reshape((count,) * rank)[(slice(3),) * rank]
 
 
-def _raster(fields: Fields, shape: tuple[int, ...], path: Path, start: bytes, length: int) -> Raster:
+def _raster(fields: HeaderFields, shape: tuple[int, ...], path: Path, start: bytes, length: int) -> Raster:
     name, kind = str(path), fields["ElementType"].removesuffix("_ARRAY")
-    if kind not in TYPES:
+    if kind not in META_TYPES:
         found = f"ElementType = {fields['ElementType'][:80]}"
         raise FormatError("the voxels are of an unknown kind", file=name, found=found)
     big = _is_true(fields, "BinaryDataByteOrderMSB") or _is_true(fields, "ElementByteOrderMSB")
-    dtype: np.dtype[Any] = np.dtype((">" if big else "<") + TYPES[kind])
+    dtype: np.dtype[Any] = np.dtype((">" if big else "<") + META_TYPES[kind])
     packing = ZLIB if _is_true(fields, "CompressedData") else PLAIN
     if fields.get("BinaryData", "True").lower() == "false":
         packing = TEXT
@@ -156,7 +153,7 @@ def _raster(fields: Fields, shape: tuple[int, ...], path: Path, start: bytes, le
     return Raster(shape, dtype, packing, _parts(named, path, start[length:]), int(before))
 
 
-def _is_true(fields: Fields, field: str) -> bool:
+def _is_true(fields: HeaderFields, field: str) -> bool:
     return fields.get(field, "").lower() in ("true", "1")
 
 

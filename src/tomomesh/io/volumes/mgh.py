@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 
     from ...settings import ReadSettings
 
-HEADER_BYTES = 284
-"""Bytes before the first voxel."""
+MGH_HEADER_BYTES = 284
+"""Bytes before the first voxel (FreeSurfer's wiki, MghFormat; so are all below)."""
 
-FIELD_BYTES = 90
+MGH_FIELD_BYTES = 90
 """Those of them that hold something."""
 
-GOOD = slice(28, 30)
+HAS_FRAME = slice(28, 30)
 """Those that say whether the frame counts, 1 or 0; nibabel puts the default frame and 1 in place of 0."""
 
-TYPES = {0: ">u1", 1: ">i4", 3: ">f4", 4: ">i2", 10: ">u2"}
+MGH_TYPES = {0: ">u1", 1: ">i4", 3: ">f4", 4: ">i2", 10: ">u2"}
 """The format's types to NumPy's."""
 
-HINT = "a file with a valid header"
+MGH_HINT = "a file with a valid header"
 
 
 def read_mgh(path: Path, settings: ReadSettings) -> Volume:
@@ -60,12 +60,12 @@ def read_mgh(path: Path, settings: ReadSettings) -> Volume:
     path, name = existing_file(path), str(path)
     packing = GZIP if suffix_of(path) == ".mgz" else PLAIN
     with unpacked(path, packing, file=name) as stream:
-        start = stream.read(HEADER_BYTES)
+        start = stream.read(MGH_HEADER_BYTES)
         header = _header(start, name)
         shape, dtype = _layout(header, name)
-        affine, notes = _frame(header, start[GOOD] == b"\0\1", name)
+        affine, notes = _frame(header, start[HAS_FRAME] == b"\0\1", name)
         promised = shape[0] * shape[1] * shape[2] * dtype.itemsize
-        check_promise(HEADER_BYTES + promised, path.stat().st_size, packing, file=name)
+        check_promise(MGH_HEADER_BYTES + promised, path.stat().st_size, packing, file=name)
         data = np.empty(promised, np.uint8)
         fill(data, stream, file=name)
     voxels, more = without_holes(native(data.view(dtype).reshape(shape[::-1]), file=name), file=name)
@@ -73,11 +73,11 @@ def read_mgh(path: Path, settings: ReadSettings) -> Volume:
 
 
 def _header(start: bytes, name: str) -> Any:
-    require_bytes(HEADER_BYTES, len(start), file=name)
+    require_bytes(MGH_HEADER_BYTES, len(start), file=name)
     from nibabel.freesurfer.mghformat import MGHHeader
 
     with third_party("nibabel", name):
-        header = MGHHeader(start[:FIELD_BYTES], check=False)
+        header = MGHHeader(start[:MGH_FIELD_BYTES], check=False)
     if int(header["version"]) != 1:
         found = f"version = {int(header['version'])}"
         raise FormatError("the file is no MGH file", file=name, found=found, expected="version 1")
@@ -94,17 +94,17 @@ def _layout(header: Any, name: str) -> tuple[tuple[int, int, int], np.dtype[Any]
     if sizes[3] > 1:
         hint = "one frame, written to a file of its own"
         raise FormatError("the file holds several frames", file=name, found=f"dims = {sizes}", hint=hint)
-    if code not in TYPES:
+    if code not in MGH_TYPES:
         raise FormatError("the voxels are of an unknown kind", file=name, found=f"type = {code}")
-    return (sizes[0], sizes[1], sizes[2]), np.dtype(TYPES[code])
+    return (sizes[0], sizes[1], sizes[2]), np.dtype(MGH_TYPES[code])
 
 
 def _frame(header: Any, good: bool, name: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Return the affine in millimeters, LPS; where the file marks its own as no good, FreeSurfer's default."""
     if good:
         spacing = [float(size) for size in header["delta"]]
-        check_spacing(spacing, ["delta[0]", "delta[1]", "delta[2]"], file=name, hint=HINT)
+        check_spacing(spacing, ["delta[0]", "delta[1]", "delta[2]"], file=name, hint=MGH_HINT)
     with third_party("nibabel", name):
         affine = FLIP @ np.asarray(header.get_affine(), np.float64)
-    check_affine(affine, file=name, hint=HINT)
+    check_affine(affine, file=name, hint=MGH_HINT)
     return affine, () if good else ("the file has no frame: FreeSurfer's own, coronal slices of 1 mm",)

@@ -11,9 +11,18 @@ from ...model.volume import Volume
 from ..files.detached import beside
 from ..files.source import existing_file, suffix_of, third_party
 from ..files.unpack import GZIP, PLAIN, check_promise, fill, unpacked
-from .affine import GIVEN, SMALLEST_SPACING, brought_to_mm, check_affine, check_spacing, passed_over, upright
+from .affine import (
+    GIVEN,
+    SMALLEST_SPACING,
+    SPACING_HINT,
+    brought_to_mm,
+    check_affine,
+    check_spacing,
+    passed_over,
+    upright,
+)
 from .gray import native, scaled, scaled_dtype, without_holes
-from .nifti_header import SIZES, Layout, layout_of, unpack_header
+from .nifti_header import NIFTI_HEADERS, NiftiLayout, layout_of, unpack_header
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,16 +34,14 @@ if TYPE_CHECKING:
 FLIP = np.diag([-1.0, -1.0, 1.0, 1.0])
 """RAS to LPS and back."""
 
-MM_PER_UNIT = {0: 1.0, 1: 1000.0, 2: 1.0, 3: 0.001}
-"""Millimeters in the header's unit: unknown, meter, millimeter, micron."""
+NIFTI_UNITS_MM = {0: 1.0, 1: 1000.0, 2: 1.0, 3: 0.001}
+"""Millimeters in the header's units of space (nifti1.h): unknown, meter, millimeter, micron."""
 
 PAIRED = {".hdr": ".img", ".img": ".hdr"}
 """Suffixes of a pair of files, and their partners'."""
 
 UNPLACED = "no orientation in the file (sform_code = qform_code = 0): taken for columns right, rows front, slices up"
 """The note on a file of the standard's method 1."""
-
-HINT = "--spacing x y z"
 
 
 def read_nifti(path: Path, settings: ReadSettings) -> Volume:
@@ -62,7 +69,7 @@ def read_nifti(path: Path, settings: ReadSettings) -> Volume:
     name = str(path)
     front, back = _files(existing_file(path))
     with unpacked(front, _packing(front), file=name) as stream:
-        header = unpack_header(stream.read(max(SIZES)), settings, paired=front != back, file=name)
+        header = unpack_header(stream.read(max(NIFTI_HEADERS)), settings, paired=front != back, file=name)
     layout = layout_of(header, paired=front != back, file=name)
     affine, notes = _frame(header, settings, name)
     check_promise(layout.offset + layout.promised, back.stat().st_size, _packing(back), file=name)
@@ -105,7 +112,7 @@ def _frame(header: Any, settings: ReadSettings, name: str) -> tuple[NDArray[np.f
     broken = not forms or not all(SMALLEST_SPACING <= size < np.inf for size in pixdim)
     if settings.spacing and broken:
         return upright(settings.spacing), (GIVEN,)
-    check_spacing(pixdim, ["pixdim[1]", "pixdim[2]", "pixdim[3]"], file=name, hint=HINT)
+    check_spacing(pixdim, ["pixdim[1]", "pixdim[2]", "pixdim[3]"], file=name, hint=SPACING_HINT)
     with third_party("nibabel", name):
         affine = getattr(header, f"get_{forms[0]}")() if forms else upright(pixdim)
     unit, notes = _unit(header, name)
@@ -116,18 +123,18 @@ def _frame(header: Any, settings: ReadSettings, name: str) -> tuple[NDArray[np.f
 
 def _unit(header: Any, name: str) -> tuple[float, tuple[str, ...]]:
     code = int(header["xyzt_units"]) & 7
-    if code not in MM_PER_UNIT:
+    if code not in NIFTI_UNITS_MM:
         raise GeometryError(
             "the unit of the coordinates is unknown",
             file=name,
             found=f"xyzt_units = {code}",
             expected="0 to 3",
         )
-    factor = MM_PER_UNIT[code]
+    factor = NIFTI_UNITS_MM[code]
     return factor, brought_to_mm(factor)
 
 
-def _gray(data: NDArray[np.uint8], layout: Layout, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+def _gray(data: NDArray[np.uint8], layout: NiftiLayout, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
     """Return voxels (K, J, I[, 3]); they are stored fastest axis first."""
     shape = layout.shape[::-1]
     if layout.dtype.names:

@@ -15,10 +15,10 @@ from .gray import check_scale
 if TYPE_CHECKING:
     from ...settings import ReadSettings
 
-SIZES = {348: "Nifti1Header", 540: "Nifti2Header"}
-"""Header lengths in bytes, and nibabel's classes for them."""
+NIFTI_HEADERS = {348: "Nifti1Header", 540: "Nifti2Header"}
+"""Header lengths in bytes (nifti1.h, nifti2.h), and nibabel's classes for them."""
 
-PLACES = {348: 344, 540: 4}
+MAGIC_AT = {348: 344, 540: 4}
 """Byte at which a header of each length says what it is."""
 
 MAGIC = {True: (b"ni1\0", b"ni2\0"), False: (b"n+1\0", b"n+2\0")}
@@ -29,7 +29,7 @@ ANALYZE_LACKS = ("qform_code", "sform_code", "xyzt_units", "scl_inter")
 
 
 @dataclass(frozen=True)
-class Layout:
+class NiftiLayout:
     """Where the voxels are, and of what kind.
 
     Attributes
@@ -80,10 +80,10 @@ def unpack_header(start: bytes, settings: ReadSettings, *, paired: bool, file: s
     GeometryError
         For Analyze 7.5, which does not say which side is left.
     """
-    require_bytes(min(SIZES), len(start), file=file)
-    size = next((n for n in SIZES if n in (_int(start, "<"), _int(start, ">"))), 0)
+    require_bytes(min(NIFTI_HEADERS), len(start), file=file)
+    size = next((n for n in NIFTI_HEADERS if n in (_int(start, "<"), _int(start, ">"))), 0)
     analyze = paired and size == 348 and not start[344:].startswith(b"n")
-    if not analyze and start[PLACES.get(size, 0) :][:4] not in MAGIC[paired]:
+    if not analyze and start[MAGIC_AT.get(size, 0) :][:4] not in MAGIC[paired]:
         expected = "NIfTI-1 or NIfTI-2 in " + ("a pair of files" if paired else "one file")
         raise FormatError("the file is no NIfTI file", file=file, expected=expected)
     if analyze and settings.spacing is None:
@@ -97,7 +97,7 @@ def unpack_header(start: bytes, settings: ReadSettings, *, paired: bool, file: s
     import nibabel
 
     with third_party("nibabel", file):
-        header = getattr(nibabel, SIZES[size])(start[:size], check=False)
+        header = getattr(nibabel, NIFTI_HEADERS[size])(start[:size], check=False)
     for field in ANALYZE_LACKS if analyze else ():
         header[field] = 0
     return header
@@ -107,7 +107,7 @@ def _int(start: bytes, order: str) -> int:
     return int(np.frombuffer(start, f"{order}i4", 1)[0])
 
 
-def layout_of(header: Any, *, paired: bool, file: str) -> Layout:
+def layout_of(header: Any, *, paired: bool, file: str) -> NiftiLayout:
     """Return what a header says of the voxels.
 
     Raises
@@ -122,7 +122,7 @@ def layout_of(header: Any, *, paired: bool, file: str) -> Layout:
     offset = float(header["vox_offset"])
     if not offset >= (0 if paired else int(header["sizeof_hdr"])) or not offset.is_integer():
         raise FormatError("the place of the voxels is invalid", file=file, found=f"vox_offset = {offset:g}")
-    return Layout(_shape(header, file), _dtype(header, file), int(offset), slope, intercept)
+    return NiftiLayout(_shape(header, file), _dtype(header, file), int(offset), slope, intercept)
 
 
 def _shape(header: Any, file: str) -> tuple[int, int, int]:

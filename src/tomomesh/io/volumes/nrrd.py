@@ -17,7 +17,7 @@ from ..files.detached import beside, check_count, numbered
 from ..files.source import first_bytes
 from ..files.unpack import BZIP2, GZIP, PLAIN
 from .nrrd_frame import frame_of, is_spatial
-from .raster import HEADER_BYTES, TEXT, Raster, gray_or_color, header_bytes, read_raster, sizes_of
+from .raster import LONGEST_HEADER, TEXT, Raster, gray_or_color, header_bytes, read_raster, sizes_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,8 +25,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...settings import ReadSettings
+    from .raster import HeaderFields
 
-BITS = {
+TYPE_WORDS = {
     "i1": ("signed char", "int8", "int8_t"),
     "u1": ("uchar", "unsigned char", "uint8", "uint8_t"),
     "i2": ("short", "short int", "signed short", "signed short int", "int16", "int16_t"),
@@ -40,19 +41,17 @@ BITS = {
 }
 """NumPy's codes of the types to the format's names for them."""
 
-TYPES = {name: code for code, names in BITS.items() for name in names}
+NRRD_TYPES = {name: code for code, names in TYPE_WORDS.items() for name in names}
 
 PACKINGS = {
     "raw": PLAIN, "gzip": GZIP, "gz": GZIP, "bzip2": BZIP2, "bz2": BZIP2, "text": TEXT, "txt": TEXT, "ascii": TEXT,
 }  # fmt: skip
 """The format's encodings."""
 
-ORDERS = {"little": "<", "big": ">"}
+NRRD_ORDERS = {"little": "<", "big": ">"}
 
 LIST = ""
 """The field under which the names stand that follow ``data file: LIST``."""
-
-Fields = dict[str, str]
 
 
 def read_nrrd(path: Path, settings: ReadSettings) -> Volume:
@@ -85,13 +84,13 @@ def read_nrrd(path: Path, settings: ReadSettings) -> Volume:
     return Volume.from_stored(voxels, affine, notes=notes + more)
 
 
-def _parse(start: bytes, name: str) -> tuple[Fields, int]:
+def _parse(start: bytes, name: str) -> tuple[HeaderFields, int]:
     """Return the fields, their names without spaces, and the bytes up to the voxels; -1 where none follow."""
     end = re.search(rb"\r?\n\r?\n", start)
-    if not re.match(rb"NRRD000[1-9]\r?\n", start) or (end is None and len(start) >= HEADER_BYTES):
+    if not re.match(rb"NRRD000[1-9]\r?\n", start) or (end is None and len(start) >= LONGEST_HEADER):
         raise FormatError("the file has no NRRD header", file=name, expected="NRRD000n, fields, and an empty line")
     lines = start[: end.start() if end else None].decode("utf-8", "replace").splitlines()[1:]
-    fields: Fields = {}
+    fields: HeaderFields = {}
     for number, line in enumerate(lines):
         field, colon, value = line.partition(": ")
         if colon and not line.startswith("#"):
@@ -105,13 +104,13 @@ def _parse(start: bytes, name: str) -> tuple[Fields, int]:
     return fields, end.end() if end else -1
 
 
-def _dimension(fields: Fields, name: str) -> int:
+def _dimension(fields: HeaderFields, name: str) -> int:
     if fields["dimension"] not in ("2", "3", "4", "5", "6"):
         raise FormatError("the sizes of the volume are invalid", file=name, found=f"dimension = {fields['dimension']}")
     return int(fields["dimension"])
 
 
-def _raster(fields: Fields, sizes: tuple[int, ...], path: Path, length: int, name: str) -> Raster:
+def _raster(fields: HeaderFields, sizes: tuple[int, ...], path: Path, length: int, name: str) -> Raster:
     dtype, packing = _dtype(fields, name), PACKINGS.get(fields["encoding"].lower(), "")
     if not packing:
         raise FormatError(
@@ -129,18 +128,18 @@ def _raster(fields: Fields, sizes: tuple[int, ...], path: Path, length: int, nam
     return Raster(sizes[::-1], dtype, packing, parts, -1 if skip < 0 else start + skip)
 
 
-def _dtype(fields: Fields, name: str) -> np.dtype[Any]:
+def _dtype(fields: HeaderFields, name: str) -> np.dtype[Any]:
     kind, endian = fields["type"].lower(), fields.get("endian", "").lower()
-    if kind not in TYPES:
+    if kind not in NRRD_TYPES:
         raise FormatError("the voxels are of an unknown kind", file=name, found=f"type = {fields['type']}")
-    code = TYPES[kind]
-    if code[1] != "1" and PACKINGS.get(fields["encoding"].lower()) != TEXT and endian not in ORDERS:
+    code = NRRD_TYPES[kind]
+    if code[1] != "1" and PACKINGS.get(fields["encoding"].lower()) != TEXT and endian not in NRRD_ORDERS:
         found = f"endian = {endian or 'missing'}"
         raise FormatError("the byte order of the voxels is unknown", file=name, found=found, expected="little | big")
-    return np.dtype(ORDERS.get(endian, "<") + code)
+    return np.dtype(NRRD_ORDERS.get(endian, "<") + code)
 
 
-def _parts(fields: Fields, path: Path, length: int, name: str) -> tuple[Path, ...]:
+def _parts(fields: HeaderFields, path: Path, length: int, name: str) -> tuple[Path, ...]:
     """Return the files that hold the voxels: the file itself, or those that it names."""
     named = fields.get("datafile", "")
     if not named:
@@ -156,7 +155,7 @@ def _parts(fields: Fields, path: Path, length: int, name: str) -> tuple[Path, ..
     return (beside(path, named),)
 
 
-def _whole_number(fields: Fields, field: str, name: str) -> int:
+def _whole_number(fields: HeaderFields, field: str, name: str) -> int:
     value = fields.get(field, "0")
     if not re.fullmatch(r"-1|[0-9]{1,15}", value):
         raise FormatError("a field of the header is no number", file=name, found=f"{field} = {value[:80]}")
@@ -165,7 +164,7 @@ def _whole_number(fields: Fields, field: str, name: str) -> int:
 
 def _after_lines(part: Path, start: int, lines: int, name: str) -> int:
     """Return where the lines end that stand before the voxels."""
-    ends = [match.end() for match in re.finditer(rb"\n", first_bytes(part, start + HEADER_BYTES)[start:])]
+    ends = [match.end() for match in re.finditer(rb"\n", first_bytes(part, start + LONGEST_HEADER)[start:])]
     if lines > len(ends):
         raise FormatError(
             "the file has fewer lines than are to be passed over", file=name, found=f"lines = {len(ends)}"

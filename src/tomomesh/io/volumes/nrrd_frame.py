@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import FormatError, GeometryError
-from .affine import GIVEN, UNTURNED, brought_to_mm, check_affine, check_spacing, passed_over, required_spacing, upright
+from .affine import (
+    GIVEN,
+    SPACING_HINT,
+    UNTURNED,
+    brought_to_mm,
+    check_affine,
+    check_spacing,
+    passed_over,
+    required_spacing,
+    upright,
+)
 from .raster import floats_of
 
 if TYPE_CHECKING:
@@ -28,12 +38,11 @@ SPACES = {
 NAMELESS = ("", "scanner-xyz", "3d-right-handed")
 """Spaces that name no patient axes; ITK, which writes such files, means LPS."""
 
-MM_PER_UNIT = {"": 1.0, "mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "µm": 0.001, "μm": 0.001}
+NRRD_UNITS_MM = {"": 1.0, "mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "µm": 0.001, "μm": 0.001}
+"""Millimeters in the format's units of space, which are free text; none is taken for mm, as ITK does."""
 
 OTHER_KINDS = re.compile(r".*color|.*vector|.*matrix|list|time|point|normal|.*gradient|complex|quaternion|stub|scalar")
 """Kinds of axes that are none of space."""
-
-HINT = "--spacing x y z"
 
 
 def is_spatial(fields: Mapping[str, str], sizes: tuple[int, ...], *, file: str) -> list[bool]:
@@ -126,7 +135,7 @@ def _signs(fields: Mapping[str, str], file: str) -> tuple[tuple[int, int, int], 
 
 def _unit(fields: Mapping[str, str], file: str) -> tuple[float, tuple[str, ...]]:
     units = {unit.lower() for unit in re.findall(r'"([^"]*)"', fields.get("spaceunits", ""))}
-    factors = {MM_PER_UNIT.get(unit) for unit in units or {""}}
+    factors = {NRRD_UNITS_MM.get(unit) for unit in units or {""}}
     factor = next(iter(factors))
     if len(factors) > 1 or factor is None:
         found = f"space units = {' '.join(sorted(units))[:80]}"
@@ -143,6 +152,6 @@ def _without_directions(
     words = fields.get("spacings", "").split()
     if len(words) == len(spatial):
         spacings = floats_of(words, "spacings", file=file)[spatial].tolist()
-        check_spacing(spacings, ["spacings[0]", "spacings[1]", "spacings[2]"], file=file, hint=HINT)
+        check_spacing(spacings, ["spacings[0]", "spacings[1]", "spacings[2]"], file=file, hint=SPACING_HINT)
         return upright(spacings), (UNTURNED,)
     return upright(required_spacing(settings.spacing, file=file)), (GIVEN,)

@@ -23,8 +23,12 @@ if TYPE_CHECKING:
 TEXT = "text"
 """The packing of voxels that are written as words."""
 
-HEADER_BYTES = 2**20
-"""A header that does not end within these is none."""
+LONGEST_HEADER = 2**20
+"""A header that does not end within these bytes is none: real ones have some thousand, and the names of
+`detached.MOST_FILES` data files, of 16 letters each, are as many."""
+
+HeaderFields = dict[str, str]
+"""The fields of a text header, by their names."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ class Raster:
 
 def header_bytes(path: Path) -> bytes:
     """Return the bytes among which a header must end."""
-    return first_bytes(existing_file(path), HEADER_BYTES)
+    return first_bytes(existing_file(path), LONGEST_HEADER)
 
 
 def sizes_of(values: Sequence[str], count: int, field: str, *, file: str) -> tuple[int, ...]:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from ....errors import FormatError
 from .deflated import check_deflated
-from .element import ELEMENTS, Element
+from .element import ELEMENTS, PixelElement
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 SHORT = 2**16
-"""Bytes that are asked for without a look at how many there are."""
+"""Bytes that are asked for without a look at how many there are: what the lengths of 16 bits can ask for."""
 
 
 class Bounded(io.BufferedReader):
@@ -52,11 +52,11 @@ def read_dataset(path: Path, **options: Any) -> Any:
     return data
 
 
-def inflated(path: Path) -> tuple[BinaryIO, Element]:
+def inflated(path: Path) -> tuple[BinaryIO, PixelElement]:
     """Return the pixels of a packed file, and where they stand."""
     data = read_dataset(path)
     for keyword in ELEMENTS.values():
         if keyword in data:
             value = data[keyword].value
-            return io.BytesIO(value), Element(keyword, "OW", 0, len(value), encapsulated=False)
+            return io.BytesIO(value), PixelElement(keyword, "OW", 0, len(value), encapsulated=False)
     raise FormatError("the file holds no pixels", file=path.name, found="PixelData = missing", hint="a fresh copy")

@@ -12,10 +12,11 @@ from .element import WIDE
 
 DEFLATED = "1.2.840.10008.1.2.1.99"
 
-LARGEST_BYTES = 2**30
-"""A packed file that holds more is taken for a bomb."""
+LARGEST_UNPACKED = 2**30
+"""A packed file that holds more is taken for a bomb: it is a stack of 2,000 slices of 512 squared voxels of 16 bits."""
 
-CHUNK = 2**20
+BYTES_AT_ONCE = 2**20
+"""Bytes that are unpacked together."""
 
 
 def check_deflated(file: BinaryIO, *, name: str) -> None:
@@ -24,15 +25,15 @@ def check_deflated(file: BinaryIO, *, name: str) -> None:
     Raises
     ------
     ResourceError
-        Where it holds more than `LARGEST_BYTES`.
+        Where it holds more than `LARGEST_UNPACKED`.
     """
     if _is_deflated(file):
         unpacker, total = zlib.decompressobj(-zlib.MAX_WBITS), 0
-        while packed := unpacker.unconsumed_tail or file.read(CHUNK):
-            total += len(unpacker.decompress(packed, CHUNK))
-            if total > LARGEST_BYTES:
+        while packed := unpacker.unconsumed_tail or file.read(BYTES_AT_ONCE):
+            total += len(unpacker.decompress(packed, BYTES_AT_ONCE))
+            if total > LARGEST_UNPACKED:
                 raise ResourceError(
-                    "the packed file holds too much", file=name, expected=f"at most {LARGEST_BYTES} bytes"
+                    "the packed file holds too much", file=name, expected=f"at most {LARGEST_UNPACKED} bytes"
                 )
     file.seek(0)
 

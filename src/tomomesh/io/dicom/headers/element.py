@@ -23,7 +23,7 @@ WIDE = (b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"
 
 
 @dataclass(frozen=True)
-class Element:
+class PixelElement:
     """The element that holds the pixels: its keyword, kind, first byte in the file, and the bytes that are there."""
 
     keyword: str
@@ -33,7 +33,7 @@ class Element:
     encapsulated: bool
 
 
-def pixel_element(file: BinaryIO, header: Any, *, name: str) -> Element:
+def pixel_element(file: BinaryIO, header: Any, *, name: str) -> PixelElement:
     """Return the element that begins where a file is positioned.
 
     Parameters
@@ -63,4 +63,4 @@ def pixel_element(file: BinaryIO, header: Any, *, name: str) -> Element:
     remaining = max(file.seek(0, os.SEEK_END) - start, 0)
     kind = "OW" if implicit or head[4:6] == b"OW" else "OB"
     held = remaining if length == UNDEFINED else min(length, remaining)
-    return Element(keyword, kind, start, held, length == UNDEFINED)
+    return PixelElement(keyword, kind, start, held, length == UNDEFINED)

@@ -31,7 +31,7 @@ PER_FRAME, SHARED = "PerFrameFunctionalGroupsSequence", "SharedFunctionalGroupsS
 
 
 @dataclass(frozen=True)
-class Frame:
+class ImageFrame:
     """One slice: where it is, and how its stored numbers become gray levels.
 
     Attributes
@@ -75,7 +75,7 @@ class Frame:
         return int(value[0]) + self.number
 
 
-def frames_of(path: Path, header: Any) -> list[Frame]:
+def frames_of(path: Path, header: Any) -> list[ImageFrame]:
     """Return one frame for a plain file, and all of an enhanced or multi-frame file.
 
     Raises
@@ -97,7 +97,7 @@ def frames_of(path: Path, header: Any) -> list[Frame]:
         return [_frame(path, header, number, groups[number]) for number in range(count)]
 
 
-def _frame(path: Path, header: Any, number: int, groups: list[Any]) -> Frame:
+def _frame(path: Path, header: Any, number: int, groups: list[Any]) -> ImageFrame:
     name = path.name
 
     def field(keyword: str, count: int) -> NDArray[np.float64] | None:
@@ -107,7 +107,7 @@ def _frame(path: Path, header: Any, number: int, groups: list[Any]) -> Frame:
     slope, intercept = field("RescaleSlope", 1), field("RescaleIntercept", 1)
     scale = (1.0 if slope is None else float(slope[0]), 0.0 if intercept is None else float(intercept[0]))
     check_scale(*scale, file=name)
-    return Frame(
+    return ImageFrame(
         path,
         number,
         header,

@@ -11,24 +11,24 @@ from ....errors import GeometryError
 from ...files.source import third_party
 from ..headers.header import numbers
 from ..series.regular import EVEN
-from ..series.same_geometry import check_alike, in_words
+from ..series.same_geometry import check_same_geometry, in_words
 from ..series.stack import ON_LINE, SAME_PLACE, stacked
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....settings import ReadSettings
-    from ..headers.header import Frame
+    from ..headers.header import ImageFrame
 
     Floats = NDArray[np.float64]
 
 
-def lattice_of(frames: list[Frame], settings: ReadSettings, *, study: str) -> tuple[Floats, NDArray[np.int64]]:
+def lattice_of(frames: list[ImageFrame], settings: ReadSettings, *, study: str) -> tuple[Floats, NDArray[np.int64]]:
     """Find the slice of each frame, whatever their order.
 
     Parameters
     ----------
-    frames : list of Frame
+    frames : list of ImageFrame
         Of one file; several may lie on one slice, and none on others.
     settings : ReadSettings
         `spacing_z` is the distance of the slices where the file does not say.
@@ -47,7 +47,7 @@ def lattice_of(frames: list[Frame], settings: ReadSettings, *, study: str) -> tu
     GeometryError
         Where frames have no place, or do not lie a whole number of slices apart.
     """
-    check_alike(frames)
+    check_same_geometry(frames)
     positions = _positions(frames)
     affine = stacked(frames[:1], replace(settings, spacing_z=1.0), study=study).affine
     heights = (positions - positions[0]) @ affine[:3, 2]
@@ -64,7 +64,7 @@ def lattice_of(frames: list[Frame], settings: ReadSettings, *, study: str) -> tu
     return affine, levels.astype(np.int64)
 
 
-def _positions(frames: list[Frame]) -> Floats:
+def _positions(frames: list[ImageFrame]) -> Floats:
     positions = np.array([np.full(3, np.nan) if frame.position is None else frame.position for frame in frames])
     lost = np.flatnonzero(~np.isfinite(positions).all(axis=1))
     if len(lost):
@@ -78,7 +78,7 @@ def _positions(frames: list[Frame]) -> Floats:
     return positions
 
 
-def _said(frame: Frame, keyword: str = "SpacingBetweenSlices") -> float | None:
+def _said(frame: ImageFrame, keyword: str = "SpacingBetweenSlices") -> float | None:
     """Return a distance that the file gives for all of its frames."""
     with third_party("pydicom", frame.path.name):
         shared = frame.header.get("SharedFunctionalGroupsSequence") or [{}]

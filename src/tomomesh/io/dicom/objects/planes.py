@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-SAME = 1e-3
-"""Heights in mm that differ by less are the same."""
+SAME_HEIGHT_MM = 1e-3
+"""Heights in mm that differ by less are the same: planning systems write two or three decimals."""
 ONE_PLANE = 0.1
-"""Contours nearer than this share of the planes' median distance lie in one plane."""
-FLAT = 0.25
-"""Share of the least distance of two planes by which a contour may leave its own."""
+"""Contours nearer than this share of the planes' median distance lie in one plane: no stack has slices so uneven."""
+MOST_OFF_PLANE = 0.25
+"""Share of the least distance of two planes by which a contour may leave its own: half of the way to where it would
+lie nearer to another."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def planes_of(contours: Sequence[Floats], *, file: str) -> Planes:
     height = np.array([float(one.mean()) for one in along])
     order = np.argsort(height, kind="stable")
     gaps = np.diff(height[order])
-    apart = gaps[gaps > SAME]
+    apart = gaps[gaps > SAME_HEIGHT_MM]
     if not len(apart):
         raise EmptyError(
             "contours on one slice enclose no volume", file=file, found="1 slice", expected="at least two slices"
@@ -74,7 +75,7 @@ def planes_of(contours: Sequence[Floats], *, file: str) -> Planes:
     labels[order] = np.cumsum(np.concatenate([[False], gaps > ONE_PLANE * np.median(apart)]))
     heights = np.bincount(labels, height) / np.bincount(labels)
     off = np.array([np.abs(one - heights[label]).max() for one, label in zip(along, labels, strict=True)])
-    most = FLAT * float(np.diff(heights).min())
+    most = MOST_OFF_PLANE * float(np.diff(heights).min())
     if off.max() > most:
         raise GeometryError(
             "the contours do not lie in parallel planes",

@@ -11,10 +11,11 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-FLAT = 1e-9
-"""Polygons of less area, in shares of their squared length, enclose nothing."""
-LEAST = 24
-"""Points that a ring gets at least."""
+NO_AREA = 1e-9
+"""Polygons of less area, in shares of their squared length, enclose nothing: far above the rounding of doubles (1e-16),
+and far below a sliver a thousand times as long as wide (2.5e-4)."""
+FEWEST_POINTS = 24
+"""Points that a ring gets at least: a circle's polygon of so many has 1.1 % less area."""
 
 
 def vector_area(polygon: Floats) -> Floats:
@@ -51,20 +52,20 @@ def parted(polygon: Floats) -> list[Floats]:
         else:
             chain.append(corner)
     rings = [np.array(ring) for ring in [*found, chain] if len(ring) > 2]
-    return [ring for ring in rings if np.linalg.norm(vector_area(ring)) > FLAT * perimeter(ring) ** 2]
+    return [ring for ring in rings if np.linalg.norm(vector_area(ring)) > NO_AREA * perimeter(ring) ** 2]
 
 
 def thinned(ring: Floats, distance: float) -> Floats:
-    """Leave out corners of a ring (u, 3) that follow others within a distance along it; `LEAST` stay at least."""
+    """Leave out corners of a ring (u, 3) that follow others within a distance along it; `FEWEST_POINTS` stay."""
     along = np.concatenate([[0.0], np.cumsum(_sides(ring))])
-    lot = np.floor(along / min(distance, along[-1] / LEAST))
+    lot = np.floor(along / min(distance, along[-1] / FEWEST_POINTS))
     return np.asarray(ring[np.diff(lot[:-1], prepend=-1.0) > 0])
 
 
 def pieces_of(ring: Floats, distance: float) -> NDArray[np.float64]:
     """Return into how many pieces each side of a ring (u, 3) is to be cut, for points about so far apart."""
     sides = _sides(ring)
-    return np.maximum(np.rint(sides / min(distance, float(sides.sum()) / LEAST)), 1)
+    return np.maximum(np.rint(sides / min(distance, float(sides.sum()) / FEWEST_POINTS)), 1)
 
 
 def filled(ring: Floats, pieces: NDArray[np.int64]) -> Floats:

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....settings import ReadSettings
-    from ..headers.header import Frame
+    from ..headers.header import ImageFrame
 
 NAMED = 24
-"""Segments that are named in a note or an error, at most."""
+"""Segments that are named in a note or an error, at most, so that it stays one that is read."""
 PAIRS = 4
-"""Overlaps that are named, at most."""
+"""Overlaps that are named, at most, for the same reason."""
 LABELMAP = "LABELMAP"
 
 
@@ -40,7 +40,7 @@ class Segmentation:
 
     Attributes
     ----------
-    frames : list of Frame
+    frames : list of ImageFrame
     segments : (f,) int64 array
         The segment of each frame; 0 where the pixels themselves are segment numbers.
     labels : dict of int to str
@@ -53,7 +53,7 @@ class Segmentation:
         The pixel value of no segment.
     """
 
-    frames: list[Frame]
+    frames: list[ImageFrame]
     segments: NDArray[np.int64]
     labels: dict[int, str]
     kind: str

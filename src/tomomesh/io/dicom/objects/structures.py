@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 FINEST, FINE = 0.1, 0.3
 """Distances of the points on a contour, in distances of the slices: corners that are nearer are left out; longer sides
 get points."""
-MOST = 20_000_000
-"""Points that a structure may have."""
+MOST_POINTS = 20_000_000
+"""Points that a structure may have: their positions alone are half a gigabyte."""
 
 
 @dataclass(frozen=True)
@@ -180,10 +180,10 @@ def _points(contours: list[Floats], labels: NDArray[np.int64], apart: float, *, 
     sides = [np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1) for ring, _ in rings]
     distance = min(float(np.median(np.concatenate(sides))), FINE * apart)
     pieces = [pieces_of(ring, distance) for ring, _ in rings]
-    if (total := sum(float(one.sum()) for one in pieces)) > MOST:
+    if (total := sum(float(one.sum()) for one in pieces)) > MOST_POINTS:
         raise ResourceError(
             "the contours are too long beside the distance of their points", file=file,
-            found=f"{total:.3g} points {distance:.3g} mm apart", expected=f"at most {MOST}",
+            found=f"{total:.3g} points {distance:.3g} mm apart", expected=f"at most {MOST_POINTS}",
         )  # fmt: skip
     drawn = [filled(ring, one.astype(np.int64)) for (ring, _), one in zip(rings, pieces, strict=True)]
     lengths, slices = [len(one) for one in drawn], np.array([label for _, label in rings])

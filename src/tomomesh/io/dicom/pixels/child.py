@@ -21,17 +21,18 @@ from . import decoding
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .layout import Layout
+    from .layout import PixelLayout
 
 PROGRAM = decoding.__file__
 
 PATIENCE = 3
-"""Seconds on the clock for each second of the processor: the machine may be busy."""
+"""Seconds on the clock for each second of the processor: the machine may be busy with three times its cores."""
 
-KINDS = {f"{order}{kind}{size}" for order in "<|" for kind in "iu" for size in (1, 2, 4, 8)}
+FRAME_TYPES = {f"{order}{kind}{size}" for order in "<|" for kind in "iu" for size in (1, 2, 4, 8)}
 """What a frame of numbers may consist of."""
 
-LONGEST_HEAD = 2**12
+LONGEST_ANSWER = 2**12
+"""Bytes of the line in front of a frame: it has a shape, a type and a word, about 100."""
 
 EXTRA = 'pip install "tomomesh[dicom]"'
 
@@ -46,7 +47,7 @@ class Child:
         self._process: subprocess.Popen[bytes] | None = None
         self._frame_bytes = 0
 
-    def decode(self, code: bytes, layout: Layout) -> tuple[NDArray[Any], str]:
+    def decode(self, code: bytes, layout: PixelLayout) -> tuple[NDArray[Any], str]:
         """Return the stored numbers of a compressed frame, and what they stand for.
 
         Raises
@@ -73,7 +74,7 @@ class Child:
             self._process, self._frame_bytes = _started(frame_bytes), frame_bytes
         return self._process
 
-    def _asked(self, process: subprocess.Popen[bytes], code: bytes, layout: Layout) -> tuple[NDArray[Any], str]:
+    def _asked(self, process: subprocess.Popen[bytes], code: bytes, layout: PixelLayout) -> tuple[NDArray[Any], str]:
         assert process.stdin is not None
         assert isinstance(process.stdout, io.BufferedReader)
         options = {**layout.options(), "number_of_frames": 1, "correct_unused_bits": False}
@@ -85,17 +86,17 @@ class Child:
         }
         process.stdin.write(json.dumps(job).encode() + b"\n" + code)
         process.stdin.flush()
-        head = json.loads(process.stdout.readline(LONGEST_HEAD))
+        head = json.loads(process.stdout.readline(LONGEST_ANSWER))
         if "fault" in head:
             raise _refusal(str(head["fault"]), layout)
-        if tuple(head["shape"]) != layout.shape or head["kind"] not in KINDS:
+        if tuple(head["shape"]) != layout.shape or head["kind"] not in FRAME_TYPES:
             raise ValueError
         pixels = np.empty(layout.shape, head["kind"])
         if process.stdout.readinto(pixels.reshape(-1).view(np.uint8).data) != pixels.nbytes:
             raise ValueError
         return pixels, str(head["photometric"])
 
-    def _fault(self, process: subprocess.Popen[bytes], layout: Layout, *, late: bool) -> Exception:
+    def _fault(self, process: subprocess.Popen[bytes], layout: PixelLayout, *, late: bool) -> Exception:
         """Return what to say of a child that did not answer as it should; it is ended."""
         with suppress(subprocess.TimeoutExpired):
             process.wait(0.5)  # a crash takes a moment to be known
@@ -137,7 +138,7 @@ def _started(frame_bytes: int) -> subprocess.Popen[bytes]:
     )
 
 
-def _refusal(fault: str, layout: Layout) -> Exception:
+def _refusal(fault: str, layout: PixelLayout) -> Exception:
     """Return what to say of a frame that the child could not decode."""
     found = f"TransferSyntaxUID = {layout.syntax.name}"
     if fault == decoding.MISSING:

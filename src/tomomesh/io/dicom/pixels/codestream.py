@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 from ....errors import FormatError
 
 if TYPE_CHECKING:
-    from .layout import Layout
+    from .layout import PixelLayout
 
 JPEG_START, JPEG2000_START = b"\xff\xd8", b"\xff\x4f\xff\x51"
 END = b"\xff\xd9"
 """JPEG, JPEG-LS and JPEG-2000 all end with it."""
 
-PADDING = b"\0\xff"
+STREAM_PADDING = b"\0\xff"
 """What files put behind the end for an even number of bytes."""
 
 FRAME_MARKERS = {*range(0xC0, 0xD0), 0xF7} - {0xC4, 0xC8, 0xCC}
 """The second byte of the markers before the size in JPEG (0xC0 to 0xCF) and JPEG-LS (0xF7)."""
 
 
-def check_stream(code: bytes, layout: Layout) -> None:
+def check_stream(code: bytes, layout: PixelLayout) -> None:
     """Compare a compressed frame's own size with that of the header, and look for its end.
 
     A decoder allocates what the stream promises, and leaves gray what a cut stream does not hold.
@@ -39,7 +39,7 @@ def check_stream(code: bytes, layout: Layout) -> None:
             found="size = none" if found is None else "rows x columns x samples = {} x {} x {}".format(*found),
             expected=f"{layout.rows} x {layout.columns} x {layout.samples}",
         )
-    if not code.rstrip(PADDING).endswith(END):
+    if not code.rstrip(STREAM_PADDING).endswith(END):
         raise FormatError(
             "the compressed pixels are cut off", file=layout.name, expected="a whole stream", hint="a fresh copy"
         )

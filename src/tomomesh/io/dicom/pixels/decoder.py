@@ -11,10 +11,10 @@ from ...files.limits import require_memory
 from ...files.source import third_party
 from ..headers.dataset import inflated
 from ..headers.deflated import DEFLATED
-from ..headers.element import Element, pixel_element
+from ..headers.element import PixelElement, pixel_element
 from .child import Child
 from .encapsulated import LARGEST_FRAME_BYTES, SYNTAXES, read_encapsulated
-from .layout import Layout, layout_of
+from .layout import PixelLayout, layout_of
 from .levels import levels
 from .native import NATIVE, check_native, read_native
 from .tables import check_tables
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..headers.header import Frame
+    from ..headers.header import ImageFrame
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class _Opened:
 
     path: Path
     file: BinaryIO
-    element: Element
-    layout: Layout
+    element: PixelElement
+    layout: PixelLayout
     codes: list[bytes]
 
 
@@ -46,7 +46,7 @@ class Decoder:
     def __init__(self) -> None:
         self._child, self._files = Child(), ExitStack()
         self._opened: _Opened | None = None
-        self._last: tuple[Frame, NDArray[Any]] | None = None
+        self._last: tuple[ImageFrame, NDArray[Any]] | None = None
 
     def __enter__(self) -> Decoder:
         return self
@@ -57,7 +57,7 @@ class Decoder:
         self._child.end()
         self._files.close()
 
-    def __call__(self, frame: Frame) -> NDArray[Any]:
+    def __call__(self, frame: ImageFrame) -> NDArray[Any]:
         """Return a frame's gray levels before their scale, (J, I), or its colors, (J, I, 3).
 
         Raises
@@ -71,14 +71,14 @@ class Decoder:
             self._last = frame, self._read(frame)
         return self._last[1]
 
-    def expect(self, frame: Frame) -> None:
+    def expect(self, frame: ImageFrame) -> None:
         """Start the child process where frames like this one need it: while it starts, headers can be read."""
         with suppress(TomomeshError), third_party("pydicom", frame.path.name):  # what is wrong is said when it is read
             layout = layout_of(frame, "PixelData")
             if layout.syntax in SYNTAXES and layout.frame_bytes <= LARGEST_FRAME_BYTES:
                 self._child.ready(layout.frame_bytes)
 
-    def _read(self, frame: Frame) -> NDArray[Any]:
+    def _read(self, frame: ImageFrame) -> NDArray[Any]:
         with third_party("pydicom", frame.path.name):
             if self._opened is None or self._opened.path != frame.path:
                 self._files.close()
@@ -92,7 +92,7 @@ class Decoder:
         return read_native(opened.file, opened.element, opened.layout, number)
 
 
-def _opened(frame: Frame, files: ExitStack) -> _Opened:
+def _opened(frame: ImageFrame, files: ExitStack) -> _Opened:
     """Open the file of a frame, and check what it promises against what it holds."""
     check_tables(frame.header, name=frame.path.name)
     file: BinaryIO = files.enter_context(frame.path.open("rb"))

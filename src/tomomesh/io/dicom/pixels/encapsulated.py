@@ -10,13 +10,14 @@ from ...files.limits import require_bytes
 from .codestream import check_stream
 
 if TYPE_CHECKING:
-    from ..headers.element import Element
-    from .layout import Layout
+    from ..headers.element import PixelElement
+    from .layout import PixelLayout
 
 ITEM, DELIMITER = 0xFFFEE000, 0xFFFEE0DD
+"""Tags before each item and behind the last (PS3.5, A.4)."""
 
 LARGEST_FRAME_BYTES = 2**30
-"""No slice of a study is larger; what promises more in few compressed bytes is a bomb."""
+"""No slice of a study is larger, 32,768 squared bytes; what promises more in few compressed bytes is a bomb."""
 
 RLE = "1.2.840.10008.1.2.5"
 
@@ -27,7 +28,7 @@ SYNTAXES = {
 """Compressions that are decoded: RLE, JPEG, JPEG-LS, JPEG-2000 and HTJ2K."""
 
 
-def read_encapsulated(file: BinaryIO, element: Element, layout: Layout) -> list[bytes]:
+def read_encapsulated(file: BinaryIO, element: PixelElement, layout: PixelLayout) -> list[bytes]:
     """Return the compressed frames of a file.
 
     Raises
@@ -62,7 +63,7 @@ def read_encapsulated(file: BinaryIO, element: Element, layout: Layout) -> list[
     return frames
 
 
-def _check_syntax(element: Element, layout: Layout) -> None:
+def _check_syntax(element: PixelElement, layout: PixelLayout) -> None:
     if layout.syntax not in SYNTAXES or not element.encapsulated or element.keyword != "PixelData":
         raise FormatError(
             "the compression of the pixels cannot be decoded",
@@ -73,7 +74,7 @@ def _check_syntax(element: Element, layout: Layout) -> None:
         )
 
 
-def _check_whole(file: BinaryIO, element: Element, name: str) -> None:
+def _check_whole(file: BinaryIO, element: PixelElement, name: str) -> None:
     """Walk over the fragments: pydicom takes those that are there, decoders fill in what is missing.
 
     Raises

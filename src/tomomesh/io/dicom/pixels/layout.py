@@ -10,15 +10,16 @@ from ....errors import FormatError
 from ..headers.header import numbers
 
 if TYPE_CHECKING:
-    from ..headers.header import Frame
+    from ..headers.header import ImageFrame
 
-BITS = {"PixelData": (1, 8, 16, 32, 64), "FloatPixelData": (32,), "DoubleFloatPixelData": (64,)}
+ALLOCATED_BITS = {"PixelData": (1, 8, 16, 32, 64), "FloatPixelData": (32,), "DoubleFloatPixelData": (64,)}
+"""Bits that an element may have for each number (PS3.3, C.7.6.3 and C.7.6.24)."""
 
 SUBSAMPLED = "YBR_FULL_422"
 
 
 @dataclass(frozen=True)
-class Layout:
+class PixelLayout:
     """Sizes and kind of the pixels in a file.
 
     Attributes
@@ -87,7 +88,7 @@ class Layout:
         }
 
 
-def layout_of(frame: Frame, keyword: str) -> Layout:
+def layout_of(frame: ImageFrame, keyword: str) -> PixelLayout:
     """Return how the file of a frame keeps its pixels in an element.
 
     Raises
@@ -101,14 +102,14 @@ def layout_of(frame: Frame, keyword: str) -> Layout:
         value = numbers(header.get(field), 1, field, name)
         return missing if value is None else int(value[0])
 
-    allocated = number("BitsAllocated", BITS[keyword][-1] if keyword != "PixelData" else 0)
+    allocated = number("BitsAllocated", ALLOCATED_BITS[keyword][-1] if keyword != "PixelData" else 0)
     stored = number("BitsStored", allocated) if keyword == "PixelData" else allocated
     high, samples = number("HighBit", stored - 1), number("SamplesPerPixel", 1)
-    _check("BitsAllocated", allocated, BITS[keyword], name)
+    _check("BitsAllocated", allocated, ALLOCATED_BITS[keyword], name)
     _check("BitsStored", stored, range(1, allocated + 1), name)
     _check("HighBit", high, range(stored - 1, allocated), name)
     _check("SamplesPerPixel", samples, (1, 3), name)
-    return Layout(
+    return PixelLayout(
         name=name,
         syntax=syntax_of(header),
         keyword=keyword,

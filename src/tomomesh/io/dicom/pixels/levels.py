@@ -12,7 +12,7 @@ from .tables import PALETTE, modality_levels, palette_colors
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .layout import Layout
+    from .layout import PixelLayout
 
 INVERTED = "MONOCHROME1"
 
@@ -20,7 +20,7 @@ MEANINGS = {"MONOCHROME2": 1, INVERTED: 1, PALETTE: 1, "RGB": 3}
 """What decoded numbers may stand for, and how many a pixel has."""
 
 
-def levels(pixels: NDArray[Any], photometric: str, layout: Layout, header: Any) -> NDArray[Any]:
+def levels(pixels: NDArray[Any], photometric: str, layout: PixelLayout, header: Any) -> NDArray[Any]:
     """Return the gray levels (J, I) or colors (J, I, 3) of a frame, before their scale.
 
     Parameters
@@ -29,7 +29,7 @@ def levels(pixels: NDArray[Any], photometric: str, layout: Layout, header: Any) 
         Stored numbers.
     photometric : str
         What they stand for after decoding.
-    layout : Layout
+    layout : PixelLayout
         The bits that are in use.
     header : pydicom Dataset
         It holds the tables.
@@ -55,7 +55,7 @@ def levels(pixels: NDArray[Any], photometric: str, layout: Layout, header: Any) 
     return gray
 
 
-def masked(pixels: NDArray[Any], layout: Layout, *, overlays: bool) -> NDArray[Any]:
+def masked(pixels: NDArray[Any], layout: PixelLayout, *, overlays: bool) -> NDArray[Any]:
     """Clear the bits that are no part of the gray level; they may hold overlays.
 
     Raises

@@ -13,14 +13,14 @@ from ...files.limits import require_bytes
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..headers.element import Element
-    from .layout import Layout
+    from ..headers.element import PixelElement
+    from .layout import PixelLayout
 
 NATIVE = {"1.2.840.10008.1.2", "1.2.840.10008.1.2.1", "1.2.840.10008.1.2.1.99", "1.2.840.10008.1.2.2"}
 """Transfer syntaxes without compression of the pixels: implicit, explicit, deflated as a whole, big-endian."""
 
 
-def check_native(element: Element, layout: Layout) -> None:
+def check_native(element: PixelElement, layout: PixelLayout) -> None:
     """Compare the bytes that a header promises with those of the element.
 
     Raises
@@ -46,7 +46,7 @@ def check_native(element: Element, layout: Layout) -> None:
         )
 
 
-def read_native(file: BinaryIO, element: Element, layout: Layout, number: int) -> tuple[NDArray[Any], str]:
+def read_native(file: BinaryIO, element: PixelElement, layout: PixelLayout, number: int) -> tuple[NDArray[Any], str]:
     """Return the stored numbers of a frame, and what they stand for.
 
     Returns
@@ -67,7 +67,7 @@ def read_native(file: BinaryIO, element: Element, layout: Layout, number: int) -
     return pixels, str(found["photometric_interpretation"])
 
 
-def _single_bits(file: BinaryIO, element: Element, layout: Layout, number: int) -> NDArray[np.uint8]:
+def _single_bits(file: BinaryIO, element: PixelElement, layout: PixelLayout, number: int) -> NDArray[np.uint8]:
     """Return a frame of packed bits, lowest first; it may begin within a byte, which pydicom gets wrong."""
     count = math.prod(layout.shape)
     byte, bit = divmod(number * count, 8)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 PALETTE = "PALETTE COLOR"
 
-COLORS = ("Red", "Green", "Blue")
+CHANNELS = ("Red", "Green", "Blue")
 DESCRIPTOR, DATA = "PaletteColorLookupTableDescriptor", "PaletteColorLookupTableData"
 
 
@@ -30,7 +30,7 @@ def check_tables(header: Any, *, name: str) -> None:
     refused = {
         "a supplemental palette": header.get("PixelPresentation") in ("COLOR", "MIXED"),
         "a palette in segments": "SegmentedRedPaletteColorLookupTableData" in header,
-        "a palette that is missing": palette and not all(f"{color}{DATA}" in header for color in COLORS),
+        "a palette that is missing": palette and not all(f"{color}{DATA}" in header for color in CHANNELS),
         "both a table and a scale": "ModalityLUTSequence" in header and "RescaleSlope" in header,
     }
     for reason in (reason for reason, present in refused.items() if present):
@@ -67,7 +67,7 @@ def palette_colors(stored: NDArray[Any], header: Any, *, name: str) -> NDArray[A
     """
     layers = [
         _looked_up(stored, header.get(f"{color}{DESCRIPTOR}"), header.get(f"{color}{DATA}"), header, name)
-        for color in COLORS
+        for color in CHANNELS
     ]
     return np.stack(layers, axis=-1)
 

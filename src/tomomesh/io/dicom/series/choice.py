@@ -11,9 +11,9 @@ from ....errors import GeometryError, UsageError
 from ..headers.header import numbers
 
 if TYPE_CHECKING:
-    from ..headers.header import Frame
+    from ..headers.header import ImageFrame
 
-LAST = float("inf")
+NO_NUMBER = float("inf")
 """The place of a series without a number."""
 
 
@@ -21,16 +21,16 @@ LAST = float("inf")
 class Choice:
     """The frames of the series that is read, and what was left out."""
 
-    frames: list[Frame]
+    frames: list[ImageFrame]
     notes: tuple[str, ...]
 
 
-def choose(frames: list[Frame], wanted: int | None, *, folder: str) -> Choice:
+def choose(frames: list[ImageFrame], wanted: int | None, *, folder: str) -> Choice:
     """Take the series that is wanted, or the only one that can be a stack.
 
     Parameters
     ----------
-    frames : list of Frame
+    frames : list of ImageFrame
         All frames of the folder.
     wanted : int, optional
         Number of a series in the table, from 1.
@@ -63,12 +63,12 @@ def choose(frames: list[Frame], wanted: int | None, *, folder: str) -> Choice:
     return Choice(series[0], notes)
 
 
-def stacks_among(frames: list[Frame]) -> list[int]:
+def stacks_among(frames: list[ImageFrame]) -> list[int]:
     """Return the numbers, from 1, of the series with more than one slice; localizers are none."""
     return [number for number, members in enumerate(grouped(frames)[0], 1) if len(members) > 1]
 
 
-def _wanted(series: list[list[Frame]], wanted: int, folder: str) -> list[Frame]:
+def _wanted(series: list[list[ImageFrame]], wanted: int, folder: str) -> list[ImageFrame]:
     if not 1 <= wanted <= len(series):
         raise UsageError(
             "there is no such series",
@@ -79,17 +79,17 @@ def _wanted(series: list[list[Frame]], wanted: int, folder: str) -> list[Frame]:
     return series[wanted - 1]
 
 
-def _is_localizer(frame: Frame) -> bool:
+def _is_localizer(frame: ImageFrame) -> bool:
     kind = frame.header.get("ImageType") or []
     return "LOCALIZER" in ([kind] if isinstance(kind, str) else list(kind))
 
 
-def grouped(frames: list[Frame]) -> tuple[list[list[Frame]], int]:
+def grouped(frames: list[ImageFrame]) -> tuple[list[list[ImageFrame]], int]:
     """Sort frames into series: by series number, identifier, and stack within an enhanced file.
 
     Returns
     -------
-    series : list of lists of Frame
+    series : list of lists of ImageFrame
         In the order of their numbers in the table.
     localizers : int
         How many frames are left out as such; none where there is nothing else.
@@ -100,21 +100,21 @@ def grouped(frames: list[Frame]) -> tuple[list[list[Frame]], int]:
         For a series number that is none.
     """
     images = [frame for frame in frames if not _is_localizer(frame)] or frames
-    groups: dict[tuple[float, str, str], list[Frame]] = {}
+    groups: dict[tuple[float, str, str], list[ImageFrame]] = {}
     for frame in images:
         number = numbers(frame.header.get("SeriesNumber"), 1, "SeriesNumber", frame.path.name)
-        place = LAST if number is None else float(number[0])
+        place = NO_NUMBER if number is None else float(number[0])
         key = (place, str(frame.header.get("SeriesInstanceUID", "")), frame.stack)
         groups.setdefault(key, []).append(frame)
     return [groups[key] for key in sorted(groups)], len(frames) - len(images)
 
 
-def table(series: list[list[Frame]]) -> str:
+def table(series: list[list[ImageFrame]]) -> str:
     """Put series into words: number, description, slices, spacing."""
     return "; ".join(f"{number}: {_row(members)}" for number, members in enumerate(series, 1))
 
 
-def _row(members: list[Frame]) -> str:
+def _row(members: list[ImageFrame]) -> str:
     first = members[0]
     description = str(first.header.get("SeriesDescription") or "no description")
     spacing = "unknown" if first.spacing is None else " x ".join(f"{mm:.4g}" for mm in first.spacing)
@@ -122,7 +122,7 @@ def _row(members: list[Frame]) -> str:
     return f"{description}, slices {len(members)}, {spacing}{_distance(members)} mm"
 
 
-def _distance(members: list[Frame]) -> str:
+def _distance(members: list[ImageFrame]) -> str:
     """Return the distance of the slices, as far as their positions tell."""
     places = [frame.position for frame in members if frame.position is not None]
     axes = members[0].axes

@@ -10,17 +10,17 @@ from ..headers.header import PER_FRAME
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from ..headers.header import Frame
+    from ..headers.header import ImageFrame
 
-TELLING = (
+DISTINGUISHING = (
     "EchoTime", "EchoNumbers", "TemporalPositionIdentifier", "AcquisitionNumber", "TriggerTime",
     "DiffusionBValue", "InversionTime", "FlipAngle", "KVP", "ConvolutionKernel", "ImageType",
     "InstanceNumber",
 )  # fmt: skip
-"""Fields that tell apart images at one position, the most telling first; none of them is personal."""
+"""Fields that tell apart images at one position, the likeliest first; none of them is personal."""
 
 
-def difference(a: Frame, b: Frame) -> tuple[str, str]:
+def difference(a: ImageFrame, b: ImageFrame) -> tuple[str, str]:
     """Return the first field in which two images differ, and its two values in words."""
     with third_party("pydicom", b.path.name):
         for keyword, one, other in _pairs(a, b):
@@ -29,10 +29,10 @@ def difference(a: Frame, b: Frame) -> tuple[str, str]:
     return "PixelData", "different"
 
 
-def _pairs(a: Frame, b: Frame) -> Iterator[tuple[str, Any, Any]]:
+def _pairs(a: ImageFrame, b: ImageFrame) -> Iterator[tuple[str, Any, Any]]:
     """Yield fields with their values in two images: dimensions of an enhanced file, or fields of the header."""
     if a.path != b.path:
-        yield from ((keyword, a.header.get(keyword), b.header.get(keyword)) for keyword in TELLING)
+        yield from ((keyword, a.header.get(keyword), b.header.get(keyword)) for keyword in DISTINGUISHING)
     elif PER_FRAME in a.header:
         one, other = (_content(frame) for frame in (a, b))
         names = [_pointer(item) for item in a.header.get("DimensionIndexSequence") or []]
@@ -41,7 +41,7 @@ def _pairs(a: Frame, b: Frame) -> Iterator[tuple[str, Any, Any]]:
         yield "TemporalPositionIndex", one.get("TemporalPositionIndex"), other.get("TemporalPositionIndex")
 
 
-def _content(frame: Frame) -> Any:
+def _content(frame: ImageFrame) -> Any:
     items = frame.header.get(PER_FRAME)[frame.number].get("FrameContentSequence")
     return items[0] if items else {}
 

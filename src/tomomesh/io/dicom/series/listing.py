@@ -13,7 +13,7 @@ from ..files import read_frames
 from ..headers.names import shown
 from .choice import grouped
 from .regular import steps_between
-from .same_geometry import check_alike
+from .same_geometry import check_same_geometry
 from .stack import SAME_PLACE, axes_of, pixel_of, placed, stacked, tilt_of
 
 if TYPE_CHECKING:
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....settings import ReadSettings
-    from ..headers.header import Frame
+    from ..headers.header import ImageFrame
 
 UNREADABLE = "unreadable"
 LOCALIZERS = "localizers"
 
 
 @dataclass(frozen=True)
-class Course:
+class SliceSpacing:
     """Where the slices of a series are, as far as their headers tell.
 
     Attributes
@@ -69,7 +69,7 @@ class Series:
         In pixels.
     pixel_mm : (x, y) or None
         Distance of the columns and of the rows.
-    course : Course
+    slice_spacing : SliceSpacing
         Where the slices are.
     refused : TomomeshError or None
         Why it cannot be read as it is; None where the headers speak for it.
@@ -81,7 +81,7 @@ class Series:
     slices: int
     size: tuple[int, int]
     pixel_mm: tuple[float, float] | None
-    course: Course
+    slice_spacing: SliceSpacing
     refused: TomomeshError | None
 
 
@@ -132,7 +132,7 @@ def list_dicom(files: list[Path], settings: ReadSettings, *, study: str, others:
     return Listing(listed, tuple(sorted(left_out.items())), len({frame.path for frame in reading.frames}))
 
 
-def _described(number: int, members: list[Frame], settings: ReadSettings, study: str) -> Series:
+def _described(number: int, members: list[ImageFrame], settings: ReadSettings, study: str) -> Series:
     first = members[0]
     words = [_word(first.header.get("SeriesDescription")), f"stack {_word(first.stack)}" if first.stack else ""]
     return Series(
@@ -142,7 +142,7 @@ def _described(number: int, members: list[Frame], settings: ReadSettings, study:
         len(members),
         first.size,
         None if first.spacing is None else (float(first.spacing[0]), float(first.spacing[1])),
-        _course(members, settings),
+        _slice_spacing(members, settings),
         _refusal(members, settings, study),
     )
 
@@ -151,7 +151,7 @@ def _word(value: object) -> str:
     return shown(value) if value else ""
 
 
-def _refusal(members: list[Frame], settings: ReadSettings, study: str) -> TomomeshError | None:
+def _refusal(members: list[ImageFrame], settings: ReadSettings, study: str) -> TomomeshError | None:
     try:
         stacked(members, settings, study=study)
     except TomomeshError as fault:
@@ -159,28 +159,28 @@ def _refusal(members: list[Frame], settings: ReadSettings, study: str) -> Tomome
     return None
 
 
-def _course(members: list[Frame], settings: ReadSettings) -> Course:
+def _slice_spacing(members: list[ImageFrame], settings: ReadSettings) -> SliceSpacing:
     """Follow the slices of a series, if they are parallel and have positions."""
     if any(frame.position is None for frame in members):
-        return Course()
+        return SliceSpacing()
     try:
-        check_alike(members)
+        check_same_geometry(members)
         normal = np.cross(*axes_of(members[0]))
         places = placed(members, normal, SAME_PLACE * min(pixel_of(members[0], settings)))
     except GeometryError:
-        return Course()
+        return SliceSpacing()
     origins = np.array([place[0].position for place in places])
     repeats = len(members) - len(places)
-    return _between(origins, normal, repeats) if len(places) > 1 else Course(repeats=repeats)
+    return _between(origins, normal, repeats) if len(places) > 1 else SliceSpacing(repeats=repeats)
 
 
-def _between(origins: NDArray[np.float64], normal: NDArray[np.float64], repeats: int) -> Course:
+def _between(origins: NDArray[np.float64], normal: NDArray[np.float64], repeats: int) -> SliceSpacing:
     """Measure the way from slice to slice; their first voxels are `origins` (s, 3), two at least."""
     heights = origins @ normal
     gaps = np.diff(heights)
     steps, whole = steps_between(gaps)
     wide = np.flatnonzero((steps > 1) & whole)
-    return Course(
+    return SliceSpacing(
         (float(gaps.min()), float(gaps.max())),
         tuple((float(heights[n]), float(heights[n + 1])) for n in wide),
         int((steps[wide] - 1).sum()),

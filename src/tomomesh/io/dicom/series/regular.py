@@ -14,10 +14,12 @@ if TYPE_CHECKING:
     from ....settings import ReadSettings
 
 EVEN = 0.01
-"""Distances that differ by less than this part are even."""
+"""Distances that differ by less than this part are even: headers that round positions of slices 1 mm apart to two
+decimals reach it."""
 
 WHOLE = 0.1
-"""A gap of many slices may be off a whole number of steps by this part of one."""
+"""A gap of many slices may be off a whole number of steps by this part of one, however many they are: a tenth of the
+distance at which it would be another number of slices, and no voxel shows it."""
 
 
 def regular(

@@ -9,16 +9,16 @@ import numpy as np
 from ....errors import GeometryError
 
 if TYPE_CHECKING:
-    from ..headers.header import Frame
+    from ..headers.header import ImageFrame
 
 PARALLEL = 1e-3
-"""Directions whose components differ by less are the same."""
+"""Directions whose components differ by less are the same: over a slice of 300 mm they are .3 mm."""
 
 SAME_SPACING = 1e-4
-"""Spacings that differ by less than this part are the same."""
+"""Spacings that differ by less than this part are the same: over 1,000 pixels they are a tenth of one."""
 
 
-def check_alike(frames: list[Frame]) -> None:
+def check_same_geometry(frames: list[ImageFrame]) -> None:
     """Refuse slices that differ in size, spacing or direction.
 
     Raises
@@ -35,7 +35,7 @@ def check_alike(frames: list[Frame]) -> None:
             ("ImageOrientationPatient", frame.axes, first.axes, PARALLEL),
         ]
         for field, found, expected, tolerance in fields:
-            if not _alike(found, expected, tolerance):
+            if not _same(found, expected, tolerance):
                 raise GeometryError(
                     f"slices of one series differ in {field}",
                     file=frame.path.name,
@@ -45,7 +45,7 @@ def check_alike(frames: list[Frame]) -> None:
                 )
 
 
-def _alike(found: object, expected: object, tolerance: float) -> bool:
+def _same(found: object, expected: object, tolerance: float) -> bool:
     if found is None or expected is None:
         return found is expected
     a, b = np.asarray(found, np.float64), np.asarray(expected, np.float64)

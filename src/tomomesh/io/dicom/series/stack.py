@@ -10,26 +10,27 @@ import numpy as np
 from ....errors import GeometryError
 from ...volumes.affine import check_affine, check_spacing
 from .regular import regular
-from .same_geometry import check_alike, in_words
+from .same_geometry import check_same_geometry, in_words
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....settings import ReadSettings
-    from ..headers.header import Frame
+    from ..headers.header import ImageFrame
 
 SAME_PLACE = 0.01
-"""Slices that are nearer than this part of a pixel are at the same position."""
+"""Slices that are nearer than this part of a pixel are at the same position: it is far above the rounding of headers,
+and no scanner's slices are so thin."""
 
 ON_LINE = 0.1
-"""Origins may leave their straight line by this part of a pixel."""
+"""Origins may leave their straight line by this part of a pixel, which interpolation would not show."""
 
 TILTED = 0.1
-"""Degrees of gantry tilt from which on it is mentioned."""
+"""Degrees of gantry tilt from which on it is mentioned: over a stack of 300 mm they are half a millimeter."""
 
 
 @dataclass(frozen=True)
-class Course:
+class SliceLine:
     """Where the slices begin and how they go on: origin and step in millimeters, number of each slice."""
 
     origin: NDArray[np.float64]
@@ -44,7 +45,7 @@ class Stack:
 
     Attributes
     ----------
-    places : list of lists of Frame
+    places : list of lists of ImageFrame
         The frames at each position, rising along the normal; more than one where a position repeats.
     levels : (s,) float array
         Slice number at which each place lies: whole where the stack is regular.
@@ -54,18 +55,18 @@ class Stack:
         What was decided.
     """
 
-    places: list[list[Frame]]
+    places: list[list[ImageFrame]]
     levels: NDArray[np.float64]
     affine: NDArray[np.float64]
     notes: tuple[str, ...]
 
 
-def stacked(frames: list[Frame], settings: ReadSettings, *, study: str) -> Stack:
+def stacked(frames: list[ImageFrame], settings: ReadSettings, *, study: str) -> Stack:
     """Order the frames of a series, whatever order their files had.
 
     Parameters
     ----------
-    frames : list of Frame
+    frames : list of ImageFrame
         Of one series.
     settings : ReadSettings
         `spacing_z` stands in for positions, `spacing` for all distances; `fill_gaps` and
@@ -78,20 +79,20 @@ def stacked(frames: list[Frame], settings: ReadSettings, *, study: str) -> Stack
     GeometryError
         Where the frames do not make one regular stack.
     """
-    check_alike(frames)
+    check_same_geometry(frames)
     pixel, axes = pixel_of(frames[0], settings), axes_of(frames[0])
     normal = np.cross(axes[0], axes[1])
     lost = [frame for frame in frames if frame.position is None]
     if lost:
         places = _numbered(frames)
-        course = _along(normal, np.zeros(3), _given(settings), len(places), lost[0])
+        line = _along(normal, np.zeros(3), _given(settings), len(places), lost[0])
     else:
         places = placed(frames, normal, SAME_PLACE * min(pixel))
-        course = _course(places, normal, settings, min(pixel), study)
+        line = _line(places, normal, settings, min(pixel), study)
     affine = np.eye(4)
-    affine[:3] = np.column_stack([axes[0] * pixel[0], axes[1] * pixel[1], course.step, course.origin])
+    affine[:3] = np.column_stack([axes[0] * pixel[0], axes[1] * pixel[1], line.step, line.origin])
     check_affine(affine, file=study, hint="a series with a valid geometry")
-    return Stack(places, course.levels, affine, course.notes)
+    return Stack(places, line.levels, affine, line.notes)
 
 
 def _given(settings: ReadSettings) -> float | None:
@@ -99,7 +100,7 @@ def _given(settings: ReadSettings) -> float | None:
     return settings.spacing_z or (settings.spacing[2] if settings.spacing else None)
 
 
-def pixel_of(frame: Frame, settings: ReadSettings) -> tuple[float, float]:
+def pixel_of(frame: ImageFrame, settings: ReadSettings) -> tuple[float, float]:
     """Return the distance of the columns and of the rows, mm.
 
     Raises
@@ -122,7 +123,7 @@ def pixel_of(frame: Frame, settings: ReadSettings) -> tuple[float, float]:
     return x, y
 
 
-def axes_of(frame: Frame) -> NDArray[np.float64]:
+def axes_of(frame: ImageFrame) -> NDArray[np.float64]:
     """Return the directions of the columns and of the rows (2, 3); those of an axial slice where there are none.
 
     Raises
@@ -143,7 +144,7 @@ def axes_of(frame: Frame) -> NDArray[np.float64]:
     return axes
 
 
-def _numbered(frames: list[Frame]) -> list[list[Frame]]:
+def _numbered(frames: list[ImageFrame]) -> list[list[ImageFrame]]:
     """Order frames by their numbers."""
     keyed = {frame.instance: frame for frame in frames}
     if len(frames) > 1 and (None in keyed or len(keyed) < len(frames)):
@@ -157,8 +158,8 @@ def _numbered(frames: list[Frame]) -> list[list[Frame]]:
 
 
 def _along(
-    normal: NDArray[np.float64], origin: NDArray[np.float64], distance: float | None, count: int, frame: Frame
-) -> Course:
+    normal: NDArray[np.float64], origin: NDArray[np.float64], distance: float | None, count: int, frame: ImageFrame
+) -> SliceLine:
     """Go along the normal by a distance that the user gave."""
     lost = frame.position is None
     if distance is None:
@@ -171,10 +172,10 @@ def _along(
         )
     note = "slices without positions, in the order of their numbers" if lost else "one slice"
     levels = np.arange(count, dtype=np.float64)
-    return Course(origin, normal * distance, levels, (f"{note}: {distance:g} mm apart, as given",))
+    return SliceLine(origin, normal * distance, levels, (f"{note}: {distance:g} mm apart, as given",))
 
 
-def placed(frames: list[Frame], normal: NDArray[np.float64], nearest: float) -> list[list[Frame]]:
+def placed(frames: list[ImageFrame], normal: NDArray[np.float64], nearest: float) -> list[list[ImageFrame]]:
     """Order frames, all with a position, along their normal (3,); those nearer than `nearest` mm are together.
 
     Raises
@@ -193,7 +194,7 @@ def placed(frames: list[Frame], normal: NDArray[np.float64], nearest: float) -> 
     heights = positions @ normal
     order = sorted(range(len(frames)), key=lambda n: (heights[n], str(frames[n].path), frames[n].number))
     starts = np.diff(heights[order], prepend=-np.inf) >= nearest
-    places: list[list[Frame]] = []
+    places: list[list[ImageFrame]] = []
     for n, new in zip(order, starts, strict=True):
         if new:
             places.append([])
@@ -201,13 +202,13 @@ def placed(frames: list[Frame], normal: NDArray[np.float64], nearest: float) -> 
     return places
 
 
-def _course(
-    places: list[list[Frame]],
+def _line(
+    places: list[list[ImageFrame]],
     normal: NDArray[np.float64],
     settings: ReadSettings,
     pixel: float,
     study: str,
-) -> Course:
+) -> SliceLine:
     """Follow the positions of the slices: the step keeps the shear of a tilted gantry."""
     origins, distance = np.array([place[0].position for place in places]), _given(settings)
     if len(places) == 1:
@@ -227,7 +228,7 @@ def _course(
     tilt = tilt_of(way, normal)
     notes += (f"gantry tilt of {tilt:.1f} degrees: the axes are sheared",) if tilt > TILTED else ()
     notes += ("the given distance of the slices is not used: they have positions",) if distance else ()
-    return Course(origins[0], way / levels[-1], levels, notes)
+    return SliceLine(origins[0], way / levels[-1], levels, notes)
 
 
 def tilt_of(way: NDArray[np.float64], normal: NDArray[np.float64]) -> float:

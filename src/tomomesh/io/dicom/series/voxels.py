@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..headers.header import Frame
+    from ..headers.header import ImageFrame
     from ..pixels.decoder import Decoder
     from .stack import Stack
 
@@ -79,7 +79,7 @@ class _Slices:
         require_memory(self._count * first.nbytes, file=self._study)
         return np.empty((self._count, *first.shape), first.dtype)
 
-    def at(self, place: list[Frame]) -> NDArray[Any] | None:
+    def at(self, place: list[ImageFrame]) -> NDArray[Any] | None:
         """Return the gray levels at a position, None where all its files are broken.
 
         Raises
@@ -94,7 +94,7 @@ class _Slices:
         self.repeats += max(len(found) - 1, 0)
         return found[0][1] if found else None
 
-    def _one(self, frame: Frame) -> NDArray[Any] | None:
+    def _one(self, frame: ImageFrame) -> NDArray[Any] | None:
         if frame.path in self.bad:
             return None
         try:
@@ -105,7 +105,7 @@ class _Slices:
         self._check_kind(stored, frame)
         return scaled(stored, *frame.scale, self._dtype)
 
-    def _check_kind(self, stored: NDArray[Any], frame: Frame) -> None:
+    def _check_kind(self, stored: NDArray[Any], frame: ImageFrame) -> None:
         """Refuse a slice of another kind than the first; the first decides on the type of all gray levels."""
         kind = (stored.dtype, stored.shape)
         if not self._kind:
@@ -121,7 +121,7 @@ class _Slices:
             )
 
 
-def _two_at_once(one: Frame, other: Frame) -> GeometryError:
+def _two_at_once(one: ImageFrame, other: ImageFrame) -> GeometryError:
     keyword, values = difference(one, other)
     return GeometryError(
         "different slices are at the same position",

@@ -38,10 +38,11 @@ CODECS = {
 """What zarr and numcodecs unpack by themselves, and without running what a file holds."""
 
 MOST_CHUNKS = 2**22
-"""Most chunks that an array may have."""
+"""Most chunks that an array may have; of 64 cubed voxels, a usual size, they are a million million voxels."""
 
 TORN = 0.25
-"""A missing chunk was lost where more than this part of the voxels beside it differ from the fill value."""
+"""A missing chunk was lost where more than this part of the voxels beside it differ from the fill value: what writers
+leave out is background, which an object touches in part at most; around a lost part of it, it is on all sides."""
 
 
 def document_of(folder: Path, name: str, *, file: str) -> dict[str, Any]:

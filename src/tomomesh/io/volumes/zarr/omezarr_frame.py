@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 SPACE = ("x", "y", "z")
 """The axes that a stack must have, the columns' first."""
 
-MM_PER_UNIT = {
+OME_UNITS_MM = {
     "angstrom": 1e-7, "nanometer": 1e-6, "micrometer": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "decimeter": 100.0,
     "meter": 1e3, "inch": 25.4,
 }  # fmt: skip
@@ -106,10 +106,10 @@ def frame_of(
         For distances that no scanner writes, or that are missing, and directions that are no patient's.
     """
     scale, offset = _combined(axes, transformations, file)
-    if not all(unit in MM_PER_UNIT for unit in axes.units) or not transformations:
+    if not all(unit in OME_UNITS_MM for unit in axes.units) or not transformations:
         return upright(required_spacing(settings.spacing, file=file, what=_unknown(axes))), (GIVEN,)
     check_spacing(scale.tolist(), [f"scale of {name}" for name in SPACE], file=file, hint="a store with valid scales")
-    factors = np.array([MM_PER_UNIT[unit] for unit in axes.units])
+    factors = np.array([OME_UNITS_MM[unit] for unit in axes.units])
     affine = np.zeros((4, 4))
     affine[3, 3] = 1.0
     for column, (row, sign) in enumerate(_directions(axes, file)):
