@@ -82,7 +82,9 @@ def sizes_of(values: Sequence[str], count: int, field: str, *, file: str) -> tup
     FormatError
         For another count, text, and sizes below 1.
     """
-    sizes = tuple(int(value) for value in values if value.isascii() and value.isdigit() and len(value) < 19)
+    sizes = tuple(
+        int(value) for value in values if value.isascii() and value.isdigit() and len(value) < 19
+    )  # fit into 64 bits
     if len(sizes) != len(values) or len(sizes) != count or min(sizes, default=0) < 1:
         raise FormatError(
             "the sizes of the volume are invalid",

@@ -25,6 +25,10 @@ and no scanner's slices are so thin."""
 ON_LINE = 0.1
 """Origins may leave their straight line by this part of a pixel, which interpolation would not show."""
 
+RIGHT_ANGLE = 0.01
+"""Products of the directions of columns and rows may be off those of unit vectors at right angles by this: .6 degrees,
+or directions that are written with two decimals."""
+
 TILTED = 0.1
 """Degrees of gantry tilt from which on it is mentioned: over a stack of 300 mm they are half a millimeter."""
 
@@ -134,7 +138,7 @@ def axes_of(frame: ImageFrame) -> NDArray[np.float64]:
     if frame.axes is None and frame.position is None:
         return np.eye(3)[:2]
     axes = np.full((2, 3), np.nan) if frame.axes is None else frame.axes
-    if not np.allclose(axes @ axes.T, np.eye(2), atol=1e-2):
+    if not np.allclose(axes @ axes.T, np.eye(2), atol=RIGHT_ANGLE):
         raise GeometryError(
             "the directions of the slices are invalid",
             file=frame.path.name,
