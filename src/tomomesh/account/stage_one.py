@@ -82,7 +82,9 @@ class StageOne(Ledger):
                 f"{chosen.dropped} of {chosen.found} components of the window ({chosen.dropped_voxels} voxels) were "
                 "left out, which lie in nothing that is 12 mm thick, as a scanner's table: --keep all keeps them"
             )
-        if chosen.spared_voxels:
+        if chosen.spared_voxels == int(mask.sum()):
+            self.warn("nothing of the window lies in a body, 12 mm thick and denser than air: all of it was kept")
+        elif chosen.spared_voxels:
             self.warn(
                 f"most of the window ({chosen.spared_voxels} of {int(mask.sum())} voxels) lies in nothing that is 12 "
                 "mm thick, and was kept for all that: --keep body leaves it out"
