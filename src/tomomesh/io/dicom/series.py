@@ -59,6 +59,7 @@ def choose(frames: list[Frame], wanted: int | None, *, folder: str) -> Choice:
             found=table(series),
             expected="one series",
             hint="--series N",
+            flags=["--series"],
         )
     return Choice(series[0], notes)
 
