@@ -44,15 +44,24 @@ class Index:
     frame: NDArray[np.float64]
 
     @classmethod
-    def of(cls, positions: NDArray[np.float64], edge: float) -> Index:
+    def of(cls, positions: NDArray[np.float64], edge: float, origin: NDArray[np.float64] | None = None) -> Index:
         """Sort points (p, 3) into cubes of an edge.
+
+        Parameters
+        ----------
+        positions : (p, 3) float array
+        edge : float
+        origin : (3,) float array, optional
+            Lowest corner of cell (0, 0, 0), not over any point; the lowest corner of their box where not given. Of a
+            part of a cloud, that of the whole: then the part's cubes, and their order, are the whole's.
 
         Raises
         ------
         ResourceError
             Where the points reach farther than cubes can be numbered.
         """
-        origin, highest = box(positions)
+        lowest, highest = box(positions)
+        origin = lowest if origin is None else origin
         widest = float((highest - origin).max())
         most = EDGE << BITS
         if widest / edge >= most:
