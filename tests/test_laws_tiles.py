@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conftest import law, seeds
+from conftest import COMPILED, law, seeds
 from tomomesh.errors import ResourceError
 from tomomesh.pointcloud.samples import Samples, settle_points
 from tomomesh.pointcloud.search import Index
@@ -41,6 +41,10 @@ def inside(found: Samples, low: float, high: float) -> list[NDArray[np.generic]]
     return [getattr(found, name)[kept] for name in PER_POINT]
 
 
+SLOW = pytest.mark.skipif(not COMPILED, reason="thousands of points settle, minutes without the compiler")
+
+
+@SLOW
 @law(12)
 @given(seeds, st.sampled_from([0.0, 0.05, 0.3, 0.9]))
 def test_a_part_of_a_cloud_settles_as_in_the_whole(seed: int, noise: float) -> None:
@@ -58,6 +62,7 @@ def test_a_part_of_a_cloud_settles_as_in_the_whole(seed: int, noise: float) -> N
     assert part.bend == whole.bend
 
 
+@SLOW
 @law(4)
 @given(seeds)
 def test_so_does_a_part_of_a_slab_whose_points_are_merged(seed: int) -> None:
@@ -71,6 +76,7 @@ def test_so_does_a_part_of_a_slab_whose_points_are_merged(seed: int) -> None:
     assert all(np.array_equal(a, b) for a, b in zip(inside(part, 0, 60), inside(whole, 0, 60), strict=True))
 
 
+@SLOW
 def test_a_part_that_is_told_nothing_does_not() -> None:
     cloud = ribbon(260, 0.05, np.random.default_rng(0))
     whole, alone = settle_points(cloud), settle_points(cloud[cloud[:, 0] > 100])

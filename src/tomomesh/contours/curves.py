@@ -10,6 +10,8 @@ from scipy import ndimage
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
+from ..measure.polygon import side_lengths
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -69,8 +71,7 @@ def redrawn(ring: Floats, distance: float) -> Floats:
 
 def fine_curve(ring: Floats, distance: float) -> Floats:
     """Bridge the gaps of a ring (u, 2), take its noise off and draw it finely."""
-    chord = np.sqrt(((ring - np.roll(ring, -1, axis=0)) ** 2).sum(axis=1))
-    even = redrawn(ring, LONG * float(np.median(chord)))
+    even = redrawn(ring, LONG * float(np.median(side_lengths(ring))))
     smooth = without_noise(even)
     apart = (smooth != np.roll(smooth, -1, axis=0)).any(axis=1)
     return redrawn(smooth[apart], distance)

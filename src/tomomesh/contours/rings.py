@@ -18,7 +18,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, cKDTree
 
-from ..kernels.som.polygons import inside_polygon
+from ..measure.polygon import area, inside
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -108,7 +108,7 @@ def nested(curves: Sequence[NDArray[np.float64]]) -> Outline:
         Its numbers are of the points of all curves, one after the other.
     """
     first = np.cumsum([0, *map(len, curves)])
-    areas = np.array([signed_area(curve) for curve in curves])
+    areas = np.array([area(curve) for curve in curves])
     turn = np.sign(areas).astype(np.int64)
     within = _within(curves, np.abs(areas))
     around = within @ turn
@@ -124,14 +124,8 @@ def nested(curves: Sequence[NDArray[np.float64]]) -> Outline:
 
 def holes(curves: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
     """Tell which closed curves (u, 2) are holes: those within an odd number of others."""
-    areas = np.array([abs(signed_area(curve)) for curve in curves])
+    areas = np.array([abs(area(curve)) for curve in curves])
     return np.asarray(_within(curves, areas).sum(axis=1) % 2 == 1)
-
-
-def signed_area(curve: NDArray[np.float64]) -> float:
-    """Return the area of a closed polygon (u, 2); below 0 where the inside is on its right."""
-    x, y = (curve - curve[0]).T
-    return float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)
 
 
 def _within(curves: Sequence[NDArray[np.float64]], areas: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -140,9 +134,7 @@ def _within(curves: Sequence[NDArray[np.float64]], areas: NDArray[np.float64]) -
     apart = (low[:, None] > high[None]).any(axis=2) | (high[:, None] < low[None]).any(axis=2)
     found = ~apart & (areas[:, None] < areas[None, :])
     for one, other in np.argwhere(found).tolist():
-        inside = np.empty(len(curves[one]), np.bool_)
-        inside_polygon(np.ascontiguousarray(curves[other]), np.ascontiguousarray(curves[one]), inside)
-        found[one, other] = inside.mean() > 0.5
+        found[one, other] = inside(curves[other], curves[one]).mean() > 0.5
     return np.asarray(found)
 
 

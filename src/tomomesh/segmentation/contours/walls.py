@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from ...measure.polygon import area, distance, inside
 from ...model.contours import WALL_INNER, WALL_OUTER
 from ...model.lattice import lattice
 from ...som.fit import fit
-from ..polygon import area, distance, inside
 from ..signal import closed, pixels_of
 from .inputs import SHORTEST, TOUCHING, Look, look_at_loop
 from .loops import Loop, trace
