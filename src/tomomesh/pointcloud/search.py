@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import ResourceError
 from ..kernels.measure.bvh import order_keys
 from ..kernels.pointcloud.samples import BITS
-from ..model.columns import box, cells_of
+from ..model.columns import box, cells_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,7 +71,7 @@ class Index:
                 expected=f"at most {most * edge:g}",
                 hint="leaving far points out",
             )
-        x, y, z = cells_of(positions, origin, edge).T
+        x, y, z = cells_at(positions, origin, edge).T
         local = ((z % EDGE) * EDGE + y % EDGE) * EDGE + x % EDGE
         keys = ((((z // EDGE << BITS) | y // EDGE) << BITS) | x // EDGE) * EDGE**3 + local
         order = np.empty(len(keys), np.int32)
