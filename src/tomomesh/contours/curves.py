@@ -197,5 +197,5 @@ def _to_sides(places: Floats, points: Floats, sides: Floats) -> Floats:
     _, nearest = cKDTree(points).query(places)
     step, side = places - points[nearest], sides[:, nearest]
     share = (step * side).sum(axis=2) / np.maximum((side**2).sum(axis=2), 1e-300)
-    foot = np.clip(share, 0, 1)[..., None] * side
-    return np.asarray(np.sqrt(((step - foot) ** 2).sum(axis=2)).min(axis=0))
+    on_side = np.clip(share, 0, 1)[..., None] * side
+    return np.asarray(np.sqrt(((step - on_side) ** 2).sum(axis=2)).min(axis=0))

@@ -30,7 +30,7 @@ BLOCK = 4_096
 """Samples or places worked on in one call."""
 RADIUS = 2.5
 """Radius of the disks, sampling distances: points thrown at random leave holes as wide, once in 10 million."""
-FLAT = 2.0
+PLANE_SIGHT = 2.0
 """How far a sample looks for the plane that it lies in, sampling distances."""
 LINK = 1.5
 """Distance of the middles of disks that belong to one border, in their radius."""
@@ -136,7 +136,7 @@ def borders(samples: Samples, edge: float, *, threads: int = 0) -> tuple[Borders
     beyond, radii = np.empty(len(rows), np.int64), np.empty(len(rows))
 
     def level(start: int, stop: int) -> None:
-        flatten(rows, *index.cells, FLAT, normals, rough, start, stop)
+        flatten(rows, *index.cells, PLANE_SIGHT, normals, rough, start, stop)
 
     def lay(start: int, stop: int) -> None:
         find_disks(rows, *index.cells, RADIUS, beyond, radii, start, stop)

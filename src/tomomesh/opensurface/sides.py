@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
     Marks = NDArray[np.bool_]
 
-CRUMB = 0.01
+LEAST_PIECE = 0.01
 """Share of the squares under which a piece of the walls is left out."""
 PLOT = 1.5
 """Edge of the plots over which two pieces are compared, cube edges: every wall has vertices over each."""
@@ -125,7 +125,7 @@ def _pieces(quads: NDArray[np.int32], count: int) -> Integers:
     size = np.bincount(label[quads[:, 0]], minlength=total)
     rank = np.empty(total, np.int64)
     rank[np.argsort(-size, kind="stable")] = np.arange(total)
-    return np.asarray(np.where(size[label] >= max(CRUMB * len(quads), 1), rank[label], -1))
+    return np.asarray(np.where(size[label] >= max(LEAST_PIECE * len(quads), 1), rank[label], -1))
 
 
 def _plots(positions: Floats, edge: float) -> Integers:

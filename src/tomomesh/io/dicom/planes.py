@@ -21,7 +21,7 @@ SAME = 1e-3
 """Heights in mm that differ by less are the same."""
 ONE_PLANE = 0.1
 """Contours nearer than this share of the planes' median distance lie in one plane."""
-FLAT = 0.25
+BULGE = 0.25
 """Share of the least distance of two planes by which a contour may leave its own."""
 
 
@@ -74,7 +74,7 @@ def planes_of(contours: Sequence[Floats], *, file: str) -> Planes:
     labels[order] = np.cumsum(np.concatenate([[False], gaps > ONE_PLANE * np.median(apart)]))
     heights = np.bincount(labels, height) / np.bincount(labels)
     off = np.array([np.abs(one - heights[label]).max() for one, label in zip(along, labels, strict=True)])
-    most = FLAT * float(np.diff(heights).min())
+    most = BULGE * float(np.diff(heights).min())
     if off.max() > most:
         raise GeometryError(
             "the contours do not lie in parallel planes",

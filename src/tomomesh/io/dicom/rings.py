@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-FLAT = 1e-9
+THIN = 1e-9
 """Polygons of less area, in shares of their squared length, enclose nothing."""
 LEAST = 24
 """Points that a ring gets at least."""
@@ -51,7 +51,7 @@ def parted(polygon: Floats) -> list[Floats]:
         else:
             chain.append(corner)
     rings = [np.array(ring) for ring in [*found, chain] if len(ring) > 2]
-    return [ring for ring in rings if np.linalg.norm(vector_area(ring)) > FLAT * perimeter(ring) ** 2]
+    return [ring for ring in rings if np.linalg.norm(vector_area(ring)) > THIN * perimeter(ring) ** 2]
 
 
 def thinned(ring: Floats, distance: float) -> Floats:

@@ -32,7 +32,7 @@ TOUCHING = np.ones((3, 3), bool)
 
 
 @dataclass(frozen=True)
-class Look:
+class Inputs:
     """What one ring is shown.
 
     Attributes
@@ -67,7 +67,7 @@ class Look:
         return min(self.perimeter // SIDES_EACH, len(self.shown))
 
 
-def looks_at_loops(plane: NDArray[np.bool_]) -> tuple[list[Look], int]:
+def inputs_of_loops(plane: NDArray[np.bool_]) -> tuple[list[Inputs], int]:
     """Show each ring one closed outline of the window: the middles of the pixels inside and outside.
 
     Parameters
@@ -76,19 +76,19 @@ def looks_at_loops(plane: NDArray[np.bool_]) -> tuple[list[Look], int]:
 
     Returns
     -------
-    looks : list of Look
+    inputs : list of Inputs
     dropped : int
         Outlines of fewer than `SHORTEST` pixel sides.
     """
     loops = trace(plane)
     kept = [loop for loop in loops if len(loop) >= SHORTEST]
-    return [look_at_loop(loop, OUTER if loop.area > 0 else HOLE) for loop in kept], len(loops) - len(kept)
+    return [inputs_along(loop, OUTER if loop.area > 0 else HOLE) for loop in kept], len(loops) - len(kept)
 
 
-def look_at_loop(loop: Loop, side: int) -> Look:
+def inputs_along(loop: Loop, side: int) -> Inputs:
     """Show a ring the outline itself, and let it start there."""
     least = max(FEWEST, len(loop) // SIDES_MOST)
-    return Look(loop.middles, loop.middles, loop.filled(), side, len(loop), outlined=True, least=least)
+    return Inputs(loop.middles, loop.middles, loop.filled(), side, len(loop), outlined=True, least=least)
 
 
 @dataclass(frozen=True)
@@ -114,13 +114,13 @@ class Component:
         spread = moments(np.ascontiguousarray(pixels_of(self.pixels).T))[1] + np.eye(2) / 12
         return float(4 * np.pi * np.sqrt(np.linalg.det(spread)))
 
-    def look(self, *, solid: bool) -> Look:
+    def inputs(self, *, solid: bool) -> Inputs:
         """Show a ring the outline of a solid, or the pixels of a wall."""
         loop = max(trace(self.pixels), key=lambda found: found.area)
         shown = outline(self.pixels) if solid else pixels_of(self.pixels)
         inside = loop.filled()
         patch = Patch(inside.low + self.low, inside.pixels)
-        return Look(shown + self.low, None, patch, OUTER, len(loop), outlined=solid)
+        return Inputs(shown + self.low, None, patch, OUTER, len(loop), outlined=solid)
 
 
 def components_of(plane: NDArray[np.bool_], bodies: NDArray[np.int32]) -> tuple[list[Component], int]:
