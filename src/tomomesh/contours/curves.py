@@ -22,11 +22,14 @@ if TYPE_CHECKING:
 WEIGHTS = np.concatenate([[0.0], 10.0 ** np.arange(-3, 5.1, 0.25)])
 """Weights of the third differences among which generalized cross-validation chooses."""
 LONG = 1.5
-"""Medians over which a side of a ring is a gap, and gets points."""
+"""Medians over which a side of a ring is a gap, and gets points. Chosen: half of it changes the distance by +22.6 %,
+twice by -4.0 %."""
 DENSE = 0.25
-"""Distance of the points on a fine curve, in pixels."""
+"""Distance of the points on a fine curve, in pixels. Chosen: half of it changes the distance by +0.4 %, twice by -0.2
+%."""
 NEAR = 3.0
-"""Pixels from a curve within which distances are exact."""
+"""Pixels from a curve within which distances are exact. Chosen: half of it changes the distance by +2.5 %, twice by
++10.4 %."""
 
 
 def without_noise(ring: Floats) -> Floats:

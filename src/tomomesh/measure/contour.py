@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 ROUNDING = 1e-9
-"""What a place may lie off a line, over the product of the lengths, and still count as on it."""
+"""What a place may lie off a line, over the product of the lengths, and still count as on it. A computed turn errs by
+some 4e-16 of that for each length between the line and the origin: lines up to a million lengths away are told right.
+"""
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from ..model.volume import Volume
 
 NAMED = 24
-"""Labels that are named where one is missing, at most."""
+"""Labels that are named where one is missing, at most. So that an error stays a line."""
 MOST = 4096
 """Labels over which a label map is doubted."""
 HIGHEST_LABEL = 2**16
-"""A volume with higher levels is no label map."""
+"""A volume with higher levels is no label map. Label maps have 8 or 16 bits."""
 EVEN = 0.8
 """Share of equal neighbors, among those that are both over 0, from which levels are labels."""
 

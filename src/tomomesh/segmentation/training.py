@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from ..som.fit import Fitted
 
 NEAR = 2.0
-"""First radius, hops, where a network starts from the result of the slice below."""
+"""First radius, hops, where a network starts from the result of the slice below. Measured: a ring that starts from its
+neighbor's place needs 3 epochs from there, and a start at 4 fails on two-sided walls."""
 
 
 def train_study(

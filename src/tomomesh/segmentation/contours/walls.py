@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 LONG = 0.25
-"""Borders shorter than this share of the longest are pores of a wall, not its sides."""
+"""Borders shorter than this share of the longest are pores of a wall, not its sides. Chosen: half of it changes the
+distance by +91.3 %, twice by +8.0 %."""
 
 
 def inputs_of_walls(
