@@ -37,13 +37,13 @@ def pictures(
     if surface is not None:
         stages |= {
             "points": surface.points,
-            "cuberille": surface.cuberille,
-            "triangulated": surface.cuberille.triangulated(),
             "smoothed": surface.smoothed,
             "mesh": surface.mesh,
             "trace": surface.trace,
             "view": _view(stage_one, settings),
         }
+    if surface is not None and len(surface.cuberille.quads):
+        stages |= {"cuberille": surface.cuberille, "triangulated": surface.cuberille.triangulated()}
     if stage_one is not None:
         volume, way = stage_one.volume, way_of(stage_one.report["way"]["name"])
         stages |= {
