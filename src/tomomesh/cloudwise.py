@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .cuberille.leak_test import SURE, hold
+from .cuberille.leak_test import SURE, close_leaks
 from .cuberille.neighbors import once_each
 from .cuberille.partition import cubes_over, is_flat
 from .dynamics.moving_least_squares import Draped, Ring, drape
@@ -16,7 +16,7 @@ from .dynamics.untangle import untangle
 from .errors import EmptyError, GeometryError
 from .measure.intersections import Crossings
 from .model.columns import any_of, box
-from .model.cubes import cells_of, keys_of
+from .model.cubes import cells_of
 from .model.mesh import QuadMesh, TriMesh
 from .opensurface.gaps import gaps
 from .opensurface.sheet import open_sheet
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .account import Account
-    from .cuberille.leak_test import Held
+    from .cuberille.leak_test import LeakTest
     from .pointcloud.bridges import Bridges
     from .progress import Progress
     from .settings import Settings
@@ -59,7 +59,7 @@ class CloudSurface:
     Attributes
     ----------
     samples : Samples
-    held : Held
+    held : LeakTest
     origin : (3,) float array
         Where positions are counted from, in the cloud's own frame.
     cuberille : QuadMesh
@@ -74,7 +74,7 @@ class CloudSurface:
     """
 
     samples: Samples
-    held: Held
+    held: LeakTest
     origin: Floats
     cuberille: QuadMesh
     smoothed: TriMesh
@@ -98,10 +98,10 @@ def surface_of_cloud(positions: Floats, settings: Settings, account: Account, pr
     with account.timed("cubes"):
         shell = _hold(len(positions), samples, settings, progress)
     held, cell = shell.held, shell.cell
-    taken = held.walls.worth_keeping(largest=settings.cubes.largest)
+    taken = held.faces.worth_keeping(largest=settings.cubes.largest)
     account.held(held, taken, cell, shell.cubes, len(shell.spanned.places))
-    fitted = held.holds or not _refused(samples, origin, settings, account)
-    walls = held.walls.only(taken)
+    fitted = held.tight or not _refused(samples, origin, settings, account)
+    walls = held.faces.only(taken)
     with account.timed("smooth"):
         ring = Ring(walls.quads, len(walls.corners), threads)
         lattice = shell.lowest + walls.corners * cell
@@ -118,7 +118,7 @@ def surface_of_cloud(positions: Floats, settings: Settings, account: Account, pr
         mesh, taken_back, crossing = untangle(mesh, vertices, ring, Crossings(threads))
     account.draped(draped, taken_back, filled)
     return CloudSurface(
-        samples, held, origin, QuadMesh(lattice + origin, walls.quads.astype(np.int64), keys_of(walls.cells)),
+        samples, held, origin, QuadMesh(lattice + origin, walls.quads.astype(np.int64)),
         smoothed.moved(vertices + origin), mesh.moved(mesh.vertices + origin), filled, crossing, draped,
     )  # fmt: skip
 
@@ -131,10 +131,10 @@ def _open_surface(
     with account.timed("fit"):
         spanned = bridges(samples, float(cell.min()), threads=threads, progress=progress)
         made = open_sheet(samples, spanned, cell, settings, Crossings(threads), progress)
-    account.held(made.held, np.ones(made.held.walls.count, bool), cell, made.cubes, len(spanned.places))
+    account.held(made.held, np.ones(made.held.faces.count, bool), cell, made.cubes, len(spanned.places))
     account.draped(made.draped, made.taken_back, made.filled)
     return CloudSurface(
-        samples, made.held, origin, QuadMesh(made.lattice + origin, made.quads, keys_of(made.cells)),
+        samples, made.held, origin, QuadMesh(made.lattice + origin, made.quads),
         made.smoothed.moved(made.smoothed.vertices + origin), made.mesh.moved(made.mesh.vertices + origin),
         made.filled, made.crossing, made.draped,
     )  # fmt: skip
@@ -148,7 +148,7 @@ class _Shell:
     lowest: Floats
     cubes: int
     spanned: Bridges
-    held: Held
+    held: LeakTest
 
 
 def _hold(count: int, samples: Samples, settings: Settings, progress: Progress) -> _Shell:
@@ -162,7 +162,7 @@ def _hold(count: int, samples: Samples, settings: Settings, progress: Progress) 
         lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
         cells = cells_of(once_each(keys))
         steps = [k for k in tried if cubes.closing is not None or k * cell.min() <= reach]
-        held = hold(
+        held = close_leaks(
             cells, steps, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
         )  # fmt: skip
         if best is None or held.two_sided >= SURE or held.is_better_than(best.held):

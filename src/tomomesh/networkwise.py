@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .cuberille.leak_test import CLOSINGS, hold
+from .cuberille.leak_test import CLOSINGS, close_leaks
 from .cuberille.partition import is_flat, partition
 from .dynamics.collapse import without_collapse
 from .dynamics.low_pass import low_pass
@@ -41,14 +41,14 @@ def surface_of_networks(
     with account.timed("cubes"):
         grid = partition(points.positions, _cell(spacing, settings))
         closings = CLOSINGS if asked.closing is None else (asked.closing,)
-        held = hold(grid.cells, closings, cavities=asked.surface == "all", threads=threads, progress=progress)
-        taken = held.walls.worth_keeping(largest=asked.largest)
+        held = close_leaks(grid.cells, closings, cavities=asked.surface == "all", threads=threads, progress=progress)
+        taken = held.faces.worth_keeping(largest=asked.largest)
     account.held(held, taken, grid.cell_mm, len(grid.keys))
     with account.timed("cuberille"):
-        walls = held.walls.only(taken)
-        cubes, cuberille = walls.over(grid)
+        walls = held.faces.only(taken)
+        cubes, cuberille, origins = walls.over(grid)
     enclosed = float(walls.volumes.sum() * grid.cell_mm.prod())
-    if enclosed < LEAST * expected_mm3 if expected_mm3 else not held.holds:
+    if enclosed < LEAST * expected_mm3 if expected_mm3 else not held.tight:
         settings = _without_fit(account, settings, points.positions)
     with account.timed("smooth"):
         rough = cuberille.triangulated()
@@ -56,7 +56,7 @@ def surface_of_networks(
     with account.timed("fit"):
         springs = cuberille.edges if settings.fit.springs == "quads" else rough.edges
         rest = fit(
-            smoothed.vertices, springs, cuberille.vertex_cubes, points.positions, cubes, settings.fit,
+            smoothed.vertices, springs, origins, points.positions, cubes, settings.fit,
             threads=threads, progress=progress,
         )  # fmt: skip
     mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))

@@ -133,7 +133,7 @@ def surface_of_space(stage_one: Segmentation, settings: Settings, account: Accou
         network, moved = _untangled(found.network, threads)
     with account.timed("smooth"):
         vertices, quads = squares_of(network)
-        rough = QuadMesh(vertices, quads.astype(np.int64), np.zeros(len(quads), np.int64))
+        rough = QuadMesh(vertices, quads.astype(np.int64))
         start = rough.triangulated()
     account.faces(network, len(quads), moved)
     with account.timed("fit"):

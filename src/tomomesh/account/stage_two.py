@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from ..contours.slices import Slices
     from ..contours.stack import ContourSurface
-    from ..cuberille.leak_test import Held
+    from ..cuberille.leak_test import LeakTest
     from ..dynamics.moving_least_squares import Draped
     from ..isosurface.voxels import Boundary, VoxelSurface
     from ..model.mesh import TriMesh
@@ -82,10 +82,10 @@ class StageTwo(Ledger):
             self.warn(f"{samples.strays} of {count} points are strays, and were left out")
 
     def held(
-        self, held: Held, taken: NDArray[np.bool_], cell: NDArray[np.float64], cubes: int, bridged: int = 0
+        self, held: LeakTest, taken: NDArray[np.bool_], cell: NDArray[np.float64], cubes: int, bridged: int = 0
     ) -> None:
         """Note the cubes, the closing that made them hold, and which surfaces were taken."""
-        shell, walls = held.shell, held.walls
+        shell, walls = held.shell, held.faces
         self._sections["cubes"] = {
             "cell_mm": cell.tolist(),
             "occupied": cubes,
@@ -93,7 +93,7 @@ class StageTwo(Ledger):
             "closing": shell.closing,
             "added_for_composition": shell.added,
             "two_sided": held.two_sided,
-            "holds": held.holds,
+            "holds": held.tight,
         }
         self._sections["surface"] = {
             "found": walls.count,
@@ -103,7 +103,7 @@ class StageTwo(Ledger):
             "square_faces": int(walls.sizes[taken].sum()),
             "enclosed_cubes": int(walls.volumes[taken].sum()),
         }
-        if held.holds and shell.closing > WIDE:
+        if held.tight and shell.closing > WIDE:
             self.warn(f"gaps up to {2 * shell.closing} cubes wide were closed: the surface is made up there")
 
     def unfitted(self, *, flat: bool) -> None:
