@@ -41,7 +41,10 @@ def surface_of_networks(
     with account.timed("cubes"):
         grid = partition(points.positions, _cell(spacing, settings))
         closings = CLOSINGS if asked.closing is None else (asked.closing,)
-        held = close_leaks(grid.cells, closings, cavities=asked.surface == "all", threads=threads, progress=progress)
+        held = close_leaks(
+            grid.cells, closings, cavities=asked.surface == "all", tracking=asked.tracking, threads=threads,
+            progress=progress,
+        )  # fmt: skip
         taken = held.faces.worth_keeping(largest=asked.largest)
     account.held(held, taken, grid.cell_mm, len(grid.keys))
     with account.timed("cuberille"):

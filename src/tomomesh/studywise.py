@@ -67,7 +67,10 @@ def segment_study(
     if networks.outlined:
         account.filled_holes(share_of_holes(mask, settings.run.threads))
     with account.timed("points"):
-        sampling = sample(networks, stack, caps=settings.cubes.caps, bridge=settings.network.bridge)
+        sampling = sample(
+            networks, stack, caps=settings.cubes.caps, bridge=settings.network.bridge,
+            cell_from=settings.cubes.cell_from,
+        )  # fmt: skip
     account.points(sampling.points, sampling.spacing_mm, sampling.bridged)
     return Segmentation(stack, mask, networks, found, sampling.points, sampling, account.report)
 
