@@ -26,7 +26,8 @@ NEAR = 2
 """Steps, beyond twice the dilation, from enclosed space within which an occupied cube counts as near it: noise may
 make a shell two cubes thick, and a dilation leaves little of what is enclosed."""
 ROOM = 0.005
-"""Cubes of a piece of enclosed space, over the occupied ones, under which it is a pocket."""
+"""Cubes of a piece of enclosed space, over the occupied ones, under which it is a pocket: a sphere of radius 2 encloses
+8 % of its own cubes, a wider one more."""
 
 
 @dataclass(frozen=True)

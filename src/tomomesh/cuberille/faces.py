@@ -39,11 +39,12 @@ TRACKERS = {"scan": scan_faces, "faces": track_faces}
 
 
 TIGHT = 0.45
-"""Share of a surface's occupied cubes that must tell of an inside for the surface to be tight: in thin parts a dilation
-leaves no inside."""
+"""Share of a surface's occupied cubes that must tell of an inside for the surface to be tight. Measured on 260 spheres,
+tori and ellipsoids with holes and missing cubes, closed by 0 to 3: the share of what leaks is under .1, that of the
+others over .8, or 0 where the dilation leaves no inside; between them are wholes with thin parts, which may be half."""
 CRUMB = 0.05
 """Share of all faces under which a surface without an inside is debris: left out, and without a say in whether the
-shell leaks."""
+shell leaks. Chosen, not measured: specks come to less, a second object of a study to more."""
 
 
 @dataclass(frozen=True)

@@ -222,7 +222,11 @@ def _to_slice(points: PointSet, own: NDArray[np.int64], other: NDArray[np.int64]
 
 
 def _caps(networks: Networks, volume: Volume, spacing: float) -> PointSet:
-    """Fill what lies inside a ring but not inside the next ring above, or below, at the given spacing."""
+    """Fill what lies inside a ring but not inside the next ring above, or below, at the given spacing.
+
+    A ring is trusted to half a spacing, and a lattice meets it at half a spacing on average: so no point is set that
+    is outside of the next ring by less than a half, or nearer to its own than a quarter.
+    """
     pixel = np.array(volume.spacing_mm[:2])
     rings = networks.codebooks * pixel
     found = []
