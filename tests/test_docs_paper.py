@@ -12,8 +12,8 @@ import pytest
 from tomomesh.settings import UNSET, Settings, parameters
 
 PAGE = (Path(__file__).parents[1] / "docs" / "paper.md").read_text(encoding="utf-8")
-ROWS = [[cell.strip() for cell in line.split("|")[1:-1]] for line in PAGE.splitlines() if line.startswith("| ")]
-STEPS = [row for row in ROWS if len(row) == 6 and row[0] != "step" and set(row[0]) != {"-"}]
+TABLES = re.findall(r"^\| step \|.*\n\|[-|]+\n((?:\|.*\n)+)", PAGE, re.MULTILINE)
+STEPS = [[cell.strip() for cell in line.split("|")[1:-1]] for table in TABLES for line in table.splitlines()]
 SETTINGS = re.findall(r"`(\w+)\.(\w+) = ([^`]+)`", PAGE)
 FUNCTIONS = sorted(set(re.findall(r"`([a-z_]\w*(?:\.\w+)+)`", PAGE)))
 

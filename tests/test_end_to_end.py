@@ -84,29 +84,29 @@ class TestDemo:
         assert finer.report["truth"]["mean_mm"] <= 0.5 * surface.report["truth"]["mean_mm"]
 
     def test_the_papers_choices_close_too(self, head: Phantom) -> None:
-        """Measured: 0.389 and 0.680 mm there, 0.385 mm back, 1.000 of the volume, 4,492 vertices, 14 steps; + 10 %."""
+        """Measured: 0.422 and 0.716 mm there, 0.416 mm back, 0.999 of the volume, 4,492 vertices, 20 steps; + 10 %."""
         paper = reconstruct(head.volume, Settings.for_paper(), truth=head.truth, lower=head.lower, upper=head.upper)
         mesh, truth, points = judged(paper), paper.report["truth"], paper.report["points"]
         assert mesh.is_watertight
         assert mesh.euler_number == 2
-        assert truth["mean_mm"] < 0.43
-        assert truth["p95_mm"] < 0.75
-        assert truth["back_mean_mm"] < 0.43
+        assert truth["mean_mm"] < 0.465
+        assert truth["p95_mm"] < 0.79
+        assert truth["back_mean_mm"] < 0.46
         assert 0.98 < paper.report["quality"]["volume_over_rings"] < 1.02
         assert len(paper.mesh.vertices) > points["measured"]
         assert paper.trace.converged
-        assert len(paper.trace.speed) <= 30
+        assert 20 <= len(paper.trace.speed) <= 30, "the paper's own range"
         assert points["spacing_mm"] == pytest.approx(widest_of_nearest(paper), rel=1e-12)
         assert paper.report["cubes"]["cell_mm"] == [points["spacing_mm"]] * 3
 
-    def test_the_other_reading_of_the_papers_r_costs_three_times_the_error(self, head: Phantom) -> None:
-        """Measured: 1.341 mm with cubes of 22.5 mm, the longest edge of a network; + 10 %."""
+    def test_the_other_reading_of_the_papers_r_costs_four_times_the_error(self, head: Phantom) -> None:
+        """Measured: 1.856 mm with cubes of 22.5 mm, the longest edge of a network; 10 % either way."""
         wide = reconstruct(
             head.volume, Settings.for_paper(), truth=head.truth, lower=head.lower, upper=head.upper,
             cell_from="adjacent",
         )  # fmt: skip
         assert judged(wide).euler_number == 2
-        assert 1.2 < wide.report["truth"]["mean_mm"] < 1.5
+        assert 1.67 < wide.report["truth"]["mean_mm"] < 2.05
         assert len(wide.mesh.vertices) < 400
 
     @pytest.mark.parametrize("changes", [{"caps": False}, {"closing": 0}, {"caps": False, "closing": 0}])
