@@ -78,7 +78,7 @@ def to_nearest(points: PointSet) -> list[float]:
 
 def cells(points: PointSet, edge: float) -> NDArray[np.int64]:
     """Return the cube of edge r of each neuron."""
-    return np.floor(points.positions[points.kinds != CAP] / edge * (1 - 1e-12)).astype(np.int64)
+    return np.asarray(np.floor(points.positions[points.kinds != CAP] / edge * (1 - 1e-12)), np.int64)
 
 
 class TestAdjacent:

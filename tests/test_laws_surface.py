@@ -61,8 +61,9 @@ class TestOrder:
 
     @pytest.mark.parametrize("attraction", ATTRACTIONS)
     def test_nor_do_threads(self, attraction: str, monkeypatch: pytest.MonkeyPatch) -> None:
-        for block, size_of_it in (("dynamics.BLOCK", 101), ("drape.BLOCK", 97), ("blocks.SHARE", 3)):
-            monkeypatch.setattr(f"tomomesh.cuberille.{block}", size_of_it)
+        blocks = ("dynamics.mass_spring.BLOCK", "dynamics.moving_least_squares.BLOCK", "cuberille.bitmasks.SHARE")
+        for block, size_of_it in zip(blocks, (101, 97, 3), strict=True):
+            monkeypatch.setattr(f"tomomesh.{block}", size_of_it)
         one, two = (reconstruct_points(sphere(COUNT), threads=n, attraction=attraction) for n in (1, 2))
         assert bytes_of(one) == bytes_of(two)
 
@@ -89,7 +90,7 @@ class TestPlace:
         points = dyadic(torus(COUNT))
         here, there = (reconstruct_points(points + place, attraction=attraction) for place in (0.0, far))
         assert here.mesh.faces.tobytes() == there.mesh.faces.tobytes()
-        assert here.cubes.keys.tobytes() == there.cubes.keys.tobytes()
+        assert here.cuberille.quads.tobytes() == there.cuberille.quads.tobytes()
         off = there.mesh.vertices - far - here.mesh.vertices
         assert np.abs(off).max() <= 4 * np.spacing(abs(far))
 

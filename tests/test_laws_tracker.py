@@ -82,7 +82,7 @@ def number_of(blocks: Blocks, cell: NDArray[np.int64]) -> int:
     """Return the kernel's number of a cube."""
     block = np.flatnonzero((cells_of(blocks.keys) == cell // 8).all(axis=1))[0]
     x, y, z = (cell % 8).tolist()
-    return 512 * int(block) + 64 * z + 8 * y + x
+    return 512 * int(block) + 64 * int(z) + 8 * int(y) + int(x)
 
 
 def walked(solid: Solid, seed: Face) -> set[Face]:

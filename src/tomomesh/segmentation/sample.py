@@ -191,8 +191,8 @@ def _to_nearest(points: PointSet) -> float:
     """Return the widest distance of a point to the one nearest to it; 0 where each lies on another, or is alone."""
     if len(points) < 2:
         return 0.0
-    distance, _ = cKDTree(points.positions).query(points.positions, k=2)
-    return float(distance[:, 1].max())
+    distance = np.asarray(cKDTree(points.positions).query(points.positions, k=[2])[0])
+    return float(distance.max())
 
 
 def _across(points: PointSet, limit: float) -> float:

@@ -13,8 +13,8 @@ from ..errors import UsageError
 from .cloud import CloudSettings
 from .crop import CropSettings
 from .cubes import CubeSettings
-from .effect import without_effect
 from .fit import FitSettings
+from .matters import MATTERS
 from .network import FALLS, IN_SLICE, IN_SPACE, SURFACES, NetworkSettings
 from .parameter import LAYERS, MANY, UNSET, asked_by, limits_of, option_of
 from .printing import PrintSettings
@@ -28,6 +28,7 @@ __all__ = [
     "IN_SPACE",
     "LAYERS",
     "MANY",
+    "MATTERS",
     "SURFACES",
     "UNSET",
     "CloudSettings",
@@ -44,7 +45,6 @@ __all__ = [
     "limits_of",
     "option_of",
     "parameters",
-    "without_effect",
 ]
 
 
