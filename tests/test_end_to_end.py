@@ -84,13 +84,13 @@ class TestDemo:
         assert finer.report["truth"]["mean_mm"] <= 0.5 * surface.report["truth"]["mean_mm"]
 
     def test_the_papers_choices_close_too(self, head: Phantom) -> None:
-        """Measured: 0.422 and 0.716 mm there, 0.416 mm back, 0.999 of the volume, 4,492 vertices, 20 steps; + 10 %."""
+        """Measured: 0.422 and 0.730 mm there, 0.417 mm back, 0.999 of the volume, 4,492 vertices, 20 steps; + 10 %."""
         paper = reconstruct(head.volume, Settings.for_paper(), truth=head.truth, lower=head.lower, upper=head.upper)
         mesh, truth, points = judged(paper), paper.report["truth"], paper.report["points"]
         assert mesh.is_watertight
         assert mesh.euler_number == 2
         assert truth["mean_mm"] < 0.465
-        assert truth["p95_mm"] < 0.79
+        assert truth["p95_mm"] < 0.80
         assert truth["back_mean_mm"] < 0.46
         assert 0.98 < paper.report["quality"]["volume_over_rings"] < 1.02
         assert len(paper.mesh.vertices) > points["measured"]
