@@ -53,7 +53,7 @@ STUDY: dict[str, dict[str, Any]] = {
     "space": {"network": "sphere", "neurons": 42},
     "nearest in space": {"network": "sphere", "neurons": 42, "attraction": "nearest"},
 }
-CLOUD: dict[str, dict[str, Any]] = {"cloud": {}, "nearest": {"attraction": "nearest"}}
+CLOUD: dict[str, dict[str, Any]] = {"cloud": {}, "nearest": {"attraction": "nearest"}, "sheet": {"open": True}}
 POWERS = {"training": "online", "alpha_fall": "power", "radius_fall": "power"}
 WAYS = [*(("gray", asked) for asked in STUDY.values()), *(("cloud", asked) for asked in CLOUD.values()), ("stack", {})]
 """What is read, and what is asked for, on each way to a mesh."""

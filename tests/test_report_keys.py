@@ -50,7 +50,7 @@ def cloud(name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def keys_of(report: dict[str, Any]) -> dict[str, Any]:
-    """Return the sections in their order, each with its keys; those of settings and of libraries are not ours to fix."""
+    """Return the sections in their order, each with its keys; those of settings and versions are held elsewhere."""
     kept = {name: sorted(part) if isinstance(part, dict) else [] for name, part in report.items()}
     return kept | {"settings": [], "versions": []}
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import io
 from ..errors import OutputError, UsageError
-from ..io.source import suffix_of
+from ..io.files.source import suffix_of
 from .parts import frame_of_part
 
 if TYPE_CHECKING:

@@ -132,7 +132,7 @@ def _pictures(found: Segmentation[Contours]) -> dict[str, Any]:
 WAY = Way(
     applies=lambda settings, input: input not in POINTS and settings.network.contours != "one",
     because=lambda settings, input: f"with --contours {settings.network.contours}",
-    reads=TRAINING | parameters("bridge", "even", "cell_mm", "cell_factor", "stiffness"),
+    reads=TRAINING | parameters("bridge", "even", "cell_mm", "cell_factor", "stiffness", "allow_leaks"),
     segment=segment_by_contours,
     surface=surface_by_contours,
     of_networks=_of_networks,

@@ -21,7 +21,7 @@ from ..model.columns import any_of
 from ..model.mesh import QuadMesh, TriMesh
 from ..model.points import PointSet
 from ..pointcloud.samples import settle_points
-from ..results import Segmentation, Surface
+from ..results import Segmentation, Surface, window_volume
 from ..segmentation.sample import Sampling
 from ..segmentation.space import is_wall, pieces_of, regions_in_space, train_space
 from ..settings import SURFACES
@@ -229,7 +229,7 @@ def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progre
     made, taken_back, crossing = mesh.value
     surface = Surface(
         found.points, rough, rough.triangulated(), made, np.empty(0, np.int32), trace=rest.value.trace,
-        filled=rest.value.filled, crossing=crossing, rests_on=found.source.places,
+        filled=rest.value.filled, crossing=crossing, rests_on=found.source.places, encloses_mm3=window_volume(found),
     )  # fmt: skip
     fitted = fit_found(rest.value.trace, len(rough.vertices), taken_back=taken_back)
     filled: Stage[None] = Stage(None, {"fit": {"filled_faces": int(rest.value.filled.sum())}})
@@ -335,7 +335,8 @@ NEAREST = {"attraction": ("nearest",)}
 WAY = Way(
     applies=lambda settings, input: input not in POINTS and settings.network.in_space,
     because=_because,
-    reads=TRAINING | parameters("attraction", "damping", "step", stiffness=NEAREST, springs=NEAREST, limit=NEAREST),
+    reads=TRAINING
+    | parameters("allow_leaks", "attraction", "damping", "step", stiffness=NEAREST, springs=NEAREST, limit=NEAREST),
     segment=segment_in_space,
     surface=surface_in_space,
     require=require_surface,

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..isosurface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
 from ..model.points import PointSet
-from ..results import Segmentation, Surface
+from ..results import Segmentation, Surface, window_volume
 from ..segmentation.sample import Sampling
 from ..stage import Stage, folded, timed
 from .sections import body_of_voxels, boundary_found, points_found
@@ -38,7 +38,8 @@ def surface_by_voxels(found: Segmentation[Boundary], settings: Settings, progres
     meshed = _mesh(source, settings, progress)
     made = meshed.value
     surface = Surface(
-        found.points, source.cuberille, made.smoothed, made.mesh, made.nearest, cavities=source.cavities
+        found.points, source.cuberille, made.smoothed, made.mesh, made.nearest, cavities=source.cavities,
+        encloses_mm3=window_volume(found),
     )  # fmt: skip
     return folded(surface, meshed, boundary_found(source, made))
 
@@ -71,7 +72,7 @@ def _pictures(found: Segmentation[Boundary]) -> dict[str, Any]:
 WAY = Way(
     applies=lambda settings, input: input not in POINTS and settings.network.network == "none",
     because=lambda settings, input: "with --network none",
-    reads=parameters("surface", "stiffness"),
+    reads=parameters("surface", "stiffness", "allow_leaks"),
     segment=segment_by_voxels,
     surface=surface_by_voxels,
     of_body=body_of_voxels,
