@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..cuberille.leak_test import SURE, hold
+from ..cuberille.leak_test import SURE, close_leaks
 from ..cuberille.neighbors import once_each
 from ..cuberille.partition import cubes_over, is_flat
 from ..dynamics.moving_least_squares import Draped, Ring, drape
@@ -16,7 +16,7 @@ from ..dynamics.untangle import untangle
 from ..errors import GeometryError
 from ..measure.intersections import Crossings
 from ..model.columns import any_of
-from ..model.cubes import cells_of, keys_of
+from ..model.cubes import cells_of
 from ..model.mesh import QuadMesh, TriMesh
 from ..opensurface.gaps import gaps
 from ..pointcloud.bridges import bridges
@@ -31,8 +31,8 @@ from .way import CUBES, POINTS, Way, on_input, parameters
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..cuberille.faces import Walls
-    from ..cuberille.leak_test import Held
+    from ..cuberille.faces import Faces
+    from ..cuberille.leak_test import LeakTest
     from ..pointcloud.bridges import Bridges
     from ..pointcloud.samples import Samples
     from ..progress import Progress
@@ -57,18 +57,18 @@ class Shell:
     lowest: Floats
     cubes: int
     spanned: Bridges
-    held: Held
+    held: LeakTest
 
     def taken(self, settings: Settings) -> NDArray[np.bool_]:
         """Tell of each surface whether it is kept."""
-        return self.held.walls.worth_keeping(largest=settings.cubes.largest)
+        return self.held.faces.worth_keeping(largest=settings.cubes.largest)
 
 
 @dataclass(frozen=True)
 class Rough:
-    """The walls that are kept, their corners (n, 3) on the lattice, and where these lie after the low-pass filter."""
+    """The faces that are kept, their corners (n, 3) on the lattice, and where these lie after the low-pass filter."""
 
-    walls: Walls
+    faces: Faces
     lattice: Floats
     ring: Ring
     mesh: TriMesh
@@ -90,13 +90,13 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     shell = _hold(points, samples, settings, progress)
     walls = _walls(shell.value, samples, origin, settings)
     rough = measured("smooth", _smoothed, shell.value, settings)
-    kept, smoothed, ring = rough.value.walls, rough.value.mesh, rough.value.ring
+    kept, smoothed, ring = rough.value.faces, rough.value.mesh, rough.value.ring
     rest = measured("fit", _fitted, shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
     apart = measured(
         "untangle", untangle, rest.value.mesh, smoothed.vertices, ring, Crossings(settings.run.threads)
     )  # fmt: skip
     mesh, taken_back, crossing = apart.value
-    cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64), keys_of(kept.cells))
+    cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64))
     trace = None if rest.value.draped is None else rest.value.draped.trace
     surface = Surface(
         points.cloud, cuberille, smoothed.moved(smoothed.vertices + origin),
@@ -127,7 +127,7 @@ def _holding(count: int, samples: Samples, settings: Settings, progress: Progres
         lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
         cells = cells_of(once_each(keys))
         steps = [k for k in tried if cubes.closing is not None or k * cell.min() <= reach]
-        held = hold(
+        held = close_leaks(
             cells, steps, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
         )  # fmt: skip
         if best is None or held.two_sided >= SURE or held.is_better_than(best.held):
@@ -140,7 +140,7 @@ def _holding(count: int, samples: Samples, settings: Settings, progress: Progres
 
 def _hollow(shell: Shell, settings: Settings) -> float:
     """Return the volume inside a shell without that of its cubes, which may be two walls with nothing between them."""
-    enclosed = int(shell.held.walls.volumes[shell.taken(settings)].sum())
+    enclosed = int(shell.held.faces.volumes[shell.taken(settings)].sum())
     return float(max(0, enclosed - shell.cubes) * shell.cell.prod())
 
 
@@ -149,7 +149,7 @@ def _walls(shell: Shell, samples: Samples, origin: Floats, settings: Settings) -
 
     One of two is not fitted: both walls would rest on the same samples, and the mesh would fall flat.
     """
-    if shell.held.holds:
+    if shell.held.tight:
         return walls_found(1)
     if is_flat(samples.positions, float(np.median(samples.spacing))):
         return walls_found(2, FLAT_SHELL)
@@ -172,11 +172,11 @@ def _place(place: Floats) -> str:
 
 
 def _smoothed(shell: Shell, settings: Settings) -> Rough:
-    walls = shell.held.walls.only(shell.taken(settings))
-    ring = Ring(walls.quads, len(walls.corners), settings.run.threads)
-    lattice = shell.lowest + walls.corners * shell.cell
+    faces = shell.held.faces.only(shell.taken(settings))
+    ring = Ring(faces.quads, len(faces.corners), settings.run.threads)
+    lattice = shell.lowest + faces.corners * shell.cell
     vertices = ring.smoothed(lattice, settings.cubes.smoothing)
-    return Rough(walls, lattice, ring, TriMesh(vertices, _halves(walls.quads)))
+    return Rough(faces, lattice, ring, TriMesh(vertices, _halves(faces.quads)))
 
 
 def _halves(quads: NDArray[np.int32]) -> NDArray[np.int64]:

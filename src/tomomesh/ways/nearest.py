@@ -30,7 +30,7 @@ def surface_near_points(points: Points, settings: Settings, progress: Progress) 
 WAY = Way(
     applies=lambda settings, input: input in POINTS and settings.fit.attraction == "nearest",
     because=lambda settings, input: "on a cloud with --attraction nearest",
-    reads=CUBES | SPRINGS | parameters("attraction"),
+    reads=CUBES | SPRINGS | parameters("attraction", "tracking"),
     surface=surface_near_points,
     of_body=body_of_cubes,
 )

@@ -64,7 +64,10 @@ def _layers(kept: Selected, settings: Settings) -> NDArray[np.bool_] | None:
 
 @timed("points")
 def _place(kept: Selected, networks: Networks, settings: Settings) -> Stage[Sampling]:
-    sampling = sample(networks, kept.study, caps=settings.cubes.caps, bridge=settings.network.bridge)
+    cubes = settings.cubes
+    sampling = sample(
+        networks, kept.study, caps=cubes.caps, bridge=settings.network.bridge, cell_from=cubes.cell_from
+    )  # fmt: skip
     return folded(sampling, points_found(sampling.points, sampling.spacing_mm, bridged=sampling.bridged))
 
 
@@ -118,7 +121,7 @@ def _pictures(found: Segmentation[Networks]) -> dict[str, Any]:
 WAY = Way(
     applies=lambda settings, input: input not in POINTS,
     because=lambda settings, input: "on networks of slices",
-    reads=TRAINING | CUBES | SPRINGS | parameters("bridge", "even", "caps"),
+    reads=TRAINING | CUBES | SPRINGS | parameters("bridge", "even", "caps", "cell_from", "tracking"),
     segment=segment_by_rings,
     surface=surface_by_rings,
     of_networks=_of_networks,

@@ -206,7 +206,7 @@ def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progre
 def _divide(network: TriMesh, moved: int) -> Stage[QuadMesh]:
     """Divide a network's own faces into finer squares."""
     vertices, quads = squares_of(network)
-    rough = QuadMesh(vertices, quads.astype(np.int64), np.zeros(len(quads), np.int64))
+    rough = QuadMesh(vertices, quads.astype(np.int64))
     stats: dict[str, dict[str, Any]] = {
         "space": {"faces": len(network.faces), "untangled": moved},
         "surface": {
