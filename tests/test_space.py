@@ -19,7 +19,7 @@ from studies import rotation
 from tomomesh import Volume, phantom, reconstruct, segment
 from tomomesh.cli import main
 from tomomesh.dynamics.subdivision import squares_of
-from tomomesh.errors import EmptyError, UsageError
+from tomomesh.errors import EmptyError, GeometryError, UsageError
 from tomomesh.measure.distance import distance_to_surface
 from tomomesh.measure.intersections import Crossings
 from tomomesh.model.icosphere import icosphere
@@ -176,9 +176,13 @@ class TestSurface:
         np.testing.assert_array_equal(made.segmentation.labels > 0, labels == 7)
 
     def test_warns_of_a_solid_that_is_shown_as_a_wall(self) -> None:
-        made = reconstruct(volume_of(ellipsoid()), lower=100.0, network="sphere", neurons=162, signal="region")
+        asked: dict[str, Any] = {"lower": 100.0, "network": "sphere", "neurons": 162, "signal": "region"}
+        with pytest.raises(GeometryError, match="does not follow its window"):
+            reconstruct(volume_of(ellipsoid()), **asked)
+        made = reconstruct(volume_of(ellipsoid()), **asked, allow_leaks=True)
         assert_sound(made, genus=0)
         assert any("--signal boundary" in warning for warning in made.report["warnings"])
+        assert any("of what it should" in warning for warning in made.report["warnings"])
 
     def test_faces_outward_from_a_mirrored_start(self) -> None:
         vertices, faces = icosphere(4)

@@ -44,7 +44,7 @@ def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage
     GeometryError
         Where it has two walls, or is not what is promised.
     """
-    checked = _check(made)
+    checked = _check(made, settings)
     coarse = _coarsen(checked.value, settings)
     part = _print(coarse.value, settings, progress)
     surface = part.value
@@ -61,27 +61,19 @@ def compare_with(surface: Surface, truth: TriMesh) -> Stage[None]:
 
 
 @timed("quality")
-def _check(made: Surface) -> Stage[Surface]:
+def _check(made: Surface, settings: Settings) -> Stage[Surface]:
     check_promise(made.mesh, cavities=made.cavities, open_=made.borders)
-    _require_one_wall(made)
-    return Stage(made)
-
-
-def _require_one_wall(made: Surface) -> None:
-    """Refuse a mesh that encloses so little of what its rings, window or samples do that both its walls rest on them.
-
-    Raises
-    ------
-    GeometryError
-    """
-    volume = float(made.mesh.face_volumes.sum())
-    if made.encloses_mm3 and volume < LEAST * made.encloses_mm3:
-        raise GeometryError(
-            "the outside leaks in, so the surface has two walls",
-            found=f"{volume / made.encloses_mm3:.1%} of the volume that its points enclose",
-            expected=f"at least {LEAST:.0%}",
-            hint="caps at both ends, a larger --cell-mm or --closing, or --network none",
-        )
+    share = float(made.mesh.face_volumes.sum()) / made.encloses_mm3 if made.encloses_mm3 else 1.0
+    if share >= LEAST:
+        return Stage(made)
+    if settings.cubes.allow_leaks:
+        return Stage(made, warnings=(f"the mesh encloses {share:.1%} of what it should: it may have two walls",))
+    raise GeometryError(
+        "the surface has two walls, or does not follow its window",
+        found=f"{share:.1%} of the volume that its points or its window enclose",
+        expected=f"at least {LEAST:.0%}",
+        hint="caps at both ends, a larger --cell-mm or --closing, --network none, or --allow-leaks",
+    )
 
 
 def _coarsen(made: Surface, settings: Settings) -> Stage[Surface]:
@@ -90,7 +82,7 @@ def _coarsen(made: Surface, settings: Settings) -> Stage[Surface]:
     if most is None or len(made.mesh.faces) <= most:
         return Stage(made)
     coarse = _decimate(made, most, settings)
-    return folded(coarse.value, coarse, _check(coarse.value))
+    return folded(coarse.value, coarse, _check(coarse.value, settings))
 
 
 @timed("decimate")

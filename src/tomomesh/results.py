@@ -60,6 +60,11 @@ class Segmentation(Reported, Generic[S]):
     source: S
 
 
+def window_volume(found: Segmentation[Any]) -> float:
+    """Return the volume of the voxels of a window, mm^3."""
+    return int(found.mask.sum()) * found.volume.voxel_mm3
+
+
 @dataclass(frozen=True)
 class Place:
     """What the numbers of a cloud are: their unit, their frame, and the corner that they are counted from."""
