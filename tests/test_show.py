@@ -52,7 +52,7 @@ def ball() -> TriMesh:
 def cube() -> QuadMesh:
     corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return QuadMesh(corners, np.array(quads), np.zeros(6, np.int64))
+    return QuadMesh(corners, np.array(quads))
 
 
 @pytest.fixture(scope="module")
