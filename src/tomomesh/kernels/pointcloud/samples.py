@@ -30,7 +30,8 @@ MOST = 1024
 ENOUGH, TRIES, WIDER = 9, 3, 1.25
 """Neighbors that a quadratic needs, how often it looks for them, and how much farther each time."""
 STEEP = 0.35
-"""Slope over which a neighbor does not belong to the surface under a plane."""
+"""Slope over which a neighbor does not belong to the surface under a plane. Chosen: half of it changes the distance by
++7.9 %, twice by -4.0 %."""
 ALIKE = 0.5
 """Cosine of the angle between normals over which points belong to one sheet."""
 BEND = 8.0
