@@ -32,7 +32,7 @@ ENOUGH, TRIES, WIDER = 9, 3, 1.25
 STEEP = 0.35
 """Slope over which a neighbor does not belong to the surface under a plane. Chosen: half of it changes the distance by
 +7.9 %, twice by -4.0 %."""
-ALIKE = 0.5
+SAME_SIDE = 0.5
 """Cosine of the angle between normals over which points belong to one sheet."""
 BEND = 8.0
 """How fast a neighbor's weight falls with 1 - cosine of the angle between the normals."""
@@ -289,7 +289,7 @@ def settle(
                     u += axes[0, axis] * moved
                     v += axes[1, axis] * moved
                 flat = u * u + v * v
-                if abs(same) < ALIKE or abs(height) > 2 * planes[p, 4] + STEEP * np.sqrt(flat):
+                if abs(same) < SAME_SIDE or abs(height) > 2 * planes[p, 4] + STEEP * np.sqrt(flat):
                     continue
                 rows[used, 0], rows[used, 1], rows[used, 2] = u / h, v / h, (raw - planes[p, 3]) / h
                 bent = 0.5 * (flat + height * height) / (h * h) + BEND * (1 - abs(same))
