@@ -41,22 +41,29 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
 
 CLOSINGS = (0, 1, 2)
-"""Closings that are tried until the two walls come apart, cubes."""
+"""Closings that are tried until the two walls come apart, cubes. Chosen: half of it changes the distance by +0.1 %,
+twice by +0.1 %."""
 APRON = 0.7
-"""How far a sheet is carried on beyond its borders, in the radius of the disks there."""
+"""How far a sheet is carried on beyond its borders, in the radius of the disks there. Chosen: half of it changes the
+distance by -6.6 %, twice by -0.3 %."""
 TIP = 0.8
-"""Share of the apron from which the walls are cut away."""
+"""Share of the apron from which the walls are cut away. Chosen: half of it changes the distance by -12.2 %, twice leads
+to a refusal."""
 DENSE = 0.5
-"""Distance of the places on the apron, cube edges."""
+"""Distance of the places on the apron, cube edges. Chosen: half of it changes the distance by -1.2 %, twice by -1.9 %.
+"""
 OVER = 0.4
-"""How far a sheet reaches beyond its outermost samples, cube edges: half of that is where points thrown at random
-end before their surface does."""
+"""How far a sheet reaches beyond its outermost samples, cube edges: half of that is where points thrown at random end
+before their surface does. Chosen: half of it changes the distance by -8.5 %, twice by +23.8 %."""
 EVEN = 3
-"""Passes of the low-pass filter over the heights along whose zero the sheet is cut."""
+"""Passes of the low-pass filter over the heights along whose zero the sheet is cut. Chosen: half of it changes the
+distance by -0.3 %, twice by -1.5 %."""
 SHIFT = 0.9
-"""Share of a height by which that filter may change it: none changes its sign, or narrow strips would be cut."""
+"""Share of a height by which that filter may change it: none changes its sign, or narrow strips would be cut. Chosen:
+half of it changes the distance by +0.1 %, twice area -0.0 %."""
 SNAP = (0.3, 0.1, 0.02)
-"""Share of an edge over which a vertex moves to the cut; the first that lets no face pass through another."""
+"""Share of an edge over which a vertex moves to the cut; the first that lets no face pass through another. Chosen: half
+of it changes the distance by +5.3 %, twice by +3.4 %."""
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from ..measure.polygon import area, distance, inside, lattice_inside, side_lengths
 from ..model.points import BRIDGE, CAP, NEURON, RING, SIDE, TRACK, PointSet
-from .polygon import area, distance, inside, lattice_inside
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -131,15 +131,13 @@ def sample_contours(contours: Contours, volume: Volume) -> Sampling:
     for one in contours.contours:
         sign = -1 if one.side % 2 else 1
         areas[np.searchsorted(contours.slices, one.slice)] += sign * abs(area(one.codebook))
-    lengths = np.concatenate([_sides(one.codebook * volume.spacing_mm[:2])[~one.bridged] for one in contours.contours])
+    lengths = np.concatenate(
+        [side_lengths(one.codebook * volume.spacing_mm[:2])[~one.bridged] for one in contours.contours]
+    )
     spacing = float(lengths.max(initial=0.0))
     bridged = sum(int(one.bridged.sum()) for one in contours.contours)
     distance = contours.slices * np.float64(volume.slice_distance_mm)
     return Sampling(points, spacing, bridged, areas * volume.pixel_area_mm2, distance)
-
-
-def _sides(ring: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.sqrt(((np.roll(ring, -1, axis=0) - ring) ** 2).sum(axis=1)))
 
 
 def _neurons(networks: Networks, volume: Volume) -> PointSet:

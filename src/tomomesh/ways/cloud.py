@@ -22,7 +22,7 @@ from ..opensurface.gaps import gaps
 from ..pointcloud.bridges import bridges
 from ..pointcloud.forecast import require_room
 from ..results import Surface
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured, timed
 from .points import place_found
 from .samples import cell_edges, lowest_corner, settle
 from .sections import FLAT_SHELL, LEAKY_SHELL, body_of_cubes, fit_found, shell_found, walls_found
@@ -83,34 +83,28 @@ class Rest:
     draped: Draped | None
 
 
-@dataclass(frozen=True)
-class Untangled:
-    """A mesh, its faces (m,) that pass through others, and how many vertices do not lie where the fit had them."""
-
-    mesh: TriMesh
-    crossing: NDArray[np.bool_]
-    taken_back: int
-
-
 def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
     """Turn a cloud into a closed surface."""
     settled = settle(points, settings, progress)
     samples, origin = settled.value, lowest_corner(points)
     shell = _hold(points, samples, settings, progress)
     walls = _walls(shell.value, samples, origin, settings)
-    rough = _smooth(shell.value, settings)
-    rest = _drape(shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
-    apart = _untangle(rest.value.mesh, rough.value, settings)
-    found, kept, smoothed = apart.value, rough.value.faces, rough.value.mesh
+    rough = measured("smooth", _smoothed, shell.value, settings)
+    kept, smoothed, ring = rough.value.faces, rough.value.mesh, rough.value.ring
+    rest = measured("fit", _fitted, shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
+    apart = measured(
+        "untangle", untangle, rest.value.mesh, smoothed.vertices, ring, Crossings(settings.run.threads)
+    )  # fmt: skip
+    mesh, taken_back, crossing = apart.value
     cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64))
     trace = None if rest.value.draped is None else rest.value.draped.trace
     surface = Surface(
         points.cloud, cuberille, smoothed.moved(smoothed.vertices + origin),
-        found.mesh.moved(found.mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=rest.value.filled,
-        cavities=int(kept.inward.sum()), crossing=found.crossing,
+        mesh.moved(mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=rest.value.filled,
+        cavities=int(kept.inward.sum()), crossing=crossing,
         encloses_mm3=_hollow(shell.value, settings) if walls.value == 1 else 0.0,
     )  # fmt: skip
-    fitted = fit_found(trace, len(smoothed.vertices), taken_back=found.taken_back, filled=rest.value.filled)
+    fitted = fit_found(trace, len(smoothed.vertices), taken_back=taken_back, filled=rest.value.filled)
     return folded(surface, settled, shell, walls, rough, rest, apart, fitted, place_found(points))
 
 
@@ -177,13 +171,12 @@ def _place(place: Floats) -> str:
     return "(" + ", ".join(f"{c:.6g}" for c in place) + ")"
 
 
-@timed("smooth")
-def _smooth(shell: Shell, settings: Settings) -> Stage[Rough]:
+def _smoothed(shell: Shell, settings: Settings) -> Rough:
     faces = shell.held.faces.only(shell.taken(settings))
     ring = Ring(faces.quads, len(faces.corners), settings.run.threads)
     lattice = shell.lowest + faces.corners * shell.cell
     vertices = ring.smoothed(lattice, settings.cubes.smoothing)
-    return Stage(Rough(faces, lattice, ring, TriMesh(vertices, _halves(faces.quads))))
+    return Rough(faces, lattice, ring, TriMesh(vertices, _halves(faces.quads)))
 
 
 def _halves(quads: NDArray[np.int32]) -> NDArray[np.int64]:
@@ -191,22 +184,15 @@ def _halves(quads: NDArray[np.int32]) -> NDArray[np.int64]:
     return quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int64)
 
 
-@timed("fit")
-def _drape(
+def _fitted(
     shell: Shell, rough: Rough, samples: Samples, settings: Settings, progress: Progress, *, still: bool
-) -> Stage[Rest]:
+) -> Rest:
     """Draw the mesh to the surface under its samples, unless it is to stay as it is."""
     if still:
-        return Stage(Rest(rough.mesh, np.zeros(len(rough.mesh.faces), np.bool_), None))
+        return Rest(rough.mesh, np.zeros(len(rough.mesh.faces), np.bool_), None)
     edge, threads = float(shell.cell.min()), settings.run.threads
     draped = drape(rough.mesh.vertices, rough.ring, samples, edge, settings.fit, threads=threads, progress=progress)
-    return Stage(Rest(TriMesh(draped.vertices, draped.faces), any_of(draped.filled[draped.faces]), draped))
-
-
-@timed("untangle")
-def _untangle(mesh: TriMesh, rough: Rough, settings: Settings) -> Stage[Untangled]:
-    apart, taken_back, crossing = untangle(mesh, rough.mesh.vertices, rough.ring, Crossings(settings.run.threads))
-    return Stage(Untangled(apart, crossing, taken_back))
+    return Rest(TriMesh(draped.vertices, draped.faces), any_of(draped.filled[draped.faces]), draped)
 
 
 WAY = Way(

@@ -17,7 +17,7 @@ from ..dynamics.untangle import untangle
 from ..errors import GeometryError
 from ..measure.intersections import Crossings
 from ..results import LEAST, Surface
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured, timed
 from .sections import FLAT_SHELL, LEAKY_SHELL, fit_found, shell_found, walls_found
 
 if TYPE_CHECKING:
@@ -83,10 +83,10 @@ def surface_on_cubes(
         Where the outside leaks in.
     """
     shell = _close(points.positions, spacing, settings, progress)
-    tracked = _track(shell.value)
+    tracked = measured("cuberille", _track, shell.value)
     walls = _walls(shell.value, points.positions, settings, encloses)
     cubes, cuberille, _ = tracked.value
-    smoothed = _smooth(cuberille, settings)
+    smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.smoothing)
     still = settings.replace(max_steps=0)
     rest = _fit(tracked.value, smoothed.value, points.positions, settings if walls.value == 1 else still, progress)
     told = encloses or shell.value.hollow
@@ -120,9 +120,8 @@ def _cell(spacing: float, settings: Settings) -> Floats:
     return np.broadcast_to(np.array(asked, np.float64) * settings.cubes.cell_factor, 3).copy()
 
 
-@timed("cuberille")
-def _track(shell: Shell) -> Stage[Tracked]:
-    return Stage(shell.held.faces.only(shell.taken).over(shell.grid))
+def _track(shell: Shell) -> Tracked:
+    return shell.held.faces.only(shell.taken).over(shell.grid)
 
 
 def _walls(shell: Shell, positions: Floats, settings: Settings, encloses: float) -> Stage[int]:
@@ -145,10 +144,9 @@ def _walls(shell: Shell, positions: Floats, settings: Settings, encloses: float)
     )
 
 
-@timed("smooth")
-def _smooth(cuberille: QuadMesh, settings: Settings) -> Stage[TriMesh]:
+def _smoothed(cuberille: QuadMesh, passes: int) -> TriMesh:
     rough = cuberille.triangulated()
-    return Stage(rough.moved(low_pass(cuberille.vertices, cuberille.edges, settings.cubes.smoothing)))
+    return rough.moved(low_pass(cuberille.vertices, cuberille.edges, passes))
 
 
 @timed("fit")
