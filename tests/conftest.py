@@ -25,16 +25,21 @@ COMPILED = not config.DISABLE_JIT
 """Whether the kernels run as machine code; where they do not, the tests are smaller."""
 
 
+settings.register_profile(
+    "repeatable", deadline=None, derandomize=True, database=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+)  # fmt: skip
+settings.load_profile("repeatable")
+
+
 def size(compiled: Number, plain: Number) -> Number:
     """Return the first size for compiled kernels, the second for kernels in plain Python."""
     return compiled if COMPILED else plain
 
 
 def law(examples: int) -> settings:
-    """Try a law on a number of examples, the same every time."""
-    few = size(examples, max(examples // 5, 3))
-    slow = [HealthCheck.too_slow, HealthCheck.data_too_large]
-    return settings(max_examples=few, deadline=None, derandomize=True, database=None, suppress_health_check=slow)
+    """Try a law on a number of examples."""
+    return settings(max_examples=size(examples, max(examples // 5, 3)))
 
 
 seeds = st.integers(0, 2**32 - 1)

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from conftest import COMPILED, law, seeds, size
 from tomomesh import reconstruct_points
 from tomomesh.errors import GeometryError
-from tomomesh.kernels.pointcloud.samples import tangents
+from tomomesh.kernels.pointcloud.linear_algebra import tangents
 from tomomesh.kernels.pointcloud.sheet import unfold
 from tomomesh.measure.topology import check_promise
 from tomomesh.model.mesh import TriMesh

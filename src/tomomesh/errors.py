@@ -23,6 +23,15 @@ class TomomeshError(Exception):
         The rule that was broken.
     hint : str, optional
         The flag or action that may help.
+
+    Examples
+    --------
+    >>> from tomomesh import TomomeshError, read_mesh
+    >>> try:
+    ...     read_mesh("nowhere.stl")
+    ... except TomomeshError as error:
+    ...     print(error.exit_code, error)
+    3 the path cannot be read. File: nowhere.stl [no such file or directory].
     """
 
     exit_code = 1

@@ -60,6 +60,15 @@ def read_mesh(path: str | Path) -> TriMesh:
         For broken files, vertices that are not finite, and unknown suffixes.
     EmptyError
         For a file without faces.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tomomesh import TriMesh, read_mesh, write_mesh
+    >>> corner = TriMesh(np.eye(4, 3, -1), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> write_mesh(corner, "corner.off")
+    >>> read_mesh("corner.off").faces.tolist() == corner.faces.tolist()
+    True
     """
     path = existing_file(path)
     read, file = reader_of(path, MESH_READERS), str(path)
@@ -144,6 +153,16 @@ def write_mesh(
         For a suffix that has no writer, and fields of another length or without numbers.
     OutputError
         Where the file cannot be written, the format cannot keep distinct vertices apart, or needs a unit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pathlib import Path
+    >>> from tomomesh import TriMesh, write_mesh
+    >>> corner = TriMesh(np.eye(4, 3, -1), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> write_mesh(corner, "corner.stl")
+    >>> Path("corner.stl").stat().st_size == 84 + 50 * len(corner.faces)
+    True
     """
     check_output(path, MESH_WRITERS)
     at_vertices = flat_columns(vertex_fields or {}, len(mesh.vertices), AXES)
