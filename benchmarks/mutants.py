@@ -1,11 +1,11 @@
 """Change the program in one place at a time, and see whether its tests notice.
 
-    python benchmarks/mutants.py [--area networks ...] [--count 20] [--seed 0] [--patience 10]
+    python benchmarks/mutants.py [--area networks ...] [--count 20] [--seed 0] [--folder DIR]
 
 A mutant is a copy of the program with one small fault: a comparison turned, a sign, a constant half as large again, a
 `not` dropped, an `and` for an `or`, a statement left out. Those of a seed are drawn evenly from an area's modules, and
 each is shown to the tests that are there for the area, the quick ones first. A test that fails, or that takes
-`--patience` times as long as without a fault, has killed it. All that lies in an error's message, a type or a docstring
+ten times as long as without a fault, has killed it. All that lies in an error's message, a type or a docstring
 stays as it is. Kernels are compiled once, in a cache of the copy's own; a mutant of a kernel runs in plain Python.
 """
 
@@ -26,7 +26,7 @@ from importlib import import_module
 from itertools import count
 from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -52,20 +52,21 @@ AREAS: dict[str, tuple[list[str], str]] = {
         "laws_attributes convergence laws_lines laws_surface open sheet clouds forecast end_to_end",
     ),
     "frames": (
-        ["io/**/frames.py", "io/**/affine.py", "model/volume.py"],
-        "volume io_nifti_pairs frames io_nifti io_nrrd io_metaimage io_outputs io_agreement places",
+        ["io/**/frames.py", "io/**/affine.py"],
+        "frames io_nifti_pairs places io_nifti io_nrrd io_metaimage io_outputs io_agreement",
     ),
 }  # fmt: skip
-TURNED = {
+TURNED: dict[type[ast.AST], Any] = {
     ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult, ast.Mod: ast.Mult,
     ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd, ast.LShift: ast.RShift, ast.RShift: ast.LShift,
     ast.And: ast.Or, ast.Or: ast.And, ast.Is: ast.IsNot, ast.IsNot: ast.Is,
 }  # fmt: skip
-OPPOSITE = {ast.Lt: ast.Gt, ast.Gt: ast.Lt, ast.LtE: ast.GtE, ast.GtE: ast.LtE}
+OPPOSITE: dict[type[ast.AST], Any] = {ast.Lt: ast.Gt, ast.Gt: ast.Lt, ast.LtE: ast.GtE, ast.GtE: ast.LtE}
 SILENT = (ast.Raise, ast.JoinedStr, ast.Import, ast.ImportFrom)
 BEFORE = ("numba", "scipy.spatial", "scipy.stats", "trimesh", "nibabel", "pydicom", "skimage.measure", "matplotlib")
 """Libraries that are imported once, for all mutants."""
+PATIENCE = 10
 ALWAYS = ("-x", "-q", "-p", "no:cacheprovider", "-n0", "--no-header")
 
 
@@ -77,25 +78,17 @@ class Mutant:
     node: ast.expr | ast.stmt
     after: str
 
-    @property
-    def before(self) -> str:
-        return ast.unparse(self.node)
-
     def source(self) -> str:
         """Return the whole module with its fault."""
         lines = (ROOT / self.path).read_bytes().splitlines(keepends=True)
         first, last = self.node.lineno - 1, (self.node.end_lineno or 0) - 1
         head, tail = lines[first][: self.node.col_offset], lines[last][self.node.end_col_offset :]
-        return b"".join([*lines[:first], head, f"({self.after})".encode() if self.is_expression else
-                         self.after.encode(), tail, *lines[last + 1 :]]).decode()  # fmt: skip
-
-    @property
-    def is_expression(self) -> bool:
-        return isinstance(self.node, ast.expr)
+        after = f"({self.after})" if isinstance(self.node, ast.expr) else self.after
+        return b"".join([*lines[:first], head, after.encode(), tail, *lines[last + 1 :]]).decode()
 
     def __str__(self) -> str:
-        where = self.path.relative_to("src/tomomesh")
-        return f"{where}:{self.node.lineno}: {self.before[:70]} -> {self.after[:70]}"
+        where = f"{self.path.relative_to('src/tomomesh')}:{self.node.lineno}"
+        return f"{where}: {ast.unparse(self.node)[:70]} -> {self.after[:70]}"
 
 
 def faults(node: ast.AST) -> Iterator[ast.AST]:
@@ -157,16 +150,14 @@ def passes(copy: Path, area: str, *, plain: bool, most_s: float | None = None) -
     """Tell whether all tests of an area pass in time; those of kernels in plain Python are laws and twins."""
     tests = [f"tests/test_{name}.py" for name in AREAS[area][1].split()]
     quick = [test for test in tests if "_laws_" in test or "_twins_" in test]
-    child = get_context("fork").Process(target=run, args=(copy, quick if plain else tests, plain))
+    child = get_context("fork").Process(target=run, args=(copy, quick if plain else tests, plain), daemon=True)
     child.start()
     child.join(most_s)
-    if child.exitcode is None:
-        child.kill()
-        child.join()
+    child.kill()
     return child.exitcode == 0
 
 
-def judged(copy: Path, area: str, chosen: list[Mutant], patience: float) -> Iterator[tuple[Mutant, bool]]:
+def judged(copy: Path, area: str, chosen: list[Mutant]) -> Iterator[tuple[Mutant, bool]]:
     """Yield each mutant, and whether it survives."""
     usual: dict[bool, float] = {}
     for mutant, stamp in zip(chosen, count(int(time.time()))):
@@ -178,7 +169,7 @@ def judged(copy: Path, area: str, chosen: list[Mutant], patience: float) -> Iter
             usual[plain] = time.perf_counter() - began
         path.write_text(mutant.source(), encoding="utf-8")
         os.utime(path, (stamp, stamp))  # Python tells an old module from a new one by seconds
-        yield mutant, passes(copy, area, plain=plain, most_s=patience * usual[plain])
+        yield mutant, passes(copy, area, plain=plain, most_s=PATIENCE * usual[plain])
         shutil.copy2(ROOT / mutant.path, path)
 
 
@@ -187,19 +178,19 @@ def main() -> None:
     parser.add_argument("--area", nargs="*", choices=AREAS, default=list(AREAS))
     parser.add_argument("--count", type=int, default=20, help="mutants an area")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--patience", type=float, default=10.0)
+    parser.add_argument("--folder", type=Path, help="where the copy stays, so that its kernels need no compiling again")
     chosen = parser.parse_args()
     for name in BEFORE:
         import_module(name)
-    with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / ROOT.name
-        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".*", "__pycache__"))
-        if (shared := ROOT.parent / "shared").is_dir():
+    with tempfile.TemporaryDirectory() as temporary:
+        copy = (chosen.folder or Path(temporary)) / ROOT.name
+        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".*", "__pycache__"), dirs_exist_ok=True)
+        if (shared := ROOT.parent / "shared").is_dir() and not (copy.parent / "shared").exists():
             (copy.parent / "shared").symlink_to(shared)
         for area in chosen.area:
             found, told = mutants(area), Counter[bool]()
             some = random.Random(chosen.seed).sample(found, min(chosen.count, len(found)))
-            for mutant, lives in judged(copy, area, some, chosen.patience):
+            for mutant, lives in judged(copy, area, some):
                 told[lives] += 1
                 print("SURVIVED" if lives else "killed  ", mutant, flush=True)
             print(f"{area}: {told[False]} of {told.total()} killed, of {len(found)} that there are\n", flush=True)
