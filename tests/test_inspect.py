@@ -66,14 +66,14 @@ class TestTable:
         assert {one.size for one in listing.series} == {(7, 9)}
         assert [one.pixel_mm for one in listing.series] == [pytest.approx((0.5, 0.7))] * 3
         assert sound.refused is None
-        assert sound.course.distances_mm == pytest.approx((2, 2))
-        assert sound.course.tilt_deg == pytest.approx(0, abs=1e-4)
-        assert gapped.course.distances_mm == pytest.approx((2, 4))
-        assert gapped.course.tilt_deg == pytest.approx(np.degrees(np.arctan2(0.5, 2)))
-        assert np.allclose(gapped.course.gaps_mm, [(44, 48)])
-        assert gapped.course.missing == 1
+        assert sound.slice_spacing.distances_mm == pytest.approx((2, 2))
+        assert sound.slice_spacing.tilt_deg == pytest.approx(0, abs=1e-4)
+        assert gapped.slice_spacing.distances_mm == pytest.approx((2, 4))
+        assert gapped.slice_spacing.tilt_deg == pytest.approx(np.degrees(np.arctan2(0.5, 2)))
+        assert np.allclose(gapped.slice_spacing.gaps_mm, [(44, 48)])
+        assert gapped.slice_spacing.missing == 1
         assert "--fill-gaps" in str(gapped.refused)
-        assert single.course.distances_mm is None
+        assert single.slice_spacing.distances_mm is None
         assert "--spacing-z" in str(single.refused)
         assert dict(listing.left_out) == {"localizers": 5, "not DICOM": 1, "unreadable": 1}
 
@@ -103,12 +103,12 @@ class TestTable:
     def test_slices_at_one_place_are_counted(self, tmp_path: Path) -> None:
         save(slice_dataset(STORED[1], AXIAL, 1), write_series(tmp_path, STORED, AXIAL) / "again.dcm")
         [series] = list_series(tmp_path).series
-        assert (series.course.repeats, series.slices) == (1, 6)
+        assert (series.slice_spacing.repeats, series.slices) == (1, 6)
 
     @pytest.mark.parametrize("fields", [{"PixelSpacing": [0, 0]}, {"ImageOrientationPatient": [0.0] * 6}])
     def test_a_geometry_of_no_sense_is_no_distance(self, tmp_path: Path, fields: dict[str, Any]) -> None:
         [series] = list_series(write_series(tmp_path, STORED, AXIAL, setting(**fields))).series
-        assert series.course.distances_mm is None
+        assert series.slice_spacing.distances_mm is None
         assert series.refused is not None
 
     def test_what_is_no_dicom_has_no_series(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:

@@ -61,10 +61,8 @@ class TestOrder:
 
     @pytest.mark.parametrize("attraction", ATTRACTIONS)
     def test_nor_do_threads(self, attraction: str, monkeypatch: pytest.MonkeyPatch) -> None:
-        for block, size_of_it in (
-            ("dynamics.mass_spring.BLOCK", 101), ("dynamics.moving_least_squares.BLOCK", 97),
-            ("cuberille.bitmasks.SHARE", 3),
-        ):  # fmt: skip
+        blocks = ("dynamics.mass_spring.BLOCK", "dynamics.moving_least_squares.BLOCK", "cuberille.bitmasks.SHARE")
+        for block, size_of_it in zip(blocks, (101, 97, 3), strict=True):
             monkeypatch.setattr(f"tomomesh.{block}", size_of_it)
         one, two = (reconstruct_points(sphere(COUNT), threads=n, attraction=attraction) for n in (1, 2))
         assert bytes_of(one) == bytes_of(two)
@@ -92,7 +90,7 @@ class TestPlace:
         points = dyadic(torus(COUNT))
         here, there = (reconstruct_points(points + place, attraction=attraction) for place in (0.0, far))
         assert here.mesh.faces.tobytes() == there.mesh.faces.tobytes()
-        assert here.cubes.keys.tobytes() == there.cubes.keys.tobytes()
+        assert here.cuberille.cubes.tobytes() == there.cuberille.cubes.tobytes()
         off = there.mesh.vertices - far - here.mesh.vertices
         assert np.abs(off).max() <= 4 * np.spacing(abs(far))
 

@@ -84,11 +84,11 @@ def _series(series: Series, *, alone: bool) -> dict[str, Any]:
         "rows": rows,
         "columns": columns,
         "pixel_mm": series.pixel_mm,
-        "distances_mm": series.course.distances_mm,
-        "tilt_deg": series.course.tilt_deg,
-        "missing": series.course.missing,
-        "gaps_mm": series.course.gaps_mm,
-        "repeats": series.course.repeats,
+        "distances_mm": series.slice_spacing.distances_mm,
+        "tilt_deg": series.slice_spacing.tilt_deg,
+        "missing": series.slice_spacing.missing,
+        "gaps_mm": series.slice_spacing.gaps_mm,
+        "repeats": series.slice_spacing.repeats,
         "refused": _refusal(series.refused),
     }
 

@@ -1,4 +1,7 @@
-"""Cubes, the shell of them, and what is taken of it."""
+"""Cubes, the shell of them, and what is taken of it.
+
+The greatest values, 64 cubes and 1,000 passes, are far beyond use and keep a slip of the keyboard from taking hours.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,9 @@ class CubeSettings(Group):
         choices=("auto", "none"),
     )
     largest: bool = param(False, "keep the largest surface alone, where cubes make it; elsewhere --keep largest does")
-    allow_leaks: bool = param(False, "write the surface even where the outside leaks into the shell")
+    allow_leaks: bool = param(
+        False, "write the surface even where the outside leaks in, or where it encloses less than half of its window"
+    )
     open: bool = param(False, "write an open surface as a one-sided sheet with its borders")
     surface: str = param(
         "auto",

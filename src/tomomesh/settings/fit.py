@@ -1,4 +1,10 @@
-"""The dynamic mesh."""
+"""The dynamic mesh.
+
+Where the numbers come from: with normalized masses the damping 1 is critical, and a time step up to 1 is stable on
+every mesh (docs, theory). Of a sum of stiffness of .25, .5, 1 and 3 k_d, .25 draws a ring of 58 neurons least off its
+points, by .34 mm against .46 to 1.77, and rests soonest, after 11 steps against 15 to 93 (measured); 200 are room for
+worse.
+"""
 
 from __future__ import annotations
 

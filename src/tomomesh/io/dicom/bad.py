@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ...errors import TomomeshError
 
 SHOWN = 8
-"""Names in one line."""
+"""Names in one line of an error, so that it stays one that is read."""
 
 
 def leave_out(bad: Mapping[Path, TomomeshError], good: int, *, skip: bool, study: str) -> tuple[str, ...]:

@@ -7,9 +7,9 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from ...errors import FormatError
-from ..source import leaves_folder, regular_files, third_party
+from ..files.source import leaves_folder, regular_files, third_party
 from .bad import listed
-from .dataset import read_dataset
+from .headers.dataset import read_dataset
 from .read import read_dicom
 
 if TYPE_CHECKING:
