@@ -23,7 +23,6 @@ from collections import Counter
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from importlib import import_module
-from itertools import count
 from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,26 +34,16 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[1]
 AREAS: dict[str, tuple[list[str], str]] = {
-    "networks": (
-        ["som/*.py", "kernels/som/*.py"],
-        "twins_som laws_networks som_measures som_training som_topologies som_estimator laws_lines several_contours",
-    ),
-    "cuberille": (
-        ["cuberille/*.py", "kernels/cuberille/*.py"],
-        "laws_cubes twins_geometry laws_walls laws_boards laws_shell laws_surface laws_fit forecast",
-    ),
-    "dynamics": (
-        ["dynamics/*.py", "kernels/dynamics/*.py"],
-        "collapse laws_fit convergence laws_surface space voxels laws_attributes sheet clouds",
-    ),
-    "points": (
-        ["segmentation/sample.py", "pointcloud/*.py", "kernels/pointcloud/*.py"],
-        "laws_attributes convergence laws_lines laws_surface open sheet clouds forecast end_to_end",
-    ),
-    "frames": (
-        ["io/**/frames.py", "io/**/affine.py"],
-        "frames io_nifti_pairs places io_nifti io_nrrd io_metaimage io_outputs io_agreement",
-    ),
+    "networks": (["som/*.py", "kernels/som/*.py"],
+        "twins_som laws_networks som_measures som_training som_topologies som_estimator laws_lines several_contours"),
+    "cuberille": (["cuberille/*.py", "kernels/cuberille/*.py"],
+        "laws_cubes twins_geometry laws_walls laws_boards laws_shell laws_surface laws_fit forecast"),
+    "dynamics": (["dynamics/*.py", "kernels/dynamics/*.py"],
+        "collapse laws_fit convergence laws_surface space voxels laws_attributes sheet clouds"),
+    "points": (["segmentation/sample.py", "pointcloud/*.py", "kernels/pointcloud/*.py"],
+        "laws_attributes convergence laws_lines laws_surface open sheet clouds forecast end_to_end"),
+    "frames": (["io/**/frames.py", "io/**/affine.py"],
+        "frames io_nifti_pairs places io_nifti io_nrrd io_metaimage io_outputs io_agreement"),
 }  # fmt: skip
 TURNED: dict[type[ast.AST], Any] = {
     ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
@@ -126,7 +115,8 @@ def read(node: ast.AST) -> Iterator[ast.AST]:
 
 def mutants(area: str) -> list[Mutant]:
     """Return all mutants of an area's modules, in order."""
-    paths = sorted({path for pattern in AREAS[area][0] for path in (ROOT / "src" / "tomomesh").glob(pattern)})
+    home = ROOT / "src" / "tomomesh"
+    paths = sorted({path for pattern in AREAS[area][0] for path in home.glob(pattern)})
     return [
         Mutant(path.relative_to(ROOT), node, ast.unparse(other))
         for path in paths
@@ -136,21 +126,25 @@ def mutants(area: str) -> list[Mutant]:
     ]
 
 
-def run(copy: Path, tests: list[str], plain: bool) -> None:
-    """Run tests in this process, a fork that knows nothing of the program yet, and end it."""
+def run(copy: Path, test: str, plain: bool) -> None:
+    """Run a file of tests in this process, a fork that knows nothing of the program yet, and end it."""
     os.environ |= {"XDG_CACHE_HOME": str(copy / "cache"), "NUMBA_DISABLE_JIT": str(int(plain))}
     import_module("numba.core.config").reload_config()
     os.chdir(copy)
     sys.path.insert(0, str(copy / "src"))
     with Path(os.devnull).open("w") as nothing, redirect_stdout(nothing), redirect_stderr(nothing):
-        os._exit(pytest.main([*ALWAYS, *tests]))
+        os._exit(pytest.main([*ALWAYS, test]))
 
 
 def passes(copy: Path, area: str, *, plain: bool, most_s: float | None = None) -> bool:
     """Tell whether all tests of an area pass in time; those of kernels in plain Python are laws and twins."""
-    tests = [f"tests/test_{name}.py" for name in AREAS[area][1].split()]
-    quick = [test for test in tests if "_laws_" in test or "_twins_" in test]
-    child = get_context("fork").Process(target=run, args=(copy, quick if plain else tests, plain), daemon=True)
+    names = [name for name in AREAS[area][1].split() if name.startswith(("laws", "twins")) or not plain]
+    return all(ends_well((copy, f"tests/test_{name}.py", plain), most_s) for name in names)
+
+
+def ends_well(what: tuple[Path, str, bool], most_s: float | None) -> bool:
+    """Tell whether a fork that runs a file of tests ends in time, and without a fault."""
+    child = get_context("fork").Process(target=run, args=what, daemon=True)
     child.start()
     child.join(most_s)
     child.kill()
@@ -160,7 +154,7 @@ def passes(copy: Path, area: str, *, plain: bool, most_s: float | None = None) -
 def judged(copy: Path, area: str, chosen: list[Mutant]) -> Iterator[tuple[Mutant, bool]]:
     """Yield each mutant, and whether it survives."""
     usual: dict[bool, float] = {}
-    for mutant, stamp in zip(chosen, count(int(time.time()))):
+    for stamp, mutant in enumerate(chosen, int(time.time())):
         plain, path = "kernels" in mutant.path.parts, copy / mutant.path
         if plain not in usual:
             began = time.perf_counter()
@@ -185,8 +179,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         copy = (chosen.folder or Path(temporary)) / ROOT.name
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".*", "__pycache__"), dirs_exist_ok=True)
-        if (shared := ROOT.parent / "shared").is_dir() and not (copy.parent / "shared").exists():
-            (copy.parent / "shared").symlink_to(shared)
+        if not (shared := copy.parent / "shared").is_symlink():
+            shared.symlink_to(ROOT.parent / shared.name)
         for area in chosen.area:
             found, told = mutants(area), Counter[bool]()
             some = random.Random(chosen.seed).sample(found, min(chosen.count, len(found)))
