@@ -59,6 +59,16 @@ def write_mesh(
         For a suffix that has no writer, and fields of another length or without numbers.
     OutputError
         Where the file cannot be written, the format cannot keep distinct vertices apart, or needs a unit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pathlib import Path
+    >>> from tomomesh import TriMesh, write_mesh
+    >>> corner = TriMesh(np.eye(4, 3, -1), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> write_mesh(corner, "corner.stl")
+    >>> Path("corner.stl").stat().st_size == 84 + 50 * len(corner.faces)
+    True
     """
     check_output(path, MESH_WRITERS)
     at_vertices = flat_columns(vertex_fields or {}, len(mesh.vertices), AXES)
