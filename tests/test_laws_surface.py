@@ -61,8 +61,13 @@ class TestOrder:
 
     @pytest.mark.parametrize("attraction", ATTRACTIONS)
     def test_nor_do_threads(self, attraction: str, monkeypatch: pytest.MonkeyPatch) -> None:
-        for block, size_of_it in (("dynamics.BLOCK", 101), ("drape.BLOCK", 97), ("blocks.SHARE", 3)):
-            monkeypatch.setattr(f"tomomesh.cuberille.{block}", size_of_it)
+        for block, size_of_it in (
+            ("dynamics.mass_spring.BLOCK", 101),
+            ("dynamics.moving_least_squares.BLOCK", 97),
+            ("dynamics.low_pass.BLOCK", 89),
+            ("cuberille.bitmasks.SHARE", 3),
+        ):
+            monkeypatch.setattr(f"tomomesh.{block}", size_of_it)
         one, two = (reconstruct_points(sphere(COUNT), threads=n, attraction=attraction) for n in (1, 2))
         assert bytes_of(one) == bytes_of(two)
 

@@ -1,4 +1,4 @@
-"""The way from any cloud, one arrow a line: points -> samples -> bridged cubes -> walls -> draped mesh."""
+"""The way from any cloud, one arrow a line: points -> samples -> bridged cubes -> walls -> fitted mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import numpy as np
 from .cuberille.leak_test import SURE, hold
 from .cuberille.neighbors import once_each
 from .cuberille.partition import cubes_over, is_flat
-from .dynamics.moving_least_squares import Draped, Ring, drape
+from .dynamics.low_pass import OneRing
+from .dynamics.moving_least_squares import SurfaceFit, fit_to_surface
 from .dynamics.untangle import untangle
 from .errors import EmptyError, GeometryError
 from .measure.intersections import Crossings
@@ -69,7 +70,7 @@ class CloudSurface:
         Faces that lie where there are no samples.
     crossing : (m,) bool array
         Faces that pass through others.
-    draped : Draped or None
+    fitted : SurfaceFit or None
         The fit; None where the shell was only smoothed.
     """
 
@@ -81,7 +82,7 @@ class CloudSurface:
     mesh: TriMesh
     filled: NDArray[np.bool_]
     crossing: NDArray[np.bool_]
-    draped: Draped | None
+    fitted: SurfaceFit | None
 
 
 def surface_of_cloud(positions: Floats, settings: Settings, account: Account, progress: Progress) -> CloudSurface:
@@ -100,26 +101,27 @@ def surface_of_cloud(positions: Floats, settings: Settings, account: Account, pr
     held, cell = shell.held, shell.cell
     taken = held.walls.worth_keeping(largest=settings.cubes.largest)
     account.held(held, taken, cell, shell.cubes, len(shell.spanned.places))
-    fitted = held.holds or not _refused(samples, origin, settings, account)
+    fits = held.holds or not _refused(samples, origin, settings, account)
     walls = held.walls.only(taken)
     with account.timed("smooth"):
-        ring = Ring(walls.quads, len(walls.corners), threads)
+        ring = OneRing.of_quads(walls.quads, len(walls.corners), threads)
         lattice = shell.lowest + walls.corners * cell
         vertices = ring.smoothed(lattice, settings.cubes.smoothing)
     with account.timed("fit"):
         smoothed = TriMesh(vertices, _halves(walls.quads))
-        mesh, draped = smoothed, None
+        mesh, fitted = smoothed, None
         filled: NDArray[np.bool_] = np.zeros(len(smoothed.faces), np.bool_)
-        if fitted:
-            draped = drape(vertices, ring, samples, float(cell.min()), settings.fit, threads=threads, progress=progress)
-            mesh = TriMesh(draped.vertices, draped.faces)
-            filled = any_of(draped.filled[draped.faces])
+        if fits:
+            edge = float(cell.min())
+            fitted = fit_to_surface(vertices, ring, samples, edge, settings.fit, threads=threads, progress=progress)
+            mesh = TriMesh(fitted.vertices, fitted.faces)
+            filled = any_of(fitted.filled[fitted.faces])
     with account.timed("untangle"):
         mesh, taken_back, crossing = untangle(mesh, vertices, ring, Crossings(threads))
-    account.draped(draped, taken_back, filled)
+    account.fitted(fitted, taken_back, filled)
     return CloudSurface(
         samples, held, origin, QuadMesh(lattice + origin, walls.quads.astype(np.int64), keys_of(walls.cells)),
-        smoothed.moved(vertices + origin), mesh.moved(mesh.vertices + origin), filled, crossing, draped,
+        smoothed.moved(vertices + origin), mesh.moved(mesh.vertices + origin), filled, crossing, fitted,
     )  # fmt: skip
 
 
@@ -132,11 +134,11 @@ def _open_surface(
         spanned = bridges(samples, float(cell.min()), threads=threads, progress=progress)
         made = open_sheet(samples, spanned, cell, settings, Crossings(threads), progress)
     account.held(made.held, np.ones(made.held.walls.count, bool), cell, made.cubes, len(spanned.places))
-    account.draped(made.draped, made.taken_back, made.filled)
+    account.fitted(made.fitted, made.taken_back, made.filled)
     return CloudSurface(
         samples, made.held, origin, QuadMesh(made.lattice + origin, made.quads, keys_of(made.cells)),
         made.smoothed.moved(made.smoothed.vertices + origin), made.mesh.moved(made.mesh.vertices + origin),
-        made.filled, made.crossing, made.draped,
+        made.filled, made.crossing, made.fitted,
     )  # fmt: skip
 
 

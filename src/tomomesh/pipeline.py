@@ -185,7 +185,7 @@ def _surface_of_cloud(cloud: PointSet, settings: Settings, account: Account, pro
     with account.timed("quality"):
         check_promise(found.mesh, cavities=account.cavities, open_=settings.cubes.open)
         account.quality(found.mesh, cloud, account.cavities, progress, found.crossing)
-    trace = NO_TRACE if found.draped is None else found.draped.trace
+    trace = NO_TRACE if found.fitted is None else found.fitted.trace
     return Surface(
         cloud, NO_CUBES, found.cuberille, found.smoothed, found.mesh, np.empty(0, np.int32), trace, account.report,
         filled=found.filled,

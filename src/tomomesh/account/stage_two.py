@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..contours.slices import Slices
     from ..contours.stack import ContourSurface
     from ..cuberille.leak_test import Held
-    from ..dynamics.moving_least_squares import Draped
+    from ..dynamics.moving_least_squares import SurfaceFit
     from ..isosurface.voxels import Boundary, VoxelSurface
     from ..model.mesh import TriMesh
     from ..model.points import PointSet
@@ -114,12 +114,12 @@ class StageTwo(Ledger):
             else "the outside leaks into the shell: its surface has two walls, and is smoothed, but not fitted"
         )
 
-    def draped(self, draped: Draped | None, taken_back: int, filled: NDArray[np.bool_]) -> None:
+    def fitted(self, fitted: SurfaceFit | None, taken_back: int, filled: NDArray[np.bool_]) -> None:
         """Note how the mesh of a cloud came to rest, and what of it was filled rather than measured."""
-        if draped is None:
+        if fitted is None:
             self._sections["fit"] = {"iterations": 0, "converged": True, "collapsed": 0}
         else:
-            self.fit(draped.trace, len(draped.vertices), 0)
+            self.fit(fitted.trace, len(fitted.vertices), 0)
         self._sections["fit"] |= {"taken_back": taken_back, "filled_faces": int(filled.sum())}
         if filled.mean() > FILLED:
             self.warn(f"{filled.mean():.0%} of the faces lie where there are no points: they were filled")
@@ -166,7 +166,7 @@ class StageTwo(Ledger):
 
     def boundary(self, found: Boundary, surface: VoxelSurface) -> None:
         """Note the boundary of the voxels, and how its net came to rest."""
-        rest = surface.rest
+        trace, steps = surface.net_fit.trace, len(surface.net_fit.trace.speed)
         self._sections["voxels"] = {
             "added_for_composition": found.added,
             "interpolated": not found.crossings.stepped,
@@ -180,11 +180,13 @@ class StageTwo(Ledger):
             "square_faces": len(found.net.quads),
             "enclosed_cubes": int(found.volumes.sum()),
         }
-        self._sections["fit"] = {"iterations": rest.steps, "converged": rest.converged, "collapsed": 0}
+        self._sections["fit"] = {"iterations": steps, "converged": trace.converged, "collapsed": 0}
+        if steps:
+            self._sections["fit"] |= {"speed": float(trace.speed[-1]), "acceleration": float(trace.acceleration[-1])}
         if found.crossings.stepped:
             self.warn("the gray levels are those of a mask: the surface is evened out between the voxels")
-        elif rest.steps and not rest.converged:
-            self.warn(f"the mesh had not come to rest after {rest.steps} steps")
+        elif steps and not trace.converged:
+            self.warn(f"the mesh had not come to rest after {steps} steps")
 
     def stack(self, made: ContourSurface, slices: Slices) -> None:
         """Note the slices of a stack of contours, and the voxels between them."""

@@ -58,6 +58,7 @@ MATTERS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "step": {"way": (*SPRINGS, "cloud", "space")},
     "springs": {"way": SPRINGS},
     "limit": {"way": SPRINGS},
+    "allow_returns": {"way": SPRINGS},
     "units": {"input": CLOUDS},
     "local_origin": {"input": CLOUDS},
     "seed": {"way": TRAINED},
