@@ -60,14 +60,18 @@ def digest(*parts: Any) -> str:
     """Hash arrays and documents."""
     found = hashlib.sha256()
     for part in parts:
-        data = np.ascontiguousarray(part).tobytes() if isinstance(part, np.ndarray) else json.dumps(part).encode()
+        data = (
+            np.ascontiguousarray(part).tobytes()
+            if isinstance(part, np.ndarray)
+            else json.dumps(part, sort_keys=True).encode()
+        )
         found.update(data)
     return found.hexdigest()[:12]
 
 
 def told(report: dict[str, Any]) -> dict[str, Any]:
     """Leave out of a report what does not repeat."""
-    return {name: part for name, part in report.items() if name not in {"timings", "versions", "settings"}}
+    return {name: part for name, part in report.items() if name not in {"timings", "versions", "settings", "way"}}
 
 
 def show(name: str, make: Any) -> None:

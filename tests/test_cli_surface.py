@@ -345,7 +345,7 @@ class TestOutputs:
         (folder / "m.ply").write_text("old")
         ready = folder.parent / "ready"
         program = (
-            "import sys, pathlib, signal, time, tomomesh.pipeline as p, tomomesh.cli as c\n"
+            "import sys, pathlib, signal, time, tomomesh.finish as p, tomomesh.cli as c\n"
             "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background jobs ignore it
             f"def wait(*a, **k):\n    pathlib.Path({str(ready)!r}).touch()\n    while True: time.sleep(0.01)\n"
             "p.check_promise = wait\n"

@@ -16,7 +16,7 @@ from studies import AFFINES, save, slice_dataset
 from tomomesh.cli import main
 from tomomesh.errors import FormatError, ResourceError, TomomeshError
 from tomomesh.io import read_volume
-from tomomesh.io.dicom import child, decoding
+from tomomesh.io.dicom.pixels import child, decoding
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:

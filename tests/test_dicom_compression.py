@@ -25,7 +25,7 @@ from studies import AFFINES, save, shared, slice_dataset, write_series
 from tomomesh.cli import main
 from tomomesh.errors import FormatError
 from tomomesh.io import read_volume
-from tomomesh.io.dicom import decoding
+from tomomesh.io.dicom.pixels import decoding
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ class TestWithoutLoss:
         np.testing.assert_array_equal(read_volume(path, settings=ONE).voxels, frames)
 
     def test_a_series_is_read_by_one_child(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        from tomomesh.io.dicom import child
+        from tomomesh.io.dicom.pixels import child
 
         started: list[int] = []
         start = child._started
@@ -178,7 +178,7 @@ class TestWhatIsMissing:
             "sys.modules.update(dict.fromkeys(['gdcm', 'pylibjpeg', 'openjpeg', 'jpeg_ls']))\n"
             f"runpy.run_path({decoding.__file__!r}, run_name='__main__')\n"
         )
-        monkeypatch.setattr("tomomesh.io.dicom.child.PROGRAM", str(lone))
+        monkeypatch.setattr("tomomesh.io.dicom.pixels.child.PROGRAM", str(lone))
         pixels = pattern("u2", 16)
         path = save(compressed(pixels, JPEGLSLossless, [encoded("JPEG-LS", pixels)], 16), tmp_path / "p" / "a.dcm")
         with pytest.raises(FormatError, match=r'JPEG-LS Lossless.*pip install "tomomesh\[dicom\]"'):

@@ -169,5 +169,5 @@ class TestDeflatedFiles:
         raw = path.read_bytes()
         start = raw.index(b"1.2.840.10008.1.2.1.99") + 22
         path.write_bytes(raw[:start] + packer.compress(bytes(2**27)) + packer.flush())
-        monkeypatch.setattr("tomomesh.io.dicom.deflated.LARGEST_BYTES", 2**26)
+        monkeypatch.setattr("tomomesh.io.dicom.headers.deflated.LARGEST_UNPACKED", 2**26)
         assert isinstance(refusal(path), ResourceError)

@@ -12,8 +12,10 @@ from conftest import COMPILED
 from studies import write_nifti
 from tomomesh import PointSet, Settings, Volume, reconstruct, reconstruct_points
 from tomomesh.cli import main
-from tomomesh.settings import parameters, without_effect
-from tomomesh.settings.effect import MATTERS
+from tomomesh.settings import MATTERS, parameters
+from tomomesh.ways import WAYS as TABLE
+from tomomesh.ways import way_of
+from tomomesh.ways.effect import without_effect
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,9 +31,11 @@ OTHER: dict[str, Any] = {
     "bridge": 1.1, "even": False, "trim": 1.5, "cell_mm": (1.5,), "cell_factor": 1.7, "caps": False, "closing": 3,
     "stacks": "none", "allow_leaks": True, "open": True, "smoothing": 0, "attraction": "surface", "stiffness": 0.9,
     "damping": 0.9, "step": 0.5, "springs": "triangles", "limit": "shorten", "units": "cm", "local_origin": True,
-    "largest": True, "surface": "outer", "seed": 99,
+    "largest": True, "surface": "outer", "seed": 99, "cell_from": "nearest", "tracking": "faces",
 }  # fmt: skip
 """Another value of each parameter that may be without effect."""
+SOMETIMES = {*MATTERS, *(name for way in TABLE for name in way_of(way).reads)}
+"""Parameters that are read on some ways alone, or beside some values of others alone."""
 ALWAYS = {
     "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "level", "fill_chunks", "structure",
     "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "keep", "slices", "network", "space",
@@ -49,7 +53,7 @@ STUDY: dict[str, dict[str, Any]] = {
     "space": {"network": "sphere", "neurons": 42},
     "nearest in space": {"network": "sphere", "neurons": 42, "attraction": "nearest"},
 }
-CLOUD: dict[str, dict[str, Any]] = {"cloud": {}, "nearest": {"attraction": "nearest"}}
+CLOUD: dict[str, dict[str, Any]] = {"cloud": {}, "nearest": {"attraction": "nearest"}, "sheet": {"open": True}}
 POWERS = {"training": "online", "alpha_fall": "power", "radius_fall": "power"}
 WAYS = [*(("gray", asked) for asked in STUDY.values()), *(("cloud", asked) for asked in CLOUD.values()), ("stack", {})]
 """What is read, and what is asked for, on each way to a mesh."""
@@ -102,17 +106,17 @@ def vertices(settings: dict[str, Any], kind: str) -> NDArray[np.float64]:
 class TestTable:
     def test_names_parameters_and_their_values_alone(self) -> None:
         choices = {entry.name: entry.metadata["choices"] for _, entry in parameters()}
-        assert set(MATTERS) <= set(NAMES)
-        for conditions in MATTERS.values():
+        assert set(NAMES) >= SOMETIMES
+        for conditions in (*MATTERS.values(), *(found for name in TABLE for found in way_of(name).reads.values())):
             for key, values in conditions.items():
-                assert key in ("way", "input") or set(values) < set(choices[key])
+                assert key == "input" or set(values) < set(choices[key])
 
     def test_every_parameter_is_in_it_or_always_matters(self) -> None:
-        assert set(MATTERS) | ALWAYS == set(NAMES)
-        assert not set(MATTERS) & ALWAYS
-        assert set(OTHER) == set(MATTERS)
+        assert set(NAMES) == SOMETIMES | ALWAYS
+        assert not SOMETIMES & ALWAYS
+        assert set(OTHER) == SOMETIMES
 
-    @pytest.mark.parametrize("name", sorted(MATTERS))
+    @pytest.mark.parametrize("name", sorted(SOMETIMES))
     def test_what_is_in_it_matters_on_some_ways_and_not_on_others(self, name: str) -> None:
         told = {
             bool(without_effect(Settings().replace(**asked), [name], input=kind))

@@ -192,7 +192,7 @@ class TestBombs:
     def test_what_is_promised_beyond_the_memory(
         self, tmp_path: Path, capsys: CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
     ) -> None:
-        monkeypatch.setattr("tomomesh.io.limits.physical_memory", lambda: 2**30)
+        monkeypatch.setattr("tomomesh.io.files.limits.physical_memory", lambda: 2**30)
         PROMISES[name](tmp_path / name)
         assert "memory" in refused(reconstructing(tmp_path / name, tmp_path, "--spacing-z", "1"), 7, tmp_path, capsys)
 
@@ -200,7 +200,7 @@ class TestBombs:
     def test_what_the_file_cannot_hold(
         self, tmp_path: Path, capsys: CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
     ) -> None:
-        monkeypatch.setattr("tomomesh.io.limits.physical_memory", lambda: 2**50)
+        monkeypatch.setattr("tomomesh.io.files.limits.physical_memory", lambda: 2**50)
         PROMISES[name](tmp_path / name)
         refused(reconstructing(tmp_path / name, tmp_path, "--spacing-z", "1"), 4, tmp_path, capsys)
 

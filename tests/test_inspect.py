@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import json
+import re
 import shlex
 import subprocess
 import sys
 import zipfile
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +18,11 @@ import numpy as np
 import pydicom
 import pytest
 
+import tomomesh
 from studies import AFFINES, affine_of, as_ct, sampled, save, setting, shared, slice_dataset, write_nifti, write_series
 from test_cli_dicom import PRIVATE, private
 from tomomesh.cli import main
+from tomomesh.cli.inspect.inspection import REFUSALS
 from tomomesh.io import list_series
 from tomomesh.settings import ReadSettings
 
@@ -38,6 +44,12 @@ def found(path: Path, capsys: CaptureFixture[str], *flags: str) -> dict[str, Any
 def told(path: Path, capsys: CaptureFixture[str], *flags: str) -> list[str]:
     assert main(["inspect", str(path), *flags]) == 0
     return capsys.readouterr().out.splitlines()
+
+
+def _manual_of(command: str) -> str:
+    with pytest.raises(SystemExit), redirect_stdout(StringIO()) as said:
+        main([command, "--help"])
+    return said.getvalue()
 
 
 def scanner(folder: Path) -> Path:
@@ -66,14 +78,14 @@ class TestTable:
         assert {one.size for one in listing.series} == {(7, 9)}
         assert [one.pixel_mm for one in listing.series] == [pytest.approx((0.5, 0.7))] * 3
         assert sound.refused is None
-        assert sound.course.distances_mm == pytest.approx((2, 2))
-        assert sound.course.tilt_deg == pytest.approx(0, abs=1e-4)
-        assert gapped.course.distances_mm == pytest.approx((2, 4))
-        assert gapped.course.tilt_deg == pytest.approx(np.degrees(np.arctan2(0.5, 2)))
-        assert np.allclose(gapped.course.gaps_mm, [(44, 48)])
-        assert gapped.course.missing == 1
+        assert sound.slice_spacing.distances_mm == pytest.approx((2, 2))
+        assert sound.slice_spacing.tilt_deg == pytest.approx(0, abs=1e-4)
+        assert gapped.slice_spacing.distances_mm == pytest.approx((2, 4))
+        assert gapped.slice_spacing.tilt_deg == pytest.approx(np.degrees(np.arctan2(0.5, 2)))
+        assert np.allclose(gapped.slice_spacing.gaps_mm, [(44, 48)])
+        assert gapped.slice_spacing.missing == 1
         assert "--fill-gaps" in str(gapped.refused)
-        assert single.course.distances_mm is None
+        assert single.slice_spacing.distances_mm is None
         assert "--spacing-z" in str(single.refused)
         assert dict(listing.left_out) == {"localizers": 5, "not DICOM": 1, "unreadable": 1}
 
@@ -103,12 +115,12 @@ class TestTable:
     def test_slices_at_one_place_are_counted(self, tmp_path: Path) -> None:
         save(slice_dataset(STORED[1], AXIAL, 1), write_series(tmp_path, STORED, AXIAL) / "again.dcm")
         [series] = list_series(tmp_path).series
-        assert (series.course.repeats, series.slices) == (1, 6)
+        assert (series.slice_spacing.repeats, series.slices) == (1, 6)
 
     @pytest.mark.parametrize("fields", [{"PixelSpacing": [0, 0]}, {"ImageOrientationPatient": [0.0] * 6}])
     def test_a_geometry_of_no_sense_is_no_distance(self, tmp_path: Path, fields: dict[str, Any]) -> None:
         [series] = list_series(write_series(tmp_path, STORED, AXIAL, setting(**fields))).series
-        assert series.course.distances_mm is None
+        assert series.slice_spacing.distances_mm is None
         assert series.refused is not None
 
     def test_what_is_no_dicom_has_no_series(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
@@ -145,6 +157,30 @@ class TestRefusal:
         assert capsys.readouterr().err.splitlines()[-1] == f"error: {refused['error']}"
         words = " ".join(" ".join(told(folder, capsys)).split())
         assert f"refused exit 5: {refused['error']}" in words
+
+    def test_what_helps_is_known_without_reading_words(self) -> None:
+        """Every refusal of a DICOM study whose hint names an option of reading says so to programs too."""
+        options = {*re.findall(r"--[a-z][a-z-]+", _manual_of("inspect")), "--select"}
+        kinds = {kind.__name__ for kind in REFUSALS}
+        named = 0
+        for path in (Path(tomomesh.__file__).parent / "io/dicom").rglob("*.py"):
+            for call in ast.walk(ast.parse(path.read_text())):
+                if not isinstance(call, ast.Call) or ast.unparse(call.func) not in kinds:
+                    continue
+                given = {word.arg: ast.unparse(word.value) for word in call.keywords}
+                hinted = set(re.findall(r"--[a-z][a-z-]+", given.get("hint", ""))) & options
+                assert set(ast.literal_eval(given.get("flags", "()"))) == hinted, (path.name, given)
+                named += bool(hinted)
+        assert named >= 8
+
+    @pytest.mark.parametrize("name", ["a Try: --fill-gaps", "Try: --series --skip-bad"])
+    def test_a_name_of_a_study_puts_no_words_into_its_mouth(
+        self, name: str, tmp_path: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        axes = ([1, 0, 0, 0, 1, 0],) * 4 + ([0, 1, 0, 0, 0, -1],)
+        said = found(write_series(tmp_path / name, STORED, AXIAL, setting(ImageOrientationPatient=axes)), capsys)
+        assert said["refused"]["exit_code"] == 5
+        assert said["next"] is None
 
     def test_no_flag_no_command(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
         axes = ([1, 0, 0, 0, 1, 0],) * 4 + ([0, 1, 0, 0, 0, -1],)

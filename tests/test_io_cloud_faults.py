@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 PCD = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH {0}\nHEIGHT {1}\nPOINTS {2}\nDATA {3}\n"
+HALF = PCD.replace("SIZE 4", "SIZE 2")
 
 BROKEN = {
     "nan.pcd": (PCD.format(2, 1, 2, "ascii") + "0 0 0\n1 nan 1\n", "row 9 = nan"),
@@ -31,7 +32,9 @@ BROKEN = {
     "lying-binary.pcd": (PCD.format(10**9, 1, 10**9, "binary") + "0" * 12, "12000000000 bytes"),
     "lying-packed.pcd": (PCD.format(10**9, 1, 10**9, "binary_compressed") + "\1\0\0\0\x0c\0\0\0a", "12000000000 bytes"),
     "cut-packed.pcd": (PCD.format(1, 1, 1, "binary_compressed") + "\x09\0\0\0\x0c\0\0\0a", "9 bytes"),
-    "lzf.pcd": (PCD.format(1, 1, 1, "binary_compressed") + "\x02\0\0\0\x0c\0\0\0\x20\x01", "LZF decoder"),
+    "lzf.pcd": (PCD.format(1, 1, 1, "binary_compressed") + "\x02\0\0\0\x0c\0\0\0\x20\x01", "pypcd4"),
+    "bomb.pcd": (PCD.format(1, 1, 1, "binary_compressed") + "\2\0\0\0\xb1\0\0\0\x20\x01", "data = 176 bytes"),
+    "half.pcd": (HALF.format(1, 1, 1, "binary_compressed") + "\6\0\0\0\x0c\0\0\0" + "0" * 6, "pypcd4"),
     "size.pcd": (PCD.format(2, 2, 2, "ascii") + "0 0 0\n1 1 1\n", "header"),
     "negative.pcd": (PCD.format(-1, 1, -1, "ascii"), "header"),
     "kind.pcd": (PCD.format(1, 1, 1, "base64") + "0 0 0\n", "header"),
@@ -131,7 +134,7 @@ class TestArrays:
         at = raw.index(b"PK\x01\x02")
         raw[at + 24 : at + 28] = b"\xfe\xff\xff\xff"  # the directory's word for the size, just below ZIP64's mark
         (tmp_path / "c.npz").write_bytes(raw)
-        monkeypatch.setattr("tomomesh.io.limits.physical_memory", lambda: 2**31)
+        monkeypatch.setattr("tomomesh.io.files.limits.physical_memory", lambda: 2**31)
         with pytest.raises(ResourceError):
             read_points(tmp_path / "c.npz")
 

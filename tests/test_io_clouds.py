@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +12,9 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
+from conftest import law
 from tomomesh.errors import FormatError
 from tomomesh.io import read_points
-from tomomesh.io.lzf import decompress
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -109,20 +110,49 @@ class TestPcd:
             "alpha": [128, 0, 0],
         }
 
+    @law(100)
     @given(
-        st.lists(st.sampled_from([b"a", b"abc", b"\0" * 30, b"xyz" * 200, bytes(range(256))]), min_size=1, max_size=40)
+        counts=st.lists(st.integers(1, 3), max_size=4),
+        names=st.lists(st.sampled_from(["a(m)", "b:0", "_", "c"]), min_size=4, max_size=4, unique=True),
+        packed=st.booleans(),
+        points=st.integers(1, 5),
     )
-    def test_lzf_undoes_what_lzf_did(self, parts: list[bytes]) -> None:
-        lzf = package("lzf")
-        plain = b"".join(parts)
-        packed = lzf.compress(plain)
-        if packed is not None:  # where packing does not help
-            assert decompress(packed, len(plain)) == plain
+    def test_fields_of_any_name_and_several_values(
+        self, tmp_path_factory: pytest.TempPathFactory, counts: list[int], names: list[str], packed: bool, points: int
+    ) -> None:
+        """The twin follows PCL: packed, one field after the other, in it all values of one point after the other's."""
+        package("pypcd4")
+        fields = {name: (points, count) for name, count in zip(names, counts, strict=False)}
+        shapes = {**fields, "x": (points, 1), "y": (points, 1), "z": (points, 1)}
+        rng = np.random.default_rng(points)
+        values = {name: rng.integers(-99, 99, shape).astype("<f4") for name, shape in shapes.items()}
+        head = {
+            "FIELDS": values,
+            "SIZE": [4 for _ in values],
+            "TYPE": ["F" for _ in values],
+            "COUNT": [table.shape[1] for table in values.values()],
+            "WIDTH": [points],
+            "HEIGHT": [1],
+            "DATA": ["binary_compressed" if packed else "binary"],
+        }
+        text = "".join(f"{word} {' '.join(map(str, row))}\n" for word, row in head.items())
+        body = np.concatenate(list(values.values()), axis=1).tobytes()
+        if packed:
+            body = lzf_literals(b"".join(table.tobytes() for table in values.values()))
+        path = tmp_path_factory.mktemp("pcd") / "c.pcd"
+        path.write_bytes(text.encode() + body)
+        found = read_points(path)
+        np.testing.assert_array_equal(found.positions, np.concatenate([values.pop(axis) for axis in "xyz"], axis=1))
+        assert set(found.attributes) == set(values) - {"_"}
+        for name, column in found.attributes.items():
+            np.testing.assert_array_equal(column.reshape(points, -1), values[name])
 
-    @pytest.mark.parametrize("packed", [b"\x00", b"\x05abc", b"\x20", b"\xe0\x01", b"\x20\x00", b"\x00a\x20\x01"])
-    def test_lzf_that_is_broken_is_refused(self, packed: bytes) -> None:
-        with pytest.raises(ValueError, match=r".*"):
-            decompress(packed, 9)
+
+def lzf_literals(plain: bytes) -> bytes:
+    """Return LZF behind its two sizes that copies nothing: at most 32 bytes at a time, behind their number less one."""
+    parts = [plain[at : at + 32] for at in range(0, len(plain), 32)]
+    stream = b"".join(bytes([len(part) - 1]) + part for part in parts)
+    return struct.pack("<II", len(stream), len(plain)) + stream
 
 
 class TestLas:
@@ -247,7 +277,8 @@ class TestMeshes:
 
 class TestMissingPackages:
     @pytest.mark.parametrize(
-        ("suffix", "missing"), [(".las", "laspy"), (".laz", "laspy"), (".laz", "lazrs"), (".e57", "pye57")]
+        ("suffix", "missing"),
+        [(".las", "laspy"), (".laz", "laspy"), (".laz", "lazrs"), (".e57", "pye57"), (".pcd", "pypcd4")],
     )
     def test_they_are_named_with_the_extra(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, missing: str
@@ -255,6 +286,8 @@ class TestMissingPackages:
         if missing == "lazrs":
             package("laspy")
         monkeypatch.setitem(sys.modules, missing, None)
-        (tmp_path / f"c{suffix}").write_bytes(b"LASF" + bytes(400))
+        pcd = b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA binary_compressed\n"
+        head = pcd + struct.pack("<II", 12, 12) if suffix == ".pcd" else b"LASF"
+        (tmp_path / f"c{suffix}").write_bytes(head + bytes(400))
         with pytest.raises(FormatError, match=rf"package {missing}.*tomomesh\[clouds\]"):
             read_points(tmp_path / f"c{suffix}")

@@ -11,7 +11,8 @@ from pydicom.sequence import Sequence
 
 from studies import AFFINES, assert_in_place, sampled, save, setting, slice_dataset, without, write_series
 from tomomesh.errors import FormatError, ResourceError, UnreadableError
-from tomomesh.io import limits, read_volume
+from tomomesh.io import read_volume
+from tomomesh.io.files import limits
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from conftest import law
 from studies import AFFINES, affine_of, assert_in_place, indices_of, sampled, save, shared, slice_dataset
 from tomomesh.errors import GeometryError
 from tomomesh.io import read_volume
-from tomomesh.io.dicom.regular import regular
+from tomomesh.io.dicom.series.regular import regular
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:

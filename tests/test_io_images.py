@@ -10,7 +10,8 @@ from PIL import Image
 
 from studies import assert_in_place, sampled, shared
 from tomomesh.errors import FormatError, GeometryError, ResourceError
-from tomomesh.io import limits, read_volume
+from tomomesh.io import read_volume
+from tomomesh.io.files import limits
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:

@@ -147,11 +147,13 @@ class TestGlb:
 
     def test_its_numbers_are_where_the_text_says(self, tmp_path: Path) -> None:
         mesh = lopsided()
-        write_mesh(mesh, tmp_path / "m.glb", vertex_fields=colors_of(mesh))
+        holed = np.where(np.arange(len(mesh.vertices)) == 1, np.nan, 2.0)
+        write_mesh(mesh, tmp_path / "m.glb", vertex_fields={**colors_of(mesh), "holed": holed})
         raw = (tmp_path / "m.glb").read_bytes()
         magic, version, length, size, kind = struct.unpack_from("<4sIII4s", raw)
         assert (magic, version, length, kind, size % 4) == (b"glTF", 2, len(raw), b"JSON", 0)
-        text = json.loads(raw[20 : 20 + size])
+        text = json.loads(raw[20 : 20 + size], parse_constant=pytest.fail)  # JSON has no NaN
+        assert text["asset"]["generator"] == HEAD
         block_size, block_kind = struct.unpack_from("<I4s", raw, 20 + size)
         assert (block_kind, block_size) == (b"BIN\0", text["buffers"][0]["byteLength"])
         assert 28 + size + block_size == len(raw)

@@ -13,7 +13,8 @@ from nibabel.orientations import inv_ornt_aff
 
 from studies import AFFINES, LPS_TO_RAS, SHAPE, assert_in_place, indices_of, sampled, shared, write_nifti
 from tomomesh.errors import FormatError, GeometryError, OutputError, ResourceError, TomomeshError, UsageError
-from tomomesh.io import limits, read_volume, unpack, write_labels
+from tomomesh.io import read_volume, write_labels
+from tomomesh.io.files import limits, unpack
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:

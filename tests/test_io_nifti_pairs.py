@@ -14,8 +14,8 @@ from studies import AFFINES, LPS_TO_RAS, assert_in_place, sampled, shared
 from tomomesh.cli import main
 from tomomesh.errors import FormatError, GeometryError, UnreadableError
 from tomomesh.io import read_volume
-from tomomesh.io.nifti import UNPLACED
-from tomomesh.io.studies import find_studies
+from tomomesh.io.studies.folder import find_studies
+from tomomesh.io.volumes.nifti import UNPLACED
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class TestPairs:
         (tmp_path / "in").mkdir()
         shutil.move(pair(tmp_path), tmp_path / "in" / "s.hdr")
         (tmp_path / "in" / "s.img").symlink_to(tmp_path / "s.img")
-        monkeypatch.setattr("tomomesh.io.nifti.unpacked", None)
+        monkeypatch.setattr("tomomesh.io.volumes.nifti.unpacked", None)
         with pytest.raises(FormatError, match="outside of its header's folder"):
             read_volume(tmp_path / "in" / "s.hdr")
 

@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from studies import assert_in_place, sampled
 from tomomesh.cli import main
 from tomomesh.errors import FormatError, GeometryError, ResourceError, TomomeshError, UsageError
-from tomomesh.io import limits, read_volume
-from tomomesh.io.studies import find_studies
+from tomomesh.io import read_volume
+from tomomesh.io.files import limits
+from tomomesh.io.studies.folder import find_studies
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:
@@ -147,7 +148,7 @@ class TestVoxels:
         self, tmp_path: Path, names: str, count: int, kind: str, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         folder = write(tmp_path / "s.zarr", np.stack([STORED] * count).astype(kind), multiscales(names))
-        monkeypatch.setattr("tomomesh.io.omezarr.read_array", None)
+        monkeypatch.setattr("tomomesh.io.volumes.zarr.omezarr.read_array", None)
         with pytest.raises(FormatError, match="a store of its own"):
             read_volume(folder)
 

@@ -13,7 +13,7 @@ import pytest
 
 from tomomesh.errors import FormatError, OutputError, UnreadableError, UsageError
 from tomomesh.io import check_output, read_settings, replacing, write_document, write_settings
-from tomomesh.io.source import existing, suffix_of
+from tomomesh.io.files.source import existing, suffix_of
 from tomomesh.settings import Settings
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class TestReplacing:
     def test_killed_at_any_moment_the_old_file_is_whole(self, tmp_path: Path) -> None:
         (tmp_path / "a").write_text("old")
         script = (
-            "import os, signal, sys\nfrom tomomesh.io.atomic import replacing\n"
+            "import os, signal, sys\nfrom tomomesh.io.files.atomic import replacing\n"
             "with replacing(sys.argv[1]) as file:\n"
             "    file.write(b'half'); file.flush(); os.kill(os.getpid(), signal.SIGKILL)\n"
         )

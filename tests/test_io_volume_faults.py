@@ -19,7 +19,8 @@ from PIL import Image
 from studies import AFFINES, LPS_TO_RAS, sampled
 from tomomesh.cli import main
 from tomomesh.errors import FormatError, GeometryError, ResourceError, TomomeshError
-from tomomesh.io import read_volume, unpack
+from tomomesh.io import read_volume
+from tomomesh.io.files import unpack
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:
@@ -194,7 +195,7 @@ class TestDetached:
         if "link" in way:
             (tmp_path / "in" / "link.raw").symlink_to(outside)
             (tmp_path / "in" / "l").symlink_to(tmp_path)
-        monkeypatch.setattr("tomomesh.io.raster.unpacked", None)
+        monkeypatch.setattr("tomomesh.io.volumes.raster.unpacked", None)
         with pytest.raises(FormatError, match="outside of its header's folder") as fault:
             read_volume(header)
         assert str(tmp_path / "secret") not in str(fault.value)

@@ -22,7 +22,8 @@ from PIL import Image
 
 from studies import AFFINES, LPS_TO_RAS, assert_in_place, sampled, shared, write_nifti, write_series
 from tomomesh.errors import FormatError, GeometryError, ResourceError, TomomeshError, UnreadableError
-from tomomesh.io import archive, limits, read_volume
+from tomomesh.io import read_volume
+from tomomesh.io.files import archive, limits
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:
@@ -246,7 +247,7 @@ class TestPrivate:
     def test_it_is_gone_after_kill_9(self, tmp_path: Path, private: Path) -> None:
         path = zipped(tmp_path / "s.zip", series(tmp_path))
         code = (
-            "import sys, time; from pathlib import Path; from tomomesh.io.archive import unpacked_zip\n"
+            "import sys, time; from pathlib import Path; from tomomesh.io.files.archive import unpacked_zip\n"
             "with unpacked_zip(Path(sys.argv[1])) as folder:\n"
             "    print(len(list(folder.iterdir())), flush=True); time.sleep(60)"
         )

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law
-from tomomesh.io.naming import LONGEST, distinct_names, safe_name
+from tomomesh.io.studies.naming import LONGEST, distinct_names, safe_name
 
 TEXTS = st.text(st.characters(), max_size=300)
 

@@ -44,9 +44,9 @@ def printed(mesh: str, *options: str, name: str = "part.ply") -> trimesh.Trimesh
 
 @pytest.mark.parametrize("kind", READABLE)
 def test_what_a_file_states_is_read_back(tmp_path: Path, kind: str) -> None:
-    assert io.stated(write(tmp_path, kind, "cm", "RAS")) == {"unit": "cm", "frame": "RAS"}
+    assert io.frame_of_file(write(tmp_path, kind, "cm", "RAS")) == {"unit": "cm", "frame": "RAS"}
     CONE.export(tmp_path / f"other.{kind}")
-    assert io.stated(tmp_path / f"other.{kind}") == {}
+    assert io.frame_of_file(tmp_path / f"other.{kind}") == {}
 
 
 @pytest.mark.parametrize("kind", READABLE)
@@ -80,7 +80,7 @@ def test_front_is_the_front_in_either_frame(tmp_path: Path, frame: str, lowest: 
 def test_a_patient_s_frame_is_kept_at_its_own_size_alone(tmp_path: Path, frame: str, scale: str, told: str) -> None:
     report = tmp_path / "report.json"
     printed(write(tmp_path, "ply", "cm", frame), "--scale", scale, "--report", str(report))
-    assert io.stated(tmp_path / "part.ply") == {"unit": "mm", "frame": told}
+    assert io.frame_of_file(tmp_path / "part.ply") == {"unit": "mm", "frame": told}
     assert json.loads(report.read_text())["written"] == {"unit": "mm", "frame": told}
 
 

@@ -168,8 +168,7 @@ class TestPoints:
 
     def test_they_say_where_they_come_from(self) -> None:
         found = segment(study(shell()), contours="loops")
-        assert found.contours is not None
-        rings = {(one.slice, one.ring): one for one in found.contours.contours}
+        rings = {(one.slice, one.ring): one for one in found.source.contours}
         points = found.points
         for (k, n), one in rings.items():
             own = (points.slices == k) & (points.attributes[RING] == n)
@@ -194,7 +193,7 @@ class TestPoints:
         slices = known_slices(found.points)
         assert slices is not None
         np.testing.assert_allclose(np.diff(slices.heights), 3, atol=1e-9)
-        assert sum(map(len, slices.rings)) == len(found.contours.contours if found.contours else ())
+        assert sum(map(len, slices.rings)) == len(found.source)
 
 
 class TestNesting:

@@ -19,7 +19,7 @@ from studies import rotation
 from tomomesh import Volume, phantom, reconstruct, segment
 from tomomesh.cli import main
 from tomomesh.dynamics.subdivision import squares_of
-from tomomesh.errors import EmptyError, UsageError
+from tomomesh.errors import EmptyError, GeometryError, UsageError
 from tomomesh.measure.distance import distance_to_surface
 from tomomesh.measure.intersections import Crossings
 from tomomesh.model.icosphere import icosphere
@@ -28,7 +28,7 @@ from tomomesh.model.mesh import TriMesh
 from tomomesh.model.networks import SpaceNetwork
 from tomomesh.segmentation.space import MOST, is_wall, pieces_of, train_space
 from tomomesh.settings import NetworkSettings
-from tomomesh.spacewise import _untangled
+from tomomesh.ways.space import _untangled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -176,9 +176,13 @@ class TestSurface:
         np.testing.assert_array_equal(made.segmentation.labels > 0, labels == 7)
 
     def test_warns_of_a_solid_that_is_shown_as_a_wall(self) -> None:
-        made = reconstruct(volume_of(ellipsoid()), lower=100.0, network="sphere", neurons=162, signal="region")
+        asked: dict[str, Any] = {"lower": 100.0, "network": "sphere", "neurons": 162, "signal": "region"}
+        with pytest.raises(GeometryError, match="does not follow its window"):
+            reconstruct(volume_of(ellipsoid()), **asked)
+        made = reconstruct(volume_of(ellipsoid()), **asked, allow_leaks=True)
         assert_sound(made, genus=0)
         assert any("--signal boundary" in warning for warning in made.report["warnings"])
+        assert any("of what it should" in warning for warning in made.report["warnings"])
 
     def test_faces_outward_from_a_mirrored_start(self) -> None:
         vertices, faces = icosphere(4)
@@ -199,7 +203,7 @@ class TestOpenNetworks:
     @pytest.mark.parametrize("network", ["chain", "grid"])
     def test_lie_among_the_voxels(self, network: str) -> None:
         found = segment(volume_of(torus()), lower=100.0, network=network, space="volume", neurons=60)
-        assert found.space is not None
+        assert len(found.source.network.codebook) == 60
         assert len(found.points) == 60
         k, j, i = np.rint(found.points.positions[:, ::-1]).astype(int).T
         inside = torus()[k, j, i] > 100

@@ -100,8 +100,7 @@ class TestOut:
     def test_nothing_is_written_where_something_fails(
         self, study: Path, monkeypatch: pytest.MonkeyPatch, temporary: Path, capfdbinary: Any
     ) -> None:
-        monkeypatch.setattr("tomomesh.pipeline.check_promise", lambda *_, **__: 1 / 0)
-        monkeypatch.setattr("tomomesh.voxelwise.check_promise", lambda *_, **__: 1 / 0)
+        monkeypatch.setattr("tomomesh.finish.check_promise", lambda *_, **__: 1 / 0)
         assert main(["reconstruct", str(study), *OPTIONS, "-o", "-", "--format", "stl"]) == 9
         assert capfdbinary.readouterr().out == b""
         assert list(temporary.iterdir()) == []

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import io
 from ..errors import UnreadableError, UsageError, printable
-from ..settings import Settings, parameters, without_effect
+from ..settings import Settings, parameters
 from . import summary
 from .bars import Bars
 from .batch import reconstruct_each
@@ -113,7 +113,7 @@ def _segment(chosen: Namespace) -> None:
     with Bars(quiet=chosen.quiet) as progress:
         volume, labels = read_study(chosen, settings, progress)
         found = segment(volume, settings, labels=labels, progress=progress, **given_of(chosen))
-        found.report["written"] = write_points(found.points, found, chosen.output, found.report, settings)
+        found.report["written"] = write_points(found.points, found, chosen.output, settings)
         write_stage_one(chosen, found)
         write_documents(chosen, found.report, settings)
         draw(chosen.figures, found, None, settings, progress)
@@ -144,6 +144,7 @@ def _network(chosen: Namespace) -> None:
     check_files(chosen)
     from ..som.region import train_region
     from ..som.shapes import SHAPES, shape
+    from ..ways.effect import without_effect
     from .pictures import film_of_network, pictures_of_network
 
     given = chosen.region in SHAPES
@@ -183,8 +184,8 @@ def _window_of_picture(path: str, settings: Settings) -> NDArray[np.float64]:
 
 
 def _inspect(chosen: Namespace) -> None:
-    from .findings import of_study
-    from .inspection import inspected
+    from .inspect.findings import of_study
+    from .inspect.inspection import inspected
 
     found = inspected(chosen.study, settings_of(chosen), typed=getattr(chosen, "typed", ""))
     _say(found, None if chosen.json else of_study(found))

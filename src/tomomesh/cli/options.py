@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import Field, fields
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from .. import __version__
 from ..errors import UsageError
 from ..settings import LAYERS, MANY, Settings, asked_by, limits_of, option_of, parameters
+from ..ways import WAYS
 from .formats import (
     CHECKED,
     CLOUD,
@@ -86,7 +88,7 @@ def build_parser() -> argparse.ArgumentParser:
     demo.add_argument("-o", "--output", default="tomomesh-demo", metavar="FOLDER", help="default: %(default)s")
     _add_settings(demo, ("network", *STAGE_TWO, "run"), without=STUDY_ONLY)
 
-    main = _command(commands, "reconstruct", "a study of slices in, a closed surface out")
+    main = _command(commands, "reconstruct", "a study of slices in, a closed surface out", epilog=_ways())
     _add_study(main)
     main.add_argument(
         "-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format; with --each, a folder"
@@ -103,7 +105,8 @@ def build_parser() -> argparse.ArgumentParser:
     _add_outputs(stage_one, "labels", "figures")
     _add_settings(stage_one, (*STAGE_ONE, "cubes", "run"), without=SURFACE_ONLY)
 
-    stage_two = _command(commands, "surface", "stages two and three alone: points in, a closed surface out")
+    in_short = "stages two and three alone: points in, a closed surface out"
+    stage_two = _command(commands, "surface", in_short, epilog=_ways())
     stage_two.add_argument("cloud", metavar="POINTS", help=f"{CLOUD}, or - with --input-format")
     stage_two.add_argument("-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format")
     _add_streams(stage_two, CLOUD_FORMATS, MESH_FORMATS, usual="xyz")
@@ -187,9 +190,20 @@ _whole_numbers.__name__ = "whole numbers, joined by commas,"
 _numbers.__name__ = "numbers, joined by commas,"
 
 
-def _command(commands: Any, name: str, text: str) -> argparse.ArgumentParser:
-    parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+def _command(commands: Any, name: str, text: str, *, epilog: str | None = None) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=text, description=f"{text[0].upper()}{text[1:]}.", epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
     return parser
+
+
+def _ways() -> str:
+    """List the ways to a surface."""
+    each = [
+        fill(f"{name:10}{text}", 96, initial_indent="  ", subsequent_indent=12 * " ") for name, text in WAYS.items()
+    ]
+    return "\n".join(["Ways to the surface, of which the first that applies is taken:", *each])
 
 
 def _add_study(parser: argparse.ArgumentParser) -> None:

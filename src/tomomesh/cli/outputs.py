@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import io
 from ..errors import OutputError, UsageError
-from ..io.source import suffix_of
+from ..io.files.source import suffix_of
 from .parts import frame_of_part
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from ..model.mesh import TriMesh
     from ..model.points import PointSet
-    from ..results import Segmentation, Surface
+    from ..results import Place, Segmentation, Surface
     from ..settings import Settings
     from .bars import Bars
 
@@ -90,7 +90,7 @@ def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progr
     io.write_mesh(mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces)
     surface.report["written"] = frame
     if getattr(chosen, "points", None):
-        write_points(surface.points, stage_one, chosen.points, surface.report, settings)
+        write_points(surface.points, stage_one, chosen.points, settings, surface.place)
     if stage_one is not None:
         write_stage_one(chosen, stage_one)
     if getattr(chosen, "mask_out", None):
@@ -107,8 +107,8 @@ def _placed(surface: Surface, output: str | Path, settings: Settings) -> tuple[T
     stage_one, part = surface.segmentation, surface.part
     mesh = surface.mesh if part is None else part.mesh
     if stage_one is None:
-        frame_of_cloud = _frame_of_cloud(surface.report, settings)
-        return mesh, frame_of_cloud if part is None else frame_of_part(frame_of_cloud, settings.printing.scale)
+        of_cloud = _frame_of_cloud(surface.place)
+        return mesh, of_cloud if part is None else frame_of_part(of_cloud, settings.printing.scale)
     asked = "ras" if suffix_of(output) in RAS_ALONE else settings.run.frame
     frame = io.frame_of_study(asked, stage_one.volume.grid)
     named = {"unit": frame.unit, "frame": frame.name}
@@ -116,23 +116,23 @@ def _placed(surface: Surface, output: str | Path, settings: Settings) -> tuple[T
 
 
 def write_points(
-    points: PointSet, stage_one: Segmentation | None, path: str | Path, report: dict[str, Any], settings: Settings
-) -> dict[str, str]:
-    """Write the points in the frame that was asked for, and return its unit and name."""
-    named = _frame_of_cloud(report, settings)
-    if stage_one is not None:
+    points: PointSet, stage_one: Segmentation[Any] | None, path: str | Path, settings: Settings,
+    place: Place | None = None,
+) -> dict[str, str]:  # fmt: skip
+    """Write the points in the frame that was asked for, or a cloud's own, and return its unit and name."""
+    if stage_one is None:
+        named = _frame_of_cloud(place)
+    else:
         frame = io.frame_of_study(settings.run.frame, stage_one.volume.grid)
         points, named = frame.points(points), {"unit": frame.unit, "frame": frame.name}
     io.write_points(points, path, **named)
     return named
 
 
-def _frame_of_cloud(report: dict[str, Any], settings: Settings) -> dict[str, str]:
+def _frame_of_cloud(place: Place | None) -> dict[str, str]:
     """Name unit and frame of a cloud: whatever its numbers are in."""
-    points = report["points"]
-    corner = ",".join(repr(place).removesuffix(".0") for place in points.get("origin", ()))
-    frame = points.get("frame", "unknown")
-    return {"unit": points["unit"], "frame": f"local:{corner}" if settings.run.local_origin else frame}
+    assert place is not None
+    return {"unit": place.unit, "frame": place.name}
 
 
 def _write_mask(surface: Surface, path: str | Path, settings: Settings) -> dict[str, Any]:
@@ -166,7 +166,7 @@ def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any
     return at_vertices, {} if filled is None else {"filled": filled}
 
 
-def write_stage_one(chosen: Namespace, found: Segmentation) -> None:
+def write_stage_one(chosen: Namespace, found: Segmentation[Any]) -> None:
     """Write the regions, where they were asked for."""
     if getattr(chosen, "labels", None):
         io.write_labels(found.labels, found.volume, chosen.labels)
@@ -182,7 +182,7 @@ def write_documents(chosen: Namespace, report: dict[str, Any], settings: Setting
 
 def draw(
     folder: str | Path | None,
-    stage_one: Segmentation | None,
+    stage_one: Segmentation[Any] | None,
     surface: Surface | None,
     settings: Settings,
     progress: Bars,

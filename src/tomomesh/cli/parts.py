@@ -27,7 +27,7 @@ def frame_of_mesh(path: str, unit: str | None = None) -> dict[str, str]:
     """
     from ..printing.part import MM
 
-    named = {"unit": "mm", "frame": "unknown"} | io.stated(path) | ({"unit": unit} if unit else {})
+    named = {"unit": "mm", "frame": "unknown"} | io.frame_of_file(path) | ({"unit": unit} if unit else {})
     if named["unit"] not in MM:
         raise GeometryError(
             "the mesh's unit has no known length", file=path, found=f"unit = {named['unit']}",

@@ -6,18 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..model.lattice import Lattice
-from ..model.networks import Networks
-from ..model.points import PointSet
 from ..show import draw_all
 from ..show.film import film
-from ..show.gallery import median_slice
 from ..show.maps import SHEETS, draw_maps
 from ..show.plane import Plane
 from ..show.render import View
 from ..show.topologies import draw_adapted, draw_update_regions
 from ..som.fit import match
 from ..som.snapshots import snapshots
+from ..ways import way_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,31 +30,28 @@ FRAMES = 40
 
 
 def pictures(
-    stage_one: Segmentation | None, surface: Surface | None, settings: Settings
+    stage_one: Segmentation[Any] | None, surface: Surface | None, settings: Settings
 ) -> Iterator[tuple[str, Figure]]:
     """Yield every picture that the stages allow, with its name."""
     stages: dict[str, Any] = {"tolerance": settings.fit.tolerance}
-    if stage_one is not None:
-        volume = stage_one.volume
-        plane = stage_one.report["study"]["plane"]
-        stages |= {
-            "images": volume.voxels,
-            "mask": stage_one.mask,
-            "networks": stage_one.networks if stage_one.contours is None else _on_one_slice(stage_one),
-            "labels": stage_one.labels,
-            "contours": stage_one.contours,
-            "points": _drawn(stage_one),
-            "plane": Plane(spacing_mm=volume.spacing_mm[:2], upward=plane != "axial"),
-        }
     if surface is not None:
         stages |= {
-            "points": surface.points if stage_one is None else _drawn(stage_one),
-            "cuberille": surface.cuberille,
-            "triangulated": surface.cuberille.triangulated(),
+            "points": surface.points,
             "smoothed": surface.smoothed,
             "mesh": surface.mesh,
             "trace": surface.trace,
             "view": _view(stage_one, settings),
+        }
+    if surface is not None and len(surface.cuberille.quads):
+        stages |= {"cuberille": surface.cuberille, "triangulated": surface.cuberille.triangulated()}
+    if stage_one is not None:
+        volume, way = stage_one.volume, way_of(stage_one.report["way"]["name"])
+        stages |= {
+            "images": volume.voxels,
+            "mask": stage_one.mask,
+            "points": stage_one.points,
+            "plane": Plane(spacing_mm=volume.spacing_mm[:2], upward=stage_one.plane != "axial"),
+            **way.pictures(stage_one),
         }
     if surface is not None and stage_one is not None:
         stages["on_slices"] = surface.mesh.moved(stage_one.volume.to_indices(surface.mesh.vertices))
@@ -89,35 +83,6 @@ def film_of_network(trained: TrainedNetwork, settings: Settings, pixel_area: flo
     return film(trained.inputs[:, axes], places, trained.lattice, notes=notes, title=title)
 
 
-def _on_one_slice(stage_one: Segmentation) -> Networks:
-    """Return the rings of the slice that is drawn as one network."""
-    found = stage_one.contours
-    assert found is not None
-    k = median_slice(stage_one.mask, found.slices)
-    rings = found.on(k)
-    first = np.cumsum([0, *map(len, rings)])
-    edges = [
-        n + np.stack([np.arange(len(ring)), (np.arange(len(ring)) + 1) % len(ring)], axis=1)
-        for n, ring in zip(first[:-1], rings, strict=True)
-    ]
-    hops = np.zeros((first[-1], first[-1]), np.int32)
-    return Networks(
-        Lattice("rings", np.concatenate(edges), hops, (int(first[-1]),)),
-        np.array([k], np.int32),
-        np.concatenate([ring.codebook for ring in rings])[None],
-        np.concatenate([ring.bridged for ring in rings])[None],
-        rings[0].outlined,
-        np.array([sum(ring.pixels for ring in rings)]),
-        np.array([sum(ring.strays for ring in rings)]),
-    )
-
-
-def _drawn(stage_one: Segmentation) -> PointSet:
-    """Return the points; without a network there are no kinds of neurons to tell apart."""
-    points = stage_one.points
-    return points if stage_one.boundary is None else PointSet.from_positions(points.positions)
-
-
-def _view(stage_one: Segmentation | None, settings: Settings) -> View:
+def _view(stage_one: Segmentation[Any] | None, settings: Settings) -> View:
     """Name the axes of the patient where there is one, and plainly where there is a cloud."""
     return View() if stage_one is not None else View(unit=settings.run.units, axes=("x", "y", "z"))

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import OutputError, TomomeshError, UsageError
-from ..io.private import private_folder
+from ..io.files.private import private_folder
 from .formats import TEXTS
 
 if TYPE_CHECKING:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from ..measure.topology import FAULTS
+from ..ways import way_of
+from ..ways.samples import points_in_words
+from ..ways.sections import unit_in_words
 
 WIDTHS = ("thinnest_wall_mm", "thinnest_gap_mm")
 """Keys of the widths that are told of a part."""
@@ -17,14 +20,14 @@ SHOWN = 3
 def of_surface(report: dict[str, Any], output: str) -> list[str]:
     """Say what was reconstructed, and how good it is."""
     quality, fit = report["quality"], report["fit"]
-    unit = _unit(report)
+    unit = unit_in_words(report)
     shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
     shape = shape if quality["closed"] else "a manifold sheet"
     lines = [
         *_of_stage_one(report),
         f"points    {_of_points(report)}",
-        _of_cubes(report),
-        f"fit       {fit['iterations']} steps, {'at rest' if fit['converged'] else 'NOT at rest'}{_of_filled(report)}",
+        *way_of(report["way"]["name"]).of_body(report),
+        f"fit       {_of_fit(fit)}{_of_filled(report)}",
         f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}, "
         f"{quality['self_intersections'] or 'no'} face(s) pass through others",
         f"          {quality['components']} component(s), genus {quality['genus']}, "
@@ -168,27 +171,14 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
     if window["chosen_by"] == "labels":
         select = ", ".join(map(str, report["settings"]["window"]["select"]))
         lines[-1] = f"window    label(s) {select}, {100 * window['share']:.1f} % of the voxels"
-    if report.get("rings", {"kind": "one"})["kind"] != "one":
-        lines += _of_contours(report)
-    elif "space" in report:
-        lines.append(_of_space(report))
-    elif "networks" in report:
-        networks = report["networks"]
-        lines.append(
-            f"networks  {networks['trained']} {networks['topology']}s of {networks['neurons']} neurons on the window's "
-            f"{'outline' if networks['signal'] == 'boundary' else 'pixels'}, {networks['strays']} stray pixels dropped"
-        )
-    return lines
+    return [*lines, *way_of(report["way"]["name"]).of_networks(report)]
 
 
-def _of_space(report: dict[str, Any]) -> str:
-    """Say what the one network in space is."""
-    networks, left = report["networks"], report["space"]["dropped_voxels"]
-    return (
-        f"network   a {networks['topology']} of {networks['neurons']} neurons in space on the window's "
-        f"{'boundary' if networks['signal'] == 'boundary' else 'voxels'}, "
-        f"{left or 'no'} voxel(s) of small pieces left out"
-    )
+def _of_fit(fit: dict[str, Any]) -> str:
+    """Say whether the mesh has come to rest."""
+    if fit["converged"] is None:
+        return "none"
+    return f"{fit['iterations']} steps, {'at rest' if fit['converged'] else 'NOT at rest'}"
 
 
 def limit_in_words(limit: float | list[float | None] | None) -> str:
@@ -197,39 +187,10 @@ def limit_in_words(limit: float | list[float | None] | None) -> str:
     return ", ".join("any" if one is None else f"{one:g}" for one in each)
 
 
-def _of_contours(report: dict[str, Any]) -> list[str]:
-    """Say what contours there are, and what becomes of them from slice to slice."""
-    rings = report["rings"]
-    return [
-        f"contours  {rings['count']} {rings['kind']} on {report['networks']['trained']} slices, "
-        f"{rings['neurons']} neurons, {rings['dropped']} too small, {len(rings['bridged_gaps'])} bridged gap(s)",
-        f"          {rings['tracks']} tracks: {rings['births']} born, {rings['branches']} branched, "
-        f"{rings['merges']} merged",
-    ]
-
-
-def _of_cubes(report: dict[str, Any]) -> str:
-    """Say what the surface was tracked on."""
-    if "voxels" in report:
-        voxels = report["voxels"]
-        known = "insides of contours interpolated" if "stack" in report else "gray levels interpolated"
-        places = known if voxels["interpolated"] else "a mask, evened out"
-        return f"voxels    {report['surface']['square_faces']} faces, {places}, {voxels['added_for_composition']} added"
-    if "space" in report:
-        space = report["space"]
-        return f"faces     {space['faces']} of the network, divided into {report['surface']['square_faces']} squares"
-    cubes = report["cubes"]
-    edge = f"edge {_edges(cubes['cell_mm'])} {_unit(report)}"
-    open_ = report["settings"]["cubes"]["open"]
-    walls = "" if "study" in report or open_ else ", one wall" if cubes["holds"] else ", TWO walls"
-    return f"cubes     {edge}, {cubes['occupied']} occupied, closed by {cubes['closing']}{walls}"
-
-
 def _of_points(report: dict[str, Any]) -> str:
-    points, unit = report["points"], _unit(report)
+    points, unit = report["points"], unit_in_words(report)
     if "noise_mm" in points:
-        apart = f"{points['spacing_mm']:.4g} {unit} apart, noise {points['noise_mm']:.2g} {unit}"
-        return f"{points['count']}, {points['strays'] or 'no'} stray(s) left out, {apart}"
+        return points_in_words(report)
     made = ""
     if points.get("on_bridges") or points.get("on_caps"):
         bridges = "bridged gaps" if "networks" in report else "added voxels"
@@ -245,12 +206,6 @@ def _of_filled(report: dict[str, Any]) -> str:
     return f", {100 * share:.3g} % of the faces filled, not measured"
 
 
-def _unit(report: dict[str, Any]) -> str:
-    """Name the unit of lengths; a cloud may not know its own."""
-    unit = report["points"]["unit"]
-    return "units" if unit == "unknown" else str(unit)
-
-
 def _of_volume(quality: dict[str, Any], unit: str) -> str:
     volume = quality["volume_mm3"]
     return f", {quality['boundary_loops']} border(s)" if volume is None else f", volume {volume:.6g} {unit}^3"
@@ -259,10 +214,6 @@ def _of_volume(quality: dict[str, Any], unit: str) -> str:
 def _of_rings(quality: dict[str, Any]) -> str:
     ratio = quality.get("volume_over_rings")
     return "" if ratio is None else f" ({100 * ratio:.1f} % of the rings')"
-
-
-def _edges(cell: list[float]) -> str:
-    return f"{cell[0]:.4g}" if len(set(cell)) == 1 else " x ".join(f"{edge:.4g}" for edge in cell)
 
 
 def _ending(report: dict[str, Any], output: str) -> list[str]:

@@ -22,8 +22,8 @@ ROUNDS = 24
 """Rounds after which what still passes through itself is left, and reported: (1 - .25)^20 = .003 of the way back is
 then left."""
 GENTLE = 4
-"""Rounds in which the mesh is only smoothed, which undoes most folds; later it also goes back. The region that is worked
-on grows by one ring of faces as often."""
+"""Rounds in which the mesh is only smoothed, which undoes most folds; later it also goes back. The region that is
+worked on grows by one ring of faces as often."""
 BACK = 0.25
 """Share of the way back to where it came from that a vertex takes in a later round."""
 

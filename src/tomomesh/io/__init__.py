@@ -1,22 +1,25 @@
 """Files in, files out: the border where every frame becomes LPS millimeters.
 
-One file a format family; each table leads from a suffix to a reader or a writer.
+One file a format, in `volumes`, `meshes`, `clouds` and `dicom`; a table leads from each suffix to its reader or writer.
+`studies` finds what a path leads to, `files` guards and finishes files as such.
 """
 
 from __future__ import annotations
 
-from .atomic import check_output, replacing
+from .clouds.read import POINT_READERS, read_points
+from .clouds.write import POINT_WRITERS, write_points
 from .dicom import Listing, Series
 from .documents import read_settings, write_document, write_settings, write_table
+from .files.atomic import check_output, replacing
 from .frames import Frame, frame_of_study
-from .images import read_picture
-from .labels import LABEL_WRITERS, write_labels
-from .meshes import MESH_READERS, MESH_WRITERS, keeps, read_mesh, write_mesh
-from .points import POINT_READERS, POINT_WRITERS, read_points, write_points
-from .series import list_series
-from .stated import stated
-from .studies import Study, find_studies
-from .volumes import VOLUME_READERS, read_volume
+from .meshes.frame import frame_of_file
+from .meshes.read import MESH_READERS, read_mesh
+from .meshes.write import MESH_WRITERS, keeps, write_mesh
+from .studies.folder import Study, find_studies
+from .studies.listing import list_series
+from .studies.read import VOLUME_READERS, read_volume
+from .volumes.images import read_picture
+from .volumes.labels import LABEL_WRITERS, write_labels
 
 __all__ = [
     "LABEL_WRITERS",
@@ -31,6 +34,7 @@ __all__ = [
     "Study",
     "check_output",
     "find_studies",
+    "frame_of_file",
     "frame_of_study",
     "keeps",
     "list_series",
@@ -40,7 +44,6 @@ __all__ = [
     "read_settings",
     "read_volume",
     "replacing",
-    "stated",
     "write_document",
     "write_labels",
     "write_mesh",

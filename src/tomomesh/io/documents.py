@@ -13,8 +13,8 @@ import numpy as np
 
 from ..errors import FormatError
 from ..settings import Settings
-from .atomic import replacing
-from .source import whole
+from .files.atomic import replacing
+from .files.source import whole
 
 if TYPE_CHECKING:
     from pathlib import Path

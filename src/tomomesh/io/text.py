@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import FormatError
-from .source import whole
+from .files.source import whole
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -13,13 +13,14 @@ from ..errors import UsageError
 from .cloud import CloudSettings
 from .crop import CropSettings
 from .cubes import CubeSettings
-from .effect import without_effect
 from .fit import FitSettings
+from .matters import MATTERS
 from .network import FALLS, IN_SLICE, IN_SPACE, SURFACES, NetworkSettings
 from .parameter import LAYERS, MANY, UNSET, asked_by, limits_of, option_of
 from .printing import PrintSettings
 from .read import ReadSettings
 from .run import RunSettings
+from .schema import object_of, schema_of
 from .window import WindowSettings
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "IN_SPACE",
     "LAYERS",
     "MANY",
+    "MATTERS",
     "SURFACES",
     "UNSET",
     "CloudSettings",
@@ -44,7 +46,6 @@ __all__ = [
     "limits_of",
     "option_of",
     "parameters",
-    "without_effect",
 ]
 
 
@@ -113,6 +114,23 @@ class Settings:
             name: {key: list(v) if isinstance(v, tuple) else v for key, v in group.items() if v is not None}
             for name, group in asdict(self).items()
         }
+
+    @classmethod
+    def json_schema(cls) -> dict[str, Any]:
+        """Return the JSON Schema (2020-12) of the sections that `from_dict` takes.
+
+        Each parameter has its type, default, limits, choices, help text as ``description``, and, as annotations,
+        its ``unit`` and the ``paper``'s value. Rules between parameters are checked by the settings alone. To JSON
+        Schema 3.0 is an integer, to the settings it is none.
+
+        Examples
+        --------
+        >>> Settings.json_schema()["properties"]["cubes"]["properties"]["smoothing"]["maximum"]
+        1000
+        """
+        groups = {entry.name: schema_of(getattr(cls(), entry.name)) for entry in fields(cls)}
+        dialect = "https://json-schema.org/draft/2020-12/schema"
+        return object_of(groups, **{"$schema": dialect}, title="tomomesh settings", description=cls.__doc__)
 
 
 def parameters() -> Iterator[tuple[str, Field[Any]]]:

@@ -1,4 +1,10 @@
-"""The dynamic mesh."""
+"""The dynamic mesh.
+
+Where the numbers come from: with normalized masses the damping 1 is critical, and a time step up to 1 is stable on
+every mesh (docs, theory). Of a sum of stiffness of .25, .5, 1 and 3 k_d, .25 draws a ring of 58 neurons least off its
+points, by .34 mm against .46 to 1.77, and rests soonest, after 11 steps against 15 to 93 (measured); 200 are room for
+worse.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +25,7 @@ class FitSettings(Group):
         choices=("auto", "nearest", "surface"),
         paper="nearest",
     )
-    stiffness: float = param(0.25, "sum of the structural stiffness at a vertex over k_d", low=0)
+    stiffness: float = param(0.25, "sum of the structural stiffness at a vertex over k_d", low=0, paper=0.5)
     damping: float = param(1.0, "damping over critical damping", above=0)
     step: float = param(0.8, "time step, in units of 1/omega; at most the damping and its inverse", above=0, high=1)
     tolerance: float = param(

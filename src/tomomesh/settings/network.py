@@ -1,4 +1,12 @@
-"""Networks: topology, training, what they see."""
+"""Networks: topology, training, what they see.
+
+Where the numbers come from: 58 neurons, 10,000 presentations, random starts and the bubble are the paper's. A
+learning rate from .5 to .01 by a power of 3 and a radius by a power of 5 came nearest to the true line of a band,
+.186 of a pixel against .207 to 1.38 for other powers; the batch map needs 3 epochs from an ellipse and 10 from random
+pixels; without the pixels beyond 2.5 medians a ring among 2 % strays is .07 of a pixel off, with them .48 (all
+measured). A bridge is an edge of over two medians (docs, theory). More than 4,096 neurons would make the table of
+hops, 4 bytes for each two, larger than 67 MB.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +18,8 @@ from .parameter import Group, param
 SURFACES = ("sphere", "torus")
 """Networks with faces: closed surfaces, which live in space."""
 IN_SLICE, IN_SPACE = 58, 2562
-"""Neurons where none are asked for: the paper's of a slice, and those of an icosahedron divided 16-fold."""
+"""Neurons where none are asked for: the paper's of a slice, and those of an icosahedron with edges divided 16-fold:
+10 x 16^2 + 2."""
 FALLS = ("linear", "power", "exponential", "inverse")
 """How a learning rate or a radius may fall."""
 

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 UNSET = object()
 MANY = tuple(range(1, 257))
-"""Lengths of a parameter that takes as many values as one likes."""
+"""Lengths of a parameter that takes as many values as one likes: labels of 8 bits are no more."""
 LAYERS = (1, 2, 3, 4)
-"""Lengths of a parameter that takes one value, or one a layer of a color image."""
+"""Lengths of a parameter that takes one value, or one a layer of a color image, opacity among them."""
 
 
 def param(

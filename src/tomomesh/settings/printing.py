@@ -1,4 +1,7 @@
-"""What becomes of a finished mesh that is to be printed."""
+"""What becomes of a finished mesh that is to be printed.
+
+The thinnest wall of .8 mm is two lines of the usual nozzle of .4 mm.
+"""
 
 from __future__ import annotations
 

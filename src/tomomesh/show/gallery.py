@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..model.networks import Networks
 from .contact import draw_slices
 from .fit import draw_fit
 from .outline import draw_outlines
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
 
     from ..model.contours import Contours
     from ..model.mesh import QuadMesh, TriMesh
-    from ..model.networks import Networks
     from ..model.points import PointSet
     from ..model.trace import Trace
 
@@ -32,9 +33,8 @@ def draw_all(
     *,
     images: NDArray[Any] | None = None,
     mask: NDArray[np.bool_] | None = None,
-    networks: Networks | None = None,
+    networks: Networks | Contours | None = None,
     labels: NDArray[Any] | None = None,
-    contours: Contours | None = None,
     points: PointSet | None = None,
     cuberille: QuadMesh | None = None,
     triangulated: TriMesh | None = None,
@@ -54,12 +54,10 @@ def draw_all(
         The slices.
     mask : (K, J, I) bool array
         The window.
-    networks : Networks
-        The trained networks.
+    networks : Networks or Contours
+        The trained networks, one a slice or several.
     labels : (K, J, I) int array
         0 outside, else neuron plus one.
-    contours : Contours
-        Several networks a slice, where there are.
     points, cuberille, triangulated, smoothed, mesh, trace
         The later stages.
     on_slices : TriMesh
@@ -79,9 +77,8 @@ def draw_all(
     """
     if images is not None and mask is not None:
         yield from _of_slice(images, mask, networks, labels, plane)
-    found = networks if contours is None else contours
-    if mask is not None and found is not None and len(found.slices):
-        pages = draw_slices(mask, found, plane)
+    if mask is not None and networks is not None and len(networks.slices):
+        pages = draw_slices(mask, networks, plane)
         yield from ((f"06-slices-{number}", page) for number, page in enumerate(pages, 1))
     if points is not None and len(points):
         yield "07-points", draw_points(points, view)
@@ -97,10 +94,38 @@ def draw_all(
         yield from ((f"12-outlines-{number}", page) for number, page in drawn)
 
 
+@dataclass
+class _OnSlice:
+    """All neurons (u, 2) of a slice, the pairs (e, 2) of them that are joined, and which of these cross a gap."""
+
+    name: str
+    codebook: NDArray[np.float64]
+    edges: NDArray[np.int64]
+    bridged: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.codebook)
+
+
+def _on_slice(found: Networks | Contours, k: int) -> _OnSlice:
+    """Return what was trained on a slice, as one graph."""
+    if isinstance(found, Networks):
+        n = int(np.searchsorted(found.slices, k))
+        return _OnSlice(found.lattice.name, found.codebooks[n], found.lattice.edges, found.bridged[n])
+    rings = found.on(k)
+    first = np.cumsum([0, *map(len, rings)])
+    edges = [
+        n + np.stack([np.arange(len(ring)), (np.arange(len(ring)) + 1) % len(ring)], axis=1)
+        for n, ring in zip(first[:-1], rings, strict=True)
+    ]
+    books, bridged = ([getattr(ring, name) for ring in rings] for name in ("codebook", "bridged"))
+    return _OnSlice("rings", np.concatenate(books), np.concatenate(edges), np.concatenate(bridged))
+
+
 def _of_slice(
     images: NDArray[Any],
     mask: NDArray[np.bool_],
-    networks: Networks | None,
+    networks: Networks | Contours | None,
     labels: NDArray[Any] | None,
     plane: Plane,
 ) -> Iterator[tuple[str, Figure]]:
@@ -110,14 +135,10 @@ def _of_slice(
     yield "04-window", draw_window(images[k], mask[k], plane, note=note)
     if networks is None or k not in networks.slices:
         return
-    n = int(np.flatnonzero(networks.slices == k)[0])
-    codebook = networks.codebooks[n]
+    drawn = _on_slice(networks, k)
     if labels is not None:
-        yield (
-            "05-regions",
-            draw_regions(images[k], mask[k], codebook, networks.lattice, labels[k], plane),
-        )
-    yield "06-network", draw_contour(mask[k], codebook, networks.lattice, plane, bridged=networks.bridged[n])
+        yield "05-regions", draw_regions(images[k], mask[k], drawn.codebook, drawn, labels[k], plane)
+    yield "06-network", draw_contour(mask[k], drawn.codebook, drawn, plane, bridged=drawn.bridged)
 
 
 def median_slice(mask: NDArray[np.bool_], among: NDArray[np.int32] | None = None) -> int:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from matplotlib.colors import hsv_to_rgb
 from matplotlib.patches import ConnectionPatch
 
 from .marks import arrow, dots, lines
-from .plane import Plane, contrast, gray, panels
+from .plane import PIXELS, Plane, contrast, gray, panels
 from .style import ACCENT, NETWORK, heading, styled
 
 if TYPE_CHECKING:
@@ -18,18 +18,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from ..model.lattice import Lattice
-
     Pixels = NDArray[Any]
     Floats = NDArray[np.float64]
 
-FLAT = Plane()
 ON_DARK = "#ff9a4d"
 PALE = (0.76, 0.80, 0.83)
 
 
 @styled
-def draw_window(image: Pixels, mask: Pixels, plane: Plane = FLAT, *, note: str = "") -> Figure:
+def draw_window(image: Pixels, mask: Pixels, plane: Plane = PIXELS, *, note: str = "") -> Figure:
     """Draw a slice and what the window keeps of it (Fig. 4)."""
     levels = gray(image)
     figure, axes = panels(8.6, 2, plane.place(np.array(levels.shape[::-1])), 0.45)
@@ -41,9 +38,24 @@ def draw_window(image: Pixels, mask: Pixels, plane: Plane = FLAT, *, note: str =
     return figure
 
 
+class Joined(Protocol):
+    """Whatever says how many neurons there are, what they form, and which are joined, as a lattice does."""
+
+    @property
+    def name(self) -> str:
+        """What they form."""
+
+    def __len__(self) -> int:
+        """Return how many neurons there are."""
+
+    @property
+    def edges(self) -> NDArray[np.int64]:
+        """Numbers (e, 2) of both neurons of each pair."""
+
+
 @styled
 def draw_regions(
-    image: Pixels, mask: Pixels, codebook: Floats, network: Lattice, labels: Pixels, plane: Plane = FLAT
+    image: Pixels, mask: Pixels, codebook: Floats, network: Joined, labels: Pixels, plane: Plane = PIXELS
 ) -> Figure:
     """Draw the way of a slice: image, window, network, regions (Fig. 5).
 
@@ -55,7 +67,7 @@ def draw_regions(
         The window.
     codebook : (u, 2) float array
         Neurons in pixel indices (column, row).
-    network : Lattice
+    network : Joined
         Which neurons are neighbors.
     labels : (J, I) int array
         0 outside, else the number of the nearest neuron plus one.
@@ -99,7 +111,7 @@ def _colored(labels: Pixels, neurons: int) -> Floats:
 
 @styled
 def draw_contour(
-    mask: Pixels, codebook: Floats, network: Lattice, plane: Plane = FLAT, *, bridged: NDArray[np.bool_]
+    mask: Pixels, codebook: Floats, network: Joined, plane: Plane = PIXELS, *, bridged: NDArray[np.bool_]
 ) -> Figure:
     """Draw the network over the window, and alone with its bridged gaps (Fig. 6).
 

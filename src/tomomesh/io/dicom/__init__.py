@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from .directory import GONE, index_in, indexed, is_index, read_index
 from .files import NOT_DICOM, dicom_among, is_dicom
-from .kinds import is_segmentation, lone_object
-from .listing import Listing, Series, list_dicom
+from .headers.kinds import is_segmentation, lone_object
 from .read import list_stacks, read_dicom
+from .series.listing import Listing, Series, list_dicom
 
 __all__ = [
     "GONE",

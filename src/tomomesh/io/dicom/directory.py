@@ -7,9 +7,9 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from ...errors import FormatError
-from ..source import leaves_folder, regular_files, third_party
+from ..files.source import leaves_folder, regular_files, third_party
 from .bad import listed
-from .dataset import read_dataset
+from .headers.dataset import read_dataset
 from .read import read_dicom
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ def read_index(index: Path, settings: ReadSettings, *, study: str) -> Volume:
             found=listed(gone),
             expected="all files beside it",
             hint="the whole disc, or --skip-bad to go on without them",
+            flags=["--skip-bad"],
         )
     return read_dicom(files, settings, study=study, others=Counter({GONE: len(gone)} if gone else {}))
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ...errors import FormatError, TomomeshError, UnreadableError
-from ..source import first_bytes, third_party
-from .dataset import read_dataset
-from .header import Frame, frames_of
-from .kinds import no_image
+from ..files.source import first_bytes, third_party
+from .headers.dataset import read_dataset
+from .headers.header import ImageFrame, frames_of
+from .headers.kinds import no_image
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,7 +30,7 @@ class Reading:
 
     Attributes
     ----------
-    frames : list of Frame
+    frames : list of ImageFrame
         The slices of all images.
     others : Counter
         How many files are no images, by reason.
@@ -38,7 +38,7 @@ class Reading:
         The files that are broken, with the error of each.
     """
 
-    frames: list[Frame] = field(default_factory=list)
+    frames: list[ImageFrame] = field(default_factory=list)
     others: Counter[str] = field(default_factory=Counter)
     bad: dict[Path, TomomeshError] = field(default_factory=dict)
 

@@ -9,20 +9,20 @@ import numpy as np
 
 from ...errors import FormatError
 from ...model.volume import Volume
-from ..source import counted
+from ..files.source import counted
 from .bad import leave_out
 from .files import read_frames
-from .kinds import SEGMENTED
-from .pixels import Decoder
-from .series import choose, stacks_among
-from .stack import Stack, stacked
-from .voxels import Gray, gray
+from .headers.kinds import SEGMENTED
+from .pixels.decoder import Decoder
+from .series.choice import choose, stacks_among
+from .series.stack import Stack, stacked
+from .series.voxels import Gray, gray
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from ...settings import ReadSettings
-    from .header import Frame
+    from .headers.header import ImageFrame
 
 
 def read_dicom(files: list[Path], settings: ReadSettings, *, study: str, others: Counter[str] | None = None) -> Volume:
@@ -101,7 +101,7 @@ def list_stacks(files: list[Path]) -> list[int]:
 
 
 def _decoded(
-    frames: list[Frame], decode: Decoder, settings: ReadSettings, study: str
+    frames: list[ImageFrame], decode: Decoder, settings: ReadSettings, study: str
 ) -> tuple[Stack, Gray, tuple[str, ...]]:
     """Stack and decode slices; those whose pixels turn out to be broken are refused, or left out and the rest stacked.
 

@@ -117,6 +117,7 @@ def project(
         weights[n] = 0.0
         if facing < FACING:
             continue
+        # Half as far above a sample counts as far as beside it: a vertex on its way down sees what it will see there.
         width = samples[p, 6]
         weights[n] = facing * facing * np.exp(-0.5 * (squared - 0.75 * over * over) / (width * width))
         total += weights[n]

@@ -21,9 +21,10 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
 
 BITS = 18
-"""Bits of a block's key for each axis."""
+"""Bits of a block's key for each axis. Three of them and 9 for a cube in its block fill a signed key of 64."""
 SIGHT = 2.5
-"""Standard deviations of a Gaussian weight that are looked at."""
+"""Standard deviations of a Gaussian weight that are looked at. The weight there is 4 % of the middle's, and all beyond
+have 4 % of the whole."""
 MOST = 1024
 """Neighbors that are looked at; more of them, in a cloud of repeated points, change nothing."""
 ENOUGH, TRIES, WIDER = 9, 3, 1.25

@@ -1,0 +1,97 @@
+"""What `tomomesh inspect` finds: what is in a study, or why it would be refused, and what to do next."""
+
+from __future__ import annotations
+
+import shlex
+from typing import TYPE_CHECKING, Any
+
+from ... import io
+from ...errors import FormatError, GeometryError, ResourceError, TomomeshError, UnreadableError
+from .next_step import next_step
+
+if TYPE_CHECKING:
+    from ...io import Listing, Series
+    from ...settings import Settings
+
+REFUSALS = (FormatError, GeometryError, ResourceError, UnreadableError)
+"""What reading raises because of the study; anything else is the user's or the program's fault."""
+
+
+def inspected(study: str, settings: Settings, *, typed: str = "") -> dict[str, Any]:
+    """Return what is in a study, ready for JSON and without any patient data.
+
+    Parameters
+    ----------
+    study : str
+        The path of the study.
+    settings : Settings
+        How it is read, and which part of it.
+    typed : str
+        What the user typed in its place, for the study of a stream.
+
+    Returns
+    -------
+    dict
+        What `survey` says where the study can be read; always `series`, all of a DICOM study, `segments`, those of a
+        DICOM segmentation, `left_out`, `refused` with the `exit_code` and the `error` of a run, None where it would go
+        on, and `next`, a command.
+
+    Raises
+    ------
+    TomomeshError
+        Where nothing can be said of the study.
+    """
+    listing = io.list_series(study, settings=settings.read)
+    found, fault = _surveyed(study, settings, listing)
+    series = [_series(one, alone=len(listing.series) == 1) for one in listing.series]
+    found |= {"series": series, "segments": dict(listing.segments), "left_out": dict(listing.left_out)}
+    found["refused"] = _refusal(fault)
+    if typed:
+        _rename(found, study, typed.split()[0])
+    path = f"./{study}" if study.startswith("-") else study  # else it would look like an option
+    return found | {"next": next_step(found, typed or shlex.quote(path), settings, fault, listing.series)}
+
+
+def _rename(found: dict[str, Any], study: str, name: str) -> None:
+    """Name the study in errors as it was typed, not the temporary file in its place."""
+    for one in (found, *found["series"]):
+        if one["refused"]:
+            one["refused"]["error"] = one["refused"]["error"].replace(study, name)
+
+
+def _surveyed(study: str, settings: Settings, listing: Listing) -> tuple[dict[str, Any], TomomeshError | None]:
+    """Return what is in a study, or the error that refuses it; a single file that is broken says nothing more."""
+    from ...segmentation.crop import crop
+    from ...segmentation.survey import survey
+
+    try:
+        volume = io.read_volume(study, settings=settings.read)
+    except REFUSALS as fault:
+        if listing.files > 1 or (listing.files and isinstance(fault, GeometryError)):
+            return {}, fault
+        raise
+    return survey(crop(volume, settings.crop, volume.thickest_axis())[0]), None
+
+
+def _series(series: Series, *, alone: bool) -> dict[str, Any]:
+    """Describe a series; its description, which people write freely, only where there is a choice to make."""
+    rows, columns = series.size
+    return {
+        "number": series.number,
+        "description": None if alone else series.description,
+        "modality": series.modality,
+        "slices": series.slices,
+        "rows": rows,
+        "columns": columns,
+        "pixel_mm": series.pixel_mm,
+        "distances_mm": series.slice_spacing.distances_mm,
+        "tilt_deg": series.slice_spacing.tilt_deg,
+        "missing": series.slice_spacing.missing,
+        "gaps_mm": series.slice_spacing.gaps_mm,
+        "repeats": series.slice_spacing.repeats,
+        "refused": _refusal(series.refused),
+    }
+
+
+def _refusal(fault: TomomeshError | None) -> dict[str, Any] | None:
+    return None if fault is None else {"exit_code": fault.exit_code, "error": str(fault)}

@@ -1,0 +1,81 @@
+"""The command that `tomomesh inspect` suggests."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ...settings import Settings, option_of, parameters
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from ...errors import TomomeshError
+    from ...io import Series
+
+VALUES = {"--spacing": "X Y Z", "--spacing-z": "MM"}
+"""What stands for the values that only the user knows."""
+SERIES, SELECT = "--series", "--select"
+
+
+def next_step(
+    found: dict[str, Any], study: str, settings: Settings, fault: TomomeshError | None, series: Sequence[Series]
+) -> str | None:
+    """Return the command that goes on: a first mesh, or `inspect` with the flag that helps; None where none does.
+
+    Parameters
+    ----------
+    found : dict
+        As `inspected` returns it.
+    study : str
+        Its words on a command line.
+    settings : Settings
+        Those given; the command repeats them.
+    fault : TomomeshError or None
+        What refuses the study.
+    series : sequence of Series
+        Those to choose from.
+    """
+    given = list(_given(settings))
+    if fault is None:
+        return " ".join(["tomomesh reconstruct", _first_try(found, study), *given, "-o mesh.stl"])
+    if SELECT in fault.flags:
+        chosen = f"--labels-in {study} {SELECT} {min(found['segments'], default='N')}"
+        return " ".join(["tomomesh reconstruct", chosen, *given, "-o mesh.stl"])
+    helping = list(_helping(fault, series))
+    return " ".join(["tomomesh inspect", study, *given, *helping]) if helping else None
+
+
+def _first_try(found: dict[str, Any], study: str) -> str:
+    """Name the study, and its largest label, bone, or nothing for Otsu's window."""
+    labels = found["labels"]
+    if labels:
+        return f"--labels-in {study} --select {max(labels, key=lambda label: labels[label])}"
+    bone = found["windows"].get("bone", {"share": 0})
+    return f"{study} --preset bone" if bone["share"] else study
+
+
+def _given(settings: Settings) -> Iterator[str]:
+    """Yield the options that differ from their defaults."""
+    sections, defaults = settings.to_dict(), Settings().to_dict()
+    for section, entry in parameters():
+        value = sections[section].get(entry.name)
+        if value not in (None, defaults[section].get(entry.name)):
+            values = value if isinstance(value, list) else [] if value is True else [value]
+            yield " ".join([option_of(entry.name), *(f"{one:.10g}" for one in values)])
+
+
+def _helping(fault: TomomeshError, series: Sequence[Series]) -> Iterator[str]:
+    """Yield the flags that a refusal names; for a choice of series, the best one's number and what it needs."""
+    flags = [*fault.flags]
+    if SERIES in flags:
+        best = max(series, key=_promise)
+        yield f"{SERIES} {best.number}"
+        flags += best.refused.flags if best.refused else ()
+    for flag in dict.fromkeys(flags):
+        if flag != SERIES:
+            yield f"{flag} {VALUES[flag]}" if flag in VALUES else flag
+
+
+def _promise(series: Series) -> tuple[bool, int, int]:
+    """Rank series: those that can be read, or that a flag helps, then by their slices, the first of equals."""
+    return series.refused is None or bool(series.refused.flags), series.slices, -series.number

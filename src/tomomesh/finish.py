@@ -1,0 +1,147 @@
+"""What becomes of a mesh at the end of every way: judged, made coarser, checked, made a part to print, measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .decimation import decimate, faces_under
+from .errors import GeometryError
+from .measure.report import assess, compare
+from .measure.topology import check_promise
+from .printing.part import make_part
+from .results import LEAST
+from .stage import Stage, folded, timed
+
+if TYPE_CHECKING:
+    from .model.mesh import TriMesh
+    from .progress import Progress
+    from .results import Surface
+    from .settings import Settings
+    from .stage import Later
+
+PLAUSIBLE = 0.15
+"""Difference from the volume of the rings over which a result is warned of."""
+FAR = 2.0
+"""Distance of the surface from one point in twenty, slice distances, from which a result is warned of."""
+
+
+def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage[Surface], tuple[Later, ...]]:
+    """Hand a mesh on as it is promised and asked for; return also what is measured once the report is read.
+
+    Parameters
+    ----------
+    made : Surface
+        As its way has left it.
+    settings : Settings
+    progress : callable
+
+    Raises
+    ------
+    GeometryError
+        Where it has two walls, or is not what is promised.
+    """
+    checked = _check(made, settings)
+    coarse = _coarsen(checked.value, settings)
+    part = _print(coarse.value, settings, progress)
+    surface = part.value
+    later: list[Later] = [partial(_measure, surface, settings, progress)]
+    if surface.part is not None:
+        later.append(partial(_judge_part, surface))
+    return folded(surface, checked, coarse, part), tuple(later)
+
+
+@timed("truth")
+def compare_with(surface: Surface, truth: TriMesh) -> Stage[None]:
+    """Measure the distance to the exact surface, both ways; the caps are no part of it."""
+    return Stage(None, {"truth": compare(surface.mesh, truth, leave_out=surface.cap_faces)})
+
+
+@timed("quality")
+def _check(made: Surface, settings: Settings) -> Stage[Surface]:
+    check_promise(made.mesh, cavities=made.cavities, open_=made.borders)
+    share = float(made.mesh.face_volumes.sum()) / made.encloses_mm3 if made.encloses_mm3 else 1.0
+    if share >= LEAST:
+        return Stage(made)
+    if settings.cubes.allow_leaks:
+        return Stage(made, warnings=(f"the mesh encloses {share:.1%} of what it should: it may have two walls",))
+    raise GeometryError(
+        "the surface has two walls, or does not follow its window",
+        found=f"{share:.1%} of the volume that its points or its window enclose",
+        expected=f"at least {LEAST:.0%}",
+        hint="caps at both ends, a larger --cell-mm or --closing, --network none, or --allow-leaks",
+    )
+
+
+def _coarsen(made: Surface, settings: Settings) -> Stage[Surface]:
+    """Leave the mesh the faces that were asked for."""
+    most = settings.run.target_faces
+    if most is None or len(made.mesh.faces) <= most:
+        return Stage(made)
+    coarse = _decimate(made, most, settings)
+    return folded(coarse.value, coarse, _check(coarse.value, settings))
+
+
+@timed("decimate")
+def _decimate(made: Surface, most: int, settings: Settings) -> Stage[Surface]:
+    mesh = decimate(made.mesh, most, cavities=made.cavities, threads=settings.run.threads)
+    coarse = replace(made, mesh=mesh, nearest=np.empty(0, np.int32), crossing=None)
+    if made.filled is None:
+        return Stage(coarse)
+    filled = made.filled[faces_under(mesh, made.mesh)]
+    return Stage(replace(coarse, filled=filled), {"fit": {"filled_faces": int(filled.sum())}})
+
+
+def _print(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:
+    """Make the part to print, where one is asked for; the surface and what is measured of it stay."""
+    return _make_part(made, settings, progress) if settings.printing.asked else Stage(made)
+
+
+@timed("print")
+def _make_part(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:
+    unit = "mm" if made.place is None else made.place.unit
+    return Stage(replace(made, part=make_part(made.mesh, settings, unit=unit, progress=progress)))
+
+
+@timed("print")
+def _judge_part(made: Surface) -> Stage[None]:
+    """Tell whether the part can be printed."""
+    assert made.part is not None
+    return Stage(None, {"print": made.part.report})
+
+
+@timed("quality")
+def _measure(made: Surface, settings: Settings, progress: Progress) -> Stage[None]:
+    """Measure the mesh, against what it rests on too."""
+    places = made.points.positions if made.rests_on is None else made.rests_on
+    quality = assess(
+        made.mesh, points=places, cavities=made.cavities, crossing=made.crossing, threads=settings.run.threads,
+        progress=progress,
+    )  # fmt: skip
+    warnings = [*_beside_rings(made, quality), *_far_from_points(made, quality)]
+    if quality["self_intersections"]:
+        warnings.append(f"{quality['self_intersections']} faces pass through others")
+    return Stage(None, {"quality": quality}, tuple(warnings))
+
+
+def _beside_rings(made: Surface, quality: dict[str, Any]) -> list[str]:
+    """Compare the volume of the mesh with the areas of the rings times the distance of their slices."""
+    rings = 0.0 if made.segmentation is None else made.segmentation.sampling.volume_mm3
+    if rings <= 0:
+        return []
+    quality["rings_volume_mm3"] = rings
+    quality["volume_over_rings"] = over = quality["volume_mm3"] / rings
+    return [f"the mesh encloses {over:.0%} of the volume of its rings"] if abs(over - 1) > PLAUSIBLE else []
+
+
+def _far_from_points(made: Surface, quality: dict[str, Any]) -> list[str]:
+    far = quality.get("points_to_surface_p95_mm", 0.0)
+    if made.segmentation is None or far <= FAR * made.segmentation.volume.spacing_mm[2]:
+        return []
+    return [
+        f"one point in twenty lies over {far:.3g} mm from the surface: it does not follow the window there, "
+        "as --network none and --contours loops do"
+    ]

@@ -1,0 +1,80 @@
+"""LAS and LAZ, the formats of airborne and mobile scans, through laspy."""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import FormatError
+from ..files.extras import required
+from ..files.limits import require_bytes, require_memory, require_rows
+from ..files.source import first_bytes, third_party
+from .laz import check_chunks
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ..fields import Cloud
+
+CARRIED = ("intensity", "classification", "red", "green", "blue", "nir")
+"""What is taken of a point beside its position and the file's own extra dimensions; the rest is the scan's."""
+
+HEAD = struct.Struct("<4s90xHII")
+"""The beginning of a header: its mark, its own bytes, those up to the points, and how many records are between."""
+
+RECORD_BYTES = 54
+"""Least bytes of one of those records: their headers (LAS 1.4, variable length records)."""
+
+POINTS_AT_ONCE = 1 << 18
+"""Points read at a time, at most 17 MB of them: a count that lies is found before much is allocated."""
+
+
+def read_las(path: Path) -> Cloud:
+    """Read a LAS or LAZ file of any version and point format that laspy knows."""
+    file = str(path)
+    _check_head(path)
+    laspy = required("laspy", file=file)
+    if path.suffix.lower() == ".laz":
+        required("lazrs", file=file)
+    with (
+        third_party("laspy", file),
+        # one thread: the parallel decoder takes memory for whatever a chunk's entry in their table says
+        laspy.open(path, read_evlrs=False, laz_backend=laspy.LazBackend.Lazrs) as reader,
+    ):
+        _check_promises(path, reader.header)
+        names = [name for name in reader.header.point_format.dimension_names if name in CARRIED]
+        names += reader.header.point_format.extra_dimension_names
+        chunks = [_columns(chunk, names) for chunk in reader.chunk_iterator(POINTS_AT_ONCE)]
+        require_rows(reader.header.point_count, sum(len(chunk[""]) for chunk in chunks), "points", file=file)
+    if not chunks:
+        return np.empty((0, 3)), {}
+    columns = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
+    return columns.pop(""), columns
+
+
+def _check_head(path: Path) -> None:
+    """Compare the sizes of what stands before the points with the file; laspy believes them."""
+    head = first_bytes(path, HEAD.size)
+    require_bytes(HEAD.size, len(head), file=str(path))
+    mark, size, start, records = HEAD.unpack(head)
+    if mark != b"LASF" or size + records * RECORD_BYTES > start:
+        raise FormatError("the LAS header cannot be understood", file=str(path))
+    require_bytes(start, path.stat().st_size, file=str(path))
+
+
+def _check_promises(path: Path, header: Any) -> None:
+    """Compare the count of points with the file's bytes, where compressed that of the chunks, and the memory."""
+    size = header.point_count * header.point_format.size
+    if header.are_points_compressed:
+        check_chunks(path, header)
+    else:
+        require_bytes(header.offset_to_point_data + size, path.stat().st_size, file=str(path))
+    require_memory(size, file=str(path))
+
+
+def _columns(chunk: Any, names: list[str]) -> dict[str, Any]:
+    """Return a chunk's positions, under the empty name, and its fields."""
+    positions = np.stack([np.array(chunk[axis], np.float64) for axis in ("x", "y", "z")], axis=1)
+    return {"": positions, **{name: np.array(chunk[name]) for name in names}}

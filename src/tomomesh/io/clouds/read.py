@@ -1,0 +1,96 @@
+"""A cloud from a file, by its suffix."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ...errors import EmptyError
+from ...settings import CloudSettings
+from ..dicom import is_dicom
+from ..dicom.objects.structures import read_structure
+from ..fields import point_set
+from ..files.source import existing_file, reader_of, suffix_of, whole
+from ..finite import check_finite
+from ..meshes.read import MESH_READERS
+from .arrays import read_npy, read_npz
+from .delimited import read_obj, read_text
+from .e57 import read_e57
+from .las import read_las
+from .pcd import read_pcd
+from .ply_vertices import read_ply
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from ...model.points import PointSet
+    from ..fields import Cloud
+
+
+def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> PointSet:
+    """Read a cloud.
+
+    Parameters
+    ----------
+    path : path
+        ``.ply`` (text or binary); ``.xyz``, ``.txt`` or ``.csv`` (the columns named x, y and z, else the first
+        three); ``.npy`` with an (n, 3) array or named fields; ``.npz`` with ``points`` or the like; ``.pcd``;
+        ``.las``, ``.laz`` and ``.e57`` (with the extra ``clouds``, which compressed ``.pcd`` needs too); or the
+        vertices of ``.obj``, ``.off`` and ``.stl`` (its equal positions become one vertex); or a DICOM RT Structure
+        Set, of which one structure's contours are taken.
+    settings : CloudSettings, optional
+        What to do where the file leaves a choice.
+
+    Returns
+    -------
+    PointSet
+        Positions as the file has them, in its own unit. What else it says of each point is in ``attributes``,
+        colors as uint8 ``red``, ``green`` and ``blue``; normals are passed over. Files that `write_points` wrote
+        bring back slices, neurons and kinds.
+
+    Raises
+    ------
+    UnreadableError
+        Where the file is missing or may not be read.
+    FormatError
+        For text, NaN, ragged rows (it names the row), a count that lies, unknown suffixes, and a format whose
+        package is not installed.
+    GeometryError
+        Where a structure must be chosen, or its contours are no stack.
+    EmptyError
+        For a file without points.
+    ResourceError
+        For a file that would not fit into the memory.
+    """
+    path = existing_file(path)
+    if suffix_of(path) not in POINT_READERS and is_dicom(path):
+        return read_structure(path, settings or CloudSettings())
+    positions, fields = reader_of(path, POINT_READERS)(path)
+    if len(positions) == 0:
+        raise EmptyError("the cloud has no points", file=str(path))
+    check_finite(positions, "row", file=str(path))
+    return point_set(positions, fields)
+
+
+def _read_vertices(path: Path) -> Cloud:
+    """Read the vertices of a mesh."""
+    vertices, _ = reader_of(path, MESH_READERS)(whole(path), str(path))
+    return vertices, {}
+
+
+POINT_READERS: dict[str, Callable[[Path], Cloud]] = {
+    ".ply": read_ply,
+    ".xyz": read_text,
+    ".txt": read_text,
+    ".csv": read_text,
+    ".npy": read_npy,
+    ".npz": read_npz,
+    ".pcd": read_pcd,
+    ".las": read_las,
+    ".laz": read_las,
+    ".e57": read_e57,
+    ".obj": read_obj,
+    ".off": _read_vertices,
+    ".stl": _read_vertices,
+}
+"""Suffix to reader."""

@@ -1,0 +1,168 @@
+"""What the headers of DICOM files say of each slice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ....errors import FormatError
+from ...files.limits import require_rows
+from ...files.source import third_party
+from ...volumes.gray import check_scale
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+GROUPS = {
+    "ImagePositionPatient": "PlanePositionSequence",
+    "ImageOrientationPatient": "PlaneOrientationSequence",
+    "PixelSpacing": "PixelMeasuresSequence",
+    "RescaleSlope": "PixelValueTransformationSequence",
+    "RescaleIntercept": "PixelValueTransformationSequence",
+    "StackID": "FrameContentSequence",
+}
+"""The functional group of an enhanced file that holds each field of a plain one."""
+
+PER_FRAME, SHARED = "PerFrameFunctionalGroupsSequence", "SharedFunctionalGroupsSequence"
+
+
+@dataclass(frozen=True)
+class ImageFrame:
+    """One slice: where it is, and how its stored numbers become gray levels.
+
+    Attributes
+    ----------
+    path : Path
+        Its file.
+    number : int
+        Its place within the file, from 0.
+    header : pydicom Dataset
+        The file's header, without pixels.
+    size : (rows, columns)
+        In pixels.
+    position : (3,) float array or None
+        Center of the first pixel, millimeters, LPS.
+    axes : (2, 3) float array or None
+        Directions in which the column and the row number rise.
+    spacing : (2,) float array or None
+        Distance of the columns and of the rows, mm.
+    scale : (slope, intercept)
+        Of the gray levels.
+    stack : str
+        Which of the stacks of an enhanced file it belongs to.
+    """
+
+    path: Path
+    number: int
+    header: Any
+    size: tuple[int, int]
+    position: NDArray[np.float64] | None
+    axes: NDArray[np.float64] | None
+    spacing: NDArray[np.float64] | None
+    scale: tuple[float, float]
+    stack: str = ""
+
+    @property
+    def instance(self) -> int | None:
+        """The number of the slice within its series, for files without positions."""
+        value = numbers(self.header.get("InstanceNumber"), 1, "InstanceNumber", self.path.name)
+        if value is None:
+            return self.number if "NumberOfFrames" in self.header else None
+        return int(value[0]) + self.number
+
+
+def frames_of(path: Path, header: Any) -> list[ImageFrame]:
+    """Return one frame for a plain file, and all of an enhanced or multi-frame file.
+
+    Raises
+    ------
+    FormatError
+        For fields that are no numbers, too short or too long, or of no meaning.
+    """
+    with third_party("pydicom", path.name):
+        count = _count(header, "NumberOfFrames", path.name, missing=1)
+        require_rows(count, path.stat().st_size, "frames of a byte", file=path.name)
+        per_frame, shared = header.get(PER_FRAME) or [], header.get(SHARED) or []
+        if len(per_frame) not in (0, count):
+            raise FormatError(
+                "the frames do not match their descriptions",
+                file=path.name,
+                found=f"NumberOfFrames = {count}, descriptions = {len(per_frame)}",
+            )
+        groups = [[*per_frame[number : number + 1], *shared[:1]] for number in range(count)]
+        return [_frame(path, header, number, groups[number]) for number in range(count)]
+
+
+def _frame(path: Path, header: Any, number: int, groups: list[Any]) -> ImageFrame:
+    name = path.name
+
+    def field(keyword: str, count: int) -> NDArray[np.float64] | None:
+        return numbers(_find(header, groups, keyword), count, keyword, name)
+
+    axes, spacing = field("ImageOrientationPatient", 6), field("PixelSpacing", 2)
+    slope, intercept = field("RescaleSlope", 1), field("RescaleIntercept", 1)
+    scale = (1.0 if slope is None else float(slope[0]), 0.0 if intercept is None else float(intercept[0]))
+    check_scale(*scale, file=name)
+    return ImageFrame(
+        path,
+        number,
+        header,
+        (_count(header, "Rows", name), _count(header, "Columns", name)),
+        None if _stacked_without_place(header) else field("ImagePositionPatient", 3),
+        None if axes is None else axes.reshape(2, 3),
+        None if spacing is None else spacing[::-1],  # stored: rows first
+        scale,
+        str(_find(header, groups, "StackID") or ""),
+    )
+
+
+def _find(header: Any, groups: list[Any], keyword: str) -> Any:
+    """Return a field of a frame: from its own functional groups, those of all frames, or the header."""
+    for group in groups:
+        items = group.get(GROUPS[keyword])
+        if items and keyword in items[0]:
+            return items[0].get(keyword)
+    return header.get(keyword)
+
+
+def _stacked_without_place(header: Any) -> bool:
+    """Tell whether a file holds several frames but one position at most: it is the first frame's only."""
+    frames = header.get("NumberOfFrames")
+    return frames is not None and int(frames) > 1 and PER_FRAME not in header
+
+
+def _count(header: Any, keyword: str, name: str, missing: int = 0) -> int:
+    value = numbers(header.get(keyword), 1, keyword, name)
+    count = missing if value is None else value[0]
+    if not (count >= 1 and float(count).is_integer()):
+        raise FormatError("a size is invalid", file=name, found=f"{keyword} = {count:g}", expected="at least 1")
+    return int(count)
+
+
+def numbers(value: Any, count: int, keyword: str, name: str) -> NDArray[np.float64] | None:
+    """Return a field's numbers, None where it is missing or empty.
+
+    Raises
+    ------
+    FormatError
+        Where they are no numbers, or not as many as they must be.
+    """
+    if value is None or (isinstance(value, str) and not value.strip()) or value == []:
+        return None
+    values = [value] if isinstance(value, (str, int, float)) else list(value)
+    try:
+        found = np.array([float(one) for one in values])
+    except (TypeError, ValueError):
+        raise FormatError("a field holds no numbers", file=name, found=keyword) from None
+    if len(found) != count:
+        raise FormatError(
+            "a field has too few or too many numbers",
+            file=name,
+            found=f"{keyword} = {len(found)} numbers",
+            expected=f"{count}",
+        )
+    return found

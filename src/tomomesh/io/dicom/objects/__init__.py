@@ -1,0 +1,1 @@
+"""DICOM objects that hold no image: segmentations, and structure sets of contours."""

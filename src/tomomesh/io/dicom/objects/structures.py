@@ -1,0 +1,198 @@
+"""DICOM RT Structure Sets: the closed contours of one structure as rings of points, each with its slice."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ....errors import EmptyError, FormatError, GeometryError, ResourceError, TomomeshError, UsageError
+from ....model.points import NEURON, RING, PointSet
+from ...files.source import counted, third_party
+from ..headers.dataset import read_dataset
+from ..headers.kinds import STRUCTURES, storage_class
+from ..headers.names import shown
+from .contours import CLOSED, corners_of
+from .planes import planes_of
+from .rings import filled, parted, pieces_of, thinned
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from ....settings import CloudSettings
+
+    Floats = NDArray[np.float64]
+
+FINEST, FINE = 0.1, 0.3
+"""Distances of the points on a contour, in distances of the slices: corners that are nearer are left out; longer sides
+get points."""
+MOST_POINTS = 20_000_000
+"""Points that a structure may have: their positions alone are half a gigabyte."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A structure of the set.
+
+    Attributes
+    ----------
+    number : int
+        Its number in the table, from 1.
+    name : str
+        As the file has it.
+    contours : list of pydicom Dataset
+        The closed ones.
+    others : Counter
+        How many others there are, by their kind.
+    """
+
+    number: int
+    name: str
+    contours: list[Any]
+    others: Counter[str]
+
+    def __str__(self) -> str:
+        return f"{self.number}: {shown(self.name)}"
+
+
+def read_structure(path: Path, settings: CloudSettings) -> PointSet:
+    """Read the closed planar contours of one structure.
+
+    Parameters
+    ----------
+    path : Path
+    settings : CloudSettings
+        `structure` chooses, where there are several.
+
+    Returns
+    -------
+    PointSet
+        Points along the contours, in millimeters, LPS; the slices rise along the normal of the contours' planes, and
+        the attribute ``ring`` tells the contours of a slice apart. Contours within others are holes.
+
+    Raises
+    ------
+    FormatError
+        For a broken file, and a contour that is; it names the contour.
+    GeometryError
+        Where a structure must be chosen, or its contours do not lie in parallel planes.
+    EmptyError
+        Where the structure has no closed contours, or all on one slice.
+    UsageError
+        For a structure that there is not.
+    ResourceError
+        Where the contours are so long beside the distance of the slices that their points would not fit.
+    """
+    if storage_class(path) != STRUCTURES:
+        raise FormatError(
+            "the DICOM file holds no contours", file=str(path), expected="an RT Structure Set",
+            hint="tomomesh reconstruct, for slices and segmentations",
+        )  # fmt: skip
+    structures = _listed(path)
+    taken = _chosen(structures, settings.structure, file=str(path))
+    with third_party("pydicom", path.name):
+        where = f"structure {taken.number}"
+        corners = corners_of(taken.contours, where=where, file=path.name, skip_flat=settings.skip_flat)
+    planes = planes_of(corners, file=str(path))
+    points = _points(corners, planes.labels, float(np.median(np.diff(planes.heights))), file=str(path))
+    notes = [f"structure {taken} of {len(structures)}, {len(corners)} contours on {len(planes.heights)} slices"]
+    if taken.others:
+        notes.append(f"contours that are not closed, left out: {counted(taken.others)}")
+    if flat := len(taken.contours) - len(corners):
+        notes.append(f"contours that enclose nothing, left out: {flat}")
+    return replace(points, frame="LPS", notes=tuple(notes))
+
+
+def _listed(path: Path) -> list[Structure]:
+    """Return the structures in the order of the file."""
+    with third_party("pydicom", path.name):
+        data = read_dataset(path)
+        drawn: dict[str, list[Any]] = {}
+        for one in data.get("ROIContourSequence") or []:
+            drawn.setdefault(str(one.get("ReferencedROINumber")), []).extend(one.get("ContourSequence") or [])
+        return [
+            _structure(n, str(one.get("ROIName") or ""), drawn.get(str(one.get("ROINumber")), []))
+            for n, one in enumerate(data.get("StructureSetROISequence") or [], 1)
+        ]
+
+
+def _structure(number: int, name: str, items: Sequence[Any]) -> Structure:
+    kinds = [str(item.get("ContourGeometricType") or "no type") for item in items]
+    closed = [item for item, kind in zip(items, kinds, strict=True) if kind in CLOSED]
+    return Structure(number, name, closed, Counter(shown(kind) for kind in kinds if kind not in CLOSED))
+
+
+def _chosen(structures: list[Structure], wanted: str | None, *, file: str) -> Structure:
+    """Return the structure that is wanted, or the only one that has closed contours."""
+    closed = [one for one in structures if one.contours]
+    if wanted is not None:
+        found = [one for one in structures if str(one.number) == wanted.strip()]
+        found = found or [one for one in structures if wanted.strip() in (one.name.strip(), shown(one.name))]
+    else:
+        found = closed
+    if len(found) > 1:
+        what = "several structures could be meant" if wanted else f"the file holds {len(found)} structures"
+        raise GeometryError(
+            what, file=file, found=_table(structures, file), expected="one structure", hint="--structure N"
+        )
+    if wanted is not None and not found:
+        raise UsageError(
+            "there is no such structure", file=file, found=_table(structures, file),
+            expected="--structure with a number or a name of the table",
+        )  # fmt: skip
+    if not found or not found[0].contours:
+        held = _table(found or structures, file) or "0 structures"
+        raise EmptyError("there are no closed contours", file=file, found=held, expected=" or ".join(CLOSED))
+    return found[0]
+
+
+def _table(structures: list[Structure], file: str) -> str:
+    """Put structures into words: number, name, contours, slices."""
+    return "; ".join(f"{one}, contours {len(one.contours)}, slices {_slices(one, file)}" for one in structures)
+
+
+def _slices(structure: Structure, file: str) -> str:
+    if len(structure.contours) < 2:
+        return str(len(structure.contours))
+    try:
+        with third_party("pydicom", file):
+            corners = corners_of(structure.contours, where="", file=file, skip_flat=True)
+            return str(len(planes_of(corners, file=file).heights))
+    except EmptyError:
+        return "1"
+    except TomomeshError:
+        return "unknown"
+
+
+def _points(contours: list[Floats], labels: NDArray[np.int64], apart: float, *, file: str) -> PointSet:
+    """Draw contours as points as far apart as their corners are as a rule, as is fit for slices that far `apart`."""
+    rings = [
+        (thinned(ring, FINEST * apart), int(label))
+        for contour, label in zip(contours, labels, strict=True)
+        for ring in parted(contour)
+    ]
+    rings.sort(key=lambda one: one[1])
+    sides = [np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1) for ring, _ in rings]
+    distance = min(float(np.median(np.concatenate(sides))), FINE * apart)
+    pieces = [pieces_of(ring, distance) for ring, _ in rings]
+    if (total := sum(float(one.sum()) for one in pieces)) > MOST_POINTS:
+        raise ResourceError(
+            "the contours are too long beside the distance of their points", file=file,
+            found=f"{total:.3g} points {distance:.3g} mm apart", expected=f"at most {MOST_POINTS}",
+        )  # fmt: skip
+    drawn = [filled(ring, one.astype(np.int64)) for (ring, _), one in zip(rings, pieces, strict=True)]
+    lengths, slices = [len(one) for one in drawn], np.array([label for _, label in rings])
+    numbers = np.arange(len(rings)) - np.searchsorted(slices, slices)
+    count = sum(lengths)
+    return PointSet(
+        np.concatenate(drawn),
+        np.repeat(slices, lengths).astype(np.int32),
+        np.concatenate([np.arange(n) for n in lengths]).astype(np.int32),
+        np.full(count, NEURON, np.uint8),
+        {RING: np.repeat(numbers, lengths).astype(np.int32)},
+    )

@@ -1,0 +1,73 @@
+"""How much a file may promise."""
+
+from __future__ import annotations
+
+import os
+
+from ...errors import FormatError, ResourceError
+
+FALLBACK_BYTES = 16 * 2**30
+"""The limit where the machine does not say how much memory it has, as Windows does not: that of a usual workstation."""
+
+
+def require_memory(promised: int, *, file: str) -> None:
+    """Refuse data that cannot fit into the machine's memory, before any of them is allocated.
+
+    Raises
+    ------
+    ResourceError
+        Where `promised` bytes are more than the physical memory.
+    """
+    held = physical_memory()
+    if promised > held:
+        raise ResourceError(
+            "the data do not fit into the memory",
+            file=file,
+            found=f"size = {promised} bytes",
+            expected=f"at most {held} bytes",
+            hint="a part of it, or a machine with more memory",
+        )
+
+
+def require_bytes(promised: int, found: int, *, file: str) -> None:
+    """Refuse a file that holds fewer bytes than its header promises.
+
+    Raises
+    ------
+    FormatError
+        Where `found` is below `promised`.
+    """
+    if found < promised:
+        raise FormatError(
+            "the file is cut off",
+            file=file,
+            found=f"data = {found} bytes",
+            expected=f"{promised} bytes, as its header promises",
+            hint="a fresh copy of the file",
+        )
+
+
+def require_rows(promised: int, found: int, what: str, *, file: str) -> None:
+    """Refuse a file that holds fewer points, or whatever `what` names, than its header promises.
+
+    Raises
+    ------
+    FormatError
+        Where `found` is below `promised`.
+    """
+    if found < promised:
+        raise FormatError(
+            "the file is cut off",
+            file=file,
+            found=f"{what} = {found}",
+            expected=f"{promised}, as its header promises",
+            hint="a fresh copy of the file",
+        )
+
+
+def physical_memory() -> int:
+    """Return the machine's memory in bytes."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return FALLBACK_BYTES

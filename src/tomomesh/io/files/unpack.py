@@ -1,0 +1,145 @@
+"""Bytes of voxels, packed or not: never more than a header promised, and nothing for what a file cannot hold."""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import io
+import zlib
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from ...errors import FormatError, ResourceError, UnreadableError
+from .limits import require_bytes, require_memory
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+PLAIN, GZIP, ZLIB, BZIP2 = "raw", "gzip", "zlib", "bzip2"
+
+RATIOS = {PLAIN: 1, GZIP: 1032, ZLIB: 1032, BZIP2: 2**21}
+"""No stream of a packing holds more than this many times its own bytes: zlib's own limit (its technical details), and
+the power of two above what bzip2 makes of zeros, 1.3 million to one (measured)."""
+
+SURPLUS_BYTES = 2**26
+"""A packed stream that goes on for longer after its voxels is a bomb: these are a slice of 8,192 squared bytes."""
+
+BYTES_AT_ONCE = 2**24
+"""Bytes that are asked for together."""
+
+
+class _Zlib(io.RawIOBase):
+    """A zlib stream as a file; the standard library has that for gzip and bzip2 only."""
+
+    def __init__(self, file: Any) -> None:
+        self._file, self._unpacker = file, zlib.decompressobj()
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        while not self._unpacker.eof:
+            packed = self._unpacker.unconsumed_tail or self._file.read(2**16)
+            data = self._unpacker.decompress(packed, len(buffer))
+            if data:
+                buffer[: len(data)] = data
+                return len(data)
+            if not packed:
+                raise EOFError
+        return 0
+
+
+@contextmanager
+def unpacked(path: Path, packing: str, *, file: str, start: int = 0) -> Iterator[Any]:
+    """Open what stands in a file from byte `start` on, as a binary stream.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    packing : str
+        ``PLAIN``, ``GZIP``, ``ZLIB`` or ``BZIP2``.
+    file : str
+        Its name for errors.
+    start : int
+        Bytes before.
+
+    Raises
+    ------
+    FormatError
+        For a damaged stream.
+    UnreadableError
+        Where the file cannot be read.
+    """
+    try:
+        with path.open("rb") as plain:
+            plain.seek(start)
+            with _opened(plain, packing) as stream:
+                yield stream
+    except (EOFError, zlib.error, OSError) as fault:
+        # what unpacks raises an OSError without a number for bad data
+        if isinstance(fault, OSError) and fault.errno is not None:
+            raise UnreadableError("the file cannot be read", file=file, found=fault.strerror or "") from None
+        raise FormatError(
+            "the compressed file is damaged",
+            file=file,
+            found=f"{packing} = {type(fault).__name__}",
+            expected=f"a whole {packing} stream with the right check sum",
+            hint="a fresh copy of the file",
+        ) from None
+
+
+def _opened(plain: Any, packing: str) -> Any:
+    if packing == GZIP:
+        return gzip.GzipFile(fileobj=plain, mode="rb")
+    if packing == BZIP2:
+        return bz2.BZ2File(plain)
+    return _Zlib(plain) if packing == ZLIB else plain
+
+
+def check_promise(promised: int, held: int, packing: str, *, file: str) -> None:
+    """Compare the bytes that a header promises with the memory, and with what so many packed bytes can hold.
+
+    Raises
+    ------
+    ResourceError
+        Where they do not fit into the memory.
+    FormatError
+        Where the file cannot hold them.
+    """
+    require_memory(promised, file=file)
+    require_bytes(promised, max(held, 0) * RATIOS[packing], file=file)
+
+
+def fill(data: NDArray[Any], stream: Any, *, file: str) -> None:
+    """Read as many bytes as an array of bytes (n,) has, and the rest of a packed stream for its check sum.
+
+    Raises
+    ------
+    FormatError
+        Where the stream holds fewer.
+    ResourceError
+        Where a packed stream goes on far beyond them.
+    """
+    done = 0
+    while done < len(data) and (count := stream.readinto(data.data[done : done + BYTES_AT_ONCE])):
+        done += count
+    require_bytes(len(data), done, file=file)
+    if isinstance(stream, (gzip.GzipFile, bz2.BZ2File, _Zlib)):
+        _drain(stream, file)
+
+
+def _drain(stream: Any, file: str) -> None:
+    surplus = 0
+    while chunk := stream.read(2**20):
+        surplus += len(chunk)
+        if surplus > SURPLUS_BYTES:
+            raise ResourceError(
+                "the compressed file goes on far beyond its voxels",
+                file=file,
+                found=f"surplus = {surplus} bytes and more",
+                expected=f"at most {SURPLUS_BYTES} bytes",
+            )

@@ -1,0 +1,76 @@
+"""GLB, binary glTF 2.0, which browsers and 3D viewers show, through trimesh.
+
+The numbers are those of the mesh; the node's matrix carries them to what glTF demands, meters with y up and z to the
+front, and ``extras`` of the mesh name unit and frame.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..colors import named_colors
+from ..files.atomic import replacing
+from .written import single
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ...model.mesh import TriMesh
+    from ..fields import Fields
+    from .written import Written
+
+METERS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
+"""Meters in a unit; an unknown one stays as it is."""
+
+TURNS = {"LPS": ((1, 0, 0), (0, 0, 1), (0, -1, 0)), "RAS": ((-1, 0, 0), (0, 0, 1), (0, 1, 0))}
+"""Frame to the rows of its rotation to +x left, +y superior, +z anterior; others stay as they are."""
+
+
+def write_glb(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+    """Write 32-bit coordinates, colors, and other fields at vertices as 32-bit attributes ``_NAME``.
+
+    Raises
+    ------
+    OutputError
+        Where 32 bits cannot keep the vertices apart.
+    """
+    import trimesh
+    from trimesh.exchange.gltf import export_glb
+
+    colors, attributes = _at_vertices(beside.vertex_fields)
+    body = trimesh.Trimesh(
+        single(mesh.vertices, path, kind="GLB"),
+        mesh.faces,
+        vertex_colors=colors,
+        vertex_attributes=attributes,
+        metadata={"unit": beside.unit, "frame": beside.frame},
+        process=False,
+    )
+    scene = trimesh.Scene()
+    scene.add_geometry(body, node_name="mesh", geom_name="mesh", transform=_to_gltf(beside))
+    data = export_glb(scene, include_normals=False, tree_postprocessor=lambda tree: _finish(tree, beside))
+    with replacing(path) as file:
+        file.write(data)
+
+
+def _at_vertices(fields: Fields) -> tuple[Any, Fields]:
+    """Part the colors, None where there are none, from the other fields."""
+    names, colors = named_colors(fields) or ([], None)
+    return colors, {f"_{name.upper()}": values.astype("<f4") for name, values in fields.items() if name not in names}
+
+
+def _to_gltf(beside: Written) -> Any:
+    matrix = np.eye(4)
+    matrix[:3, :3] = METERS.get(beside.unit, 1.0) * np.array(TURNS.get(beside.frame, np.eye(3)))
+    return matrix
+
+
+def _finish(tree: dict[str, Any], beside: Written) -> None:
+    """Name the program, and drop the bounds of attributes, which glTF does not need: JSON has no word for NaN."""
+    tree["asset"]["generator"] = beside.head
+    attributes = tree["meshes"][0]["primitives"][0]["attributes"]
+    for number in (number for name, number in attributes.items() if name.startswith("_")):
+        for bound in ("min", "max"):
+            tree["accessors"][number].pop(bound, None)

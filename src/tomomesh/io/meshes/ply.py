@@ -1,0 +1,208 @@
+"""PLY: its header, which says how many bytes must follow, and meshes in and out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import FormatError
+from ..fields import AXES
+from ..files.atomic import replacing
+from ..files.limits import require_bytes
+from .through_trimesh import loaded
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from ...model.mesh import TriMesh
+    from ..fields import Fields
+    from .through_trimesh import Arrays
+    from .written import Written
+
+TYPE_NAMES = {
+    "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
+    "i4": "int", "u4": "uint", "f4": "float", "f8": "double",
+}  # fmt: skip
+"""NumPy's codes of the types of properties to PLY's names."""
+
+TYPE_CODES = {
+    **{name: code for code, name in TYPE_NAMES.items()},
+    **{f"{word}{8 * size}": f"{word[0]}{size}" for word in ("int", "uint") for size in (1, 2, 4)},
+    "float32": "f4",
+    "float64": "f8",
+}
+"""Every name of a type to NumPy's code."""
+
+BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+"""The formats to their byte orders."""
+
+
+@dataclass(frozen=True)
+class PlyElement:
+    """One kind of row: its name, how many there are, and the words that declare each property."""
+
+    name: str
+    count: int
+    properties: tuple[tuple[str, ...], ...]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the properties."""
+        return [words[-1] for words in self.properties]
+
+    @property
+    def has_lists(self) -> bool:
+        """Whether rows differ in length."""
+        return any(words[0] == "list" for words in self.properties)
+
+    def types(self, order: str) -> list[np.dtype[Any]]:
+        """Return the type of each property; of a list, that of its length."""
+        kinds = [words[1] if words[0] == "list" else words[0] for words in self.properties]
+        return [np.dtype(order + TYPE_CODES[kind]) for kind in kinds]
+
+    def least_bytes(self, text: bool) -> int:
+        """Return the fewest bytes that all rows can take: lists are empty, numbers have one digit."""
+        types = self.types("")
+        return self.count * (2 * len(types) if text else sum(kind.itemsize for kind in types))
+
+
+@dataclass(frozen=True)
+class PlyHeader:
+    """What a PLY file promises.
+
+    Attributes
+    ----------
+    format : str
+        One of `BYTE_ORDERS`.
+    elements : tuple of PlyElement
+        In the order of the file.
+    length : int
+        Bytes up to the first row.
+    """
+
+    format: str
+    elements: tuple[PlyElement, ...]
+    length: int
+
+    def before(self, name: str) -> tuple[tuple[PlyElement, ...], PlyElement]:
+        """Return an element by its name, an empty one where there is none, and those before it."""
+        names = [one.name for one in self.elements]
+        at = names.index(name) if name in names else len(names)
+        return self.elements[:at], (*self.elements, PlyElement(name, 0, ()))[at]
+
+
+def parse_header(data: bytes, *, file: str) -> PlyHeader:
+    """Read a PLY header and compare what it promises with what the file holds.
+
+    Raises
+    ------
+    FormatError
+        For a header that is broken, or promises more than there is.
+    """
+    end = data.find(b"end_header")
+    length = data.find(b"\n", end) + 1
+    lines = [line.split() for line in data[: max(end, 0)].decode("ascii", "replace").splitlines()]
+    if end < 0 or length == 0 or len(lines) < 2 or lines[0] != ["ply"]:
+        raise FormatError("the file has no PLY header", file=file, expected="ply ... end_header")
+    try:
+        header = PlyHeader(_format(lines), tuple(_elements(lines)), length)
+        text = header.format == "ascii"
+        promised = sum(element.least_bytes(text) for element in header.elements)
+    except (IndexError, KeyError, ValueError):
+        raise FormatError("the PLY header cannot be understood", file=file) from None
+    # the last row of a text needs no line end
+    require_bytes(promised - (1 if text else 0), len(data) - length, file=file)
+    return header
+
+
+def _format(lines: list[list[str]]) -> str:
+    name = next((words[1] for words in lines if words[:1] == ["format"]), "")
+    if name not in BYTE_ORDERS:
+        raise ValueError(name)
+    return name
+
+
+def _elements(lines: list[list[str]]) -> list[PlyElement]:
+    found: list[tuple[str, int, list[tuple[str, ...]]]] = []
+    for words in lines:
+        if words[:1] == ["element"]:
+            if int(words[2]) < 0:
+                raise ValueError(words[2])
+            found.append((words[1], int(words[2]), []))
+        elif words[:1] == ["property"]:
+            found[-1][2].append(tuple(words[1:]))
+    return [PlyElement(name, count, tuple(properties)) for name, count, properties in found]
+
+
+def read_ply_mesh(data: bytes, file: str) -> Arrays:
+    """Read vertices and faces, once the header is known to promise no more than there is."""
+    parse_header(data, file=file)
+    return loaded("ply", data, file)
+
+
+def write_ply_mesh(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+    """Write 64-bit coordinates with all fields, of vertices and of faces."""
+    positions = dict(zip(AXES, np.asarray(mesh.vertices, np.float64).T, strict=True))
+    write_ply(path, beside.head, {**positions, **beside.vertex_fields}, mesh.faces, beside.face_fields)
+
+
+def write_ply(
+    path: str | Path,
+    comment: str,
+    vertices: Mapping[str, NDArray[Any]],
+    faces: NDArray[np.int64] | None = None,
+    face_fields: Mapping[str, NDArray[Any]] | None = None,
+) -> None:
+    """Write a binary PLY file, little-endian.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    comment : str
+        Goes into the header.
+    vertices : mapping of str to (n,) array
+        One column a property; integers that PLY has no type for become doubles.
+    faces : (m, 3) int array, optional
+        Vertex numbers.
+    face_fields : mapping of str to (m,) array, optional
+        Properties of the faces, behind their vertices.
+    """
+    lines = ["ply", "format binary_little_endian 1.0", f"comment {comment}"]
+    columns: Fields = {name: _storable(column) for name, column in vertices.items()}
+    body = [_rows(columns)]
+    lines += [f"element vertex {len(body[0])}", *_properties(columns)]
+    if faces is not None:
+        columns = {name: _storable(column) for name, column in (face_fields or {}).items()}
+        corners: Fields = {"count": np.full(len(faces), 3, np.uint8), "corners": faces.astype(np.int32)}
+        body.append(_rows({**corners, **columns}))
+        lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", *_properties(columns)]
+    with replacing(path) as file:
+        file.write(("\n".join([*lines, "end_header"]) + "\n").encode("ascii"))
+        file.writelines(rows.tobytes() for rows in body)
+
+
+def _storable(column: NDArray[Any]) -> NDArray[Any]:
+    """Return a column in a type that PLY has."""
+    if column.dtype.str[1:] in TYPE_NAMES:
+        return column
+    if column.dtype.kind == "f":
+        return column.astype(np.float32 if column.dtype.itemsize < 4 else np.float64)
+    return column.astype(np.int32 if np.array_equal(column.astype(np.int32), column) else np.float64)
+
+
+def _rows(columns: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+    kinds = [(name, column.dtype.newbyteorder("<"), column.shape[1:]) for name, column in columns.items()]
+    rows = np.empty(len(next(iter(columns.values()))), kinds)
+    for name, column in columns.items():
+        rows[name] = column
+    return rows
+
+
+def _properties(columns: Mapping[str, NDArray[Any]]) -> list[str]:
+    return [f"property {TYPE_NAMES[column.dtype.str[1:]]} {name}" for name, column in columns.items()]

@@ -1,0 +1,62 @@
+"""A triangle mesh from a file, by its suffix."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from ...errors import EmptyError, FormatError
+from ...model.mesh import TriMesh
+from ..files.source import existing_file, reader_of, whole
+from ..finite import check_finite
+from .ply import read_ply_mesh
+from .stl import read_stl
+from .through_trimesh import loaded
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from .through_trimesh import Arrays
+
+
+def read_mesh(path: str | Path) -> TriMesh:
+    """Read a triangle mesh.
+
+    Parameters
+    ----------
+    path : path
+        ``.stl`` (its equal positions become one vertex), ``.ply``, ``.obj`` or ``.off``.
+
+    Raises
+    ------
+    UnreadableError
+        Where the file is missing or may not be read.
+    FormatError
+        For broken files, vertices that are not finite, and unknown suffixes.
+    EmptyError
+        For a file without faces.
+    """
+    path = existing_file(path)
+    read, file = reader_of(path, MESH_READERS), str(path)
+    vertices, faces = read(whole(path), file)
+    if len(faces) == 0:
+        raise EmptyError("the mesh has no faces", file=file)
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise FormatError(
+            "a face names a vertex that there is not",
+            file=file,
+            found=f"vertex numbers = {faces.min()} to {faces.max()}",
+            expected=f"0 to {len(vertices) - 1}",
+        )
+    check_finite(vertices, "vertex", file=file)
+    return TriMesh(vertices, faces)
+
+
+MESH_READERS: dict[str, Callable[[bytes, str], Arrays]] = {
+    ".stl": read_stl,
+    ".ply": read_ply_mesh,
+    ".obj": partial(loaded, "obj"),
+    ".off": partial(loaded, "off"),
+}
+"""Suffix to reader of vertices and faces."""

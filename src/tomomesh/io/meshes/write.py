@@ -1,0 +1,93 @@
+"""A triangle mesh to a file, by its suffix."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ...model.points import COLORS
+from ..fields import AXES, flat_columns
+from ..files.atomic import check_output
+from ..files.source import suffix_of
+from .gifti import write_gifti
+from .glb import write_glb
+from .obj import write_obj
+from .off import write_off
+from .ply import write_ply_mesh
+from .stl import write_stl
+from .threemf import write_3mf
+from .vtp import write_vtp_mesh
+from .written import Written
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from ...model.mesh import TriMesh
+
+
+def write_mesh(
+    mesh: TriMesh,
+    path: str | Path,
+    *,
+    unit: str = "mm",
+    frame: str = "LPS",
+    vertex_fields: Mapping[str, NDArray[Any]] | None = None,
+    face_fields: Mapping[str, NDArray[Any]] | None = None,
+) -> None:
+    """Write a triangle mesh; the same mesh gives the same bytes.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        Its coordinates are written as they are.
+    path : path
+        ``.ply`` and ``.vtp`` (binary), ``.obj``, ``.off`` and ``.3mf`` (text) keep 64-bit coordinates; ``.stl``,
+        ``.glb`` and ``.gii`` (binary) 32-bit ones.
+    unit, frame : str
+        What the coordinates are in, named in the file.
+    vertex_fields : mapping of str to (n,) or (n, c) array, optional
+        Numbers at the vertices. PLY, VTP, GLB and GIFTI keep them all, OBJ, OFF and 3MF the colors (``red``,
+        ``green`` and ``blue``), STL none.
+    face_fields : mapping of str to (m,) or (m, c) array, optional
+        Numbers on the faces, kept by PLY and VTP.
+
+    Raises
+    ------
+    UsageError
+        For a suffix that has no writer, and fields of another length or without numbers.
+    OutputError
+        Where the file cannot be written, the format cannot keep distinct vertices apart, or needs a unit.
+    """
+    check_output(path, MESH_WRITERS)
+    at_vertices = flat_columns(vertex_fields or {}, len(mesh.vertices), AXES)
+    on_faces = flat_columns(face_fields or {}, len(mesh.faces), ["count", "corners", "vertex_indices"])
+    MESH_WRITERS[suffix_of(path)](mesh, path, Written(unit, frame, at_vertices, on_faces))
+
+
+KEEP_ALL = (".ply", ".vtp")
+KEEP_AT_VERTICES = (".glb", ".gii")
+KEEP_COLORS = (".obj", ".off", ".3mf")
+"""Suffixes by the fields that the format keeps: all, those at vertices, and the colors at vertices."""
+
+
+def keeps(path: str | Path, field: str, *, on_faces: bool = False) -> bool:
+    """Whether the format of a mesh file keeps a field."""
+    suffix = suffix_of(path)
+    if on_faces or suffix in KEEP_ALL:
+        return suffix in KEEP_ALL
+    return suffix in KEEP_AT_VERTICES or (suffix in KEEP_COLORS and field in COLORS)
+
+
+MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, Written], None]] = {
+    ".stl": write_stl,
+    ".ply": write_ply_mesh,
+    ".obj": write_obj,
+    ".off": write_off,
+    ".glb": write_glb,
+    ".vtp": write_vtp_mesh,
+    ".3mf": write_3mf,
+    ".gii": write_gifti,
+}
+"""Suffix to writer."""

@@ -1,0 +1,72 @@
+"""What every writer of meshes is given beside the mesh, and what 32-bit formats ask of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import OutputError
+from ..files.signature import signature
+from .weld import weld
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from ..fields import Fields
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a writer is given beside the mesh.
+
+    Attributes
+    ----------
+    unit, frame : str
+        What the coordinates are in.
+    vertex_fields, face_fields : dict of str to (n,) or (m,) array
+        Single columns of numbers, by name.
+    """
+
+    unit: str
+    frame: str
+    vertex_fields: Fields
+    face_fields: Fields
+
+    @property
+    def head(self) -> str:
+        """One line about the file: program, version, unit and frame."""
+        return signature(self.unit, self.frame)
+
+
+def single(vertices: NDArray[np.float64], path: str | Path, *, kind: str) -> NDArray[np.float32]:
+    """Return 32-bit coordinates, if they still tell the vertices apart.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float array
+        Positions.
+    path : path
+        The output.
+    kind : str
+        Name of the format, for the error.
+
+    Raises
+    ------
+    OutputError
+        Where two vertices would fall together, or a coordinate is too large.
+    """
+    with np.errstate(over="ignore"):
+        narrow = vertices.astype(np.float32)
+    kept = np.isfinite(narrow).all() and len(weld(narrow.astype(np.float64))[0]) == len(weld(vertices)[0])
+    if not kept:
+        raise OutputError(
+            f"the 32-bit coordinates of {kind} cannot keep the vertices apart",
+            file=str(path),
+            found=f"largest coordinate = {np.abs(vertices).max():g}",
+            hint="a .ply file, which keeps 64 bits, or --local-origin for a cloud",
+        )
+    return narrow

@@ -1,0 +1,1 @@
+"""Studies: the volume, the slices or the series behind a path, whatever holds them."""

@@ -1,0 +1,176 @@
+"""A study from whatever holds it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from ...errors import FormatError, UnreadableError
+from ...settings import ReadSettings
+from ..dicom import index_in, is_dicom, is_index, is_segmentation, lone_object, read_dicom, read_index
+from ..dicom.headers.kinds import STRUCTURES, storage_class
+from ..dicom.objects.segmentation import read_segmentation
+from ..files.archive import unpacked_zip
+from ..files.source import counted, existing, existing_file, regular_files, suffix_of
+from ..volumes.images import FAMILIES, read_images
+from ..volumes.metaimage import read_metaimage
+from ..volumes.mgh import read_mgh
+from ..volumes.nifti import read_nifti
+from ..volumes.npy import read_npy_volume
+from ..volumes.nrrd import read_nrrd
+from ..volumes.tiff import read_tiff
+from ..volumes.zarr.omezarr import is_zarr, read_omezarr
+from .slices import slices_in
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from ...model.volume import Volume
+
+
+def _read_one_dicom(
+    path: Path, settings: ReadSettings, select: Sequence[int] | None = None, *, study: str = ""
+) -> Volume:
+    study = study or str(path)
+    if storage_class(path) == STRUCTURES:
+        raise FormatError(
+            "the file holds contours, no voxels",
+            file=study,
+            found="an RT Structure Set",
+            hint=f"tomomesh surface {path.name} --structure N, which takes one of its structures",
+        )
+    if is_segmentation(path):
+        return read_segmentation(path, settings, study=study, select=select)
+    return read_dicom([path], settings, study=study)
+
+
+def _read_zip(path: Path, settings: ReadSettings, select: Sequence[int] | None = None) -> Volume:
+    """Read the slices in an archive, or the only volume; archives inside it are not opened."""
+    with unpacked_zip(path) as folder:
+        files, _ = regular_files(folder, deep=True)
+        stores = [folder] if is_zarr(folder) else [path for path in folder.iterdir() if path.is_dir() and is_zarr(path)]
+        whole = stores + [file for file in volumes_among(files) if suffix_of(file) != ".zip"]
+        one = len(whole) == 1 and not any(map(is_dicom, files))
+        return read_volume(whole[0] if one else folder, settings=settings, select=select)
+
+
+VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
+    ".nii": read_nifti,
+    ".nii.gz": read_nifti,
+    ".hdr": read_nifti,
+    ".hdr.gz": read_nifti,
+    ".img": read_nifti,
+    ".img.gz": read_nifti,
+    ".nrrd": read_nrrd,
+    ".nhdr": read_nrrd,
+    ".mha": read_metaimage,
+    ".mhd": read_metaimage,
+    ".mgh": read_mgh,
+    ".mgz": read_mgh,
+    ".npy": read_npy_volume,
+    ".tif": read_tiff,
+    ".tiff": read_tiff,
+    ".dcm": _read_one_dicom,
+    ".ima": _read_one_dicom,
+    ".zip": _read_zip,
+}
+"""Suffix of a single file to its reader; folders, and DICOM of any name, are known by their content."""
+
+READABLE = "a folder of DICOM, PNG, TIFF or JPEG slices, of OME-Zarr, a DICOM file, " + " | ".join(
+    suffix for suffix in VOLUME_READERS if suffix not in (".dcm", ".ima")
+)
+
+
+VOXELS = (".img", ".img.gz")
+"""Suffixes of files that belong to a header beside them."""
+
+
+def volumes_among(files: Sequence[Path]) -> list[Path]:
+    """Return the volume files among some; of a NIfTI pair its header alone."""
+    return [path for path in files if suffix_of(path) in VOLUME_READERS and suffix_of(path) not in VOXELS]
+
+
+def read_volume(
+    path: str | Path, *, settings: ReadSettings | None = None, select: Sequence[int] | None = None
+) -> Volume:
+    """Read a study.
+
+    Parameters
+    ----------
+    path : path
+        A DICOM, NIfTI, NRRD, MetaImage, MGH, NPY or multi-page TIFF file, a folder of DICOM, PNG, TIFF or JPEG
+        slices or of OME-Zarr, a DICOMDIR, or a zip file of one of these.
+    settings : ReadSettings, optional
+        What to do where the files leave a choice.
+    select : sequence of int, optional
+        The labels that are wanted. Of a DICOM segmentation, whose segments may overlap, only these are read; any other
+        label map is read whole.
+
+    Returns
+    -------
+    Volume
+        Voxels in canonical order with their affine, patient millimeters, LPS; its `notes` say what was
+        decided on the way.
+
+    Raises
+    ------
+    UnreadableError
+        Where the path is missing, empty or may not be read.
+    FormatError
+        For files that are broken or of an unknown kind.
+    GeometryError
+        Where the geometry is inconsistent, or needs a flag.
+    UsageError
+        For a series that there is not.
+    ResourceError
+        Where the voxels do not fit into the memory.
+    """
+    path, settings = existing(path), settings or ReadSettings()
+    if path.is_dir() and is_zarr(path):
+        return read_omezarr(path, settings)
+    if path.is_dir():
+        return _read_folder(path, settings, select)
+    existing_file(path)
+    if is_index(path):
+        return read_index(path, settings, study=str(path))
+    reader = VOLUME_READERS.get(suffix_of(path))
+    if reader is _read_one_dicom or (reader is None and is_dicom(path)):
+        return _read_one_dicom(path, settings, select)
+    if reader is _read_zip:
+        return _read_zip(path, settings, select)
+    if reader is None:
+        raise FormatError(
+            "the file is of an unknown kind",
+            file=str(path),
+            found=f"suffix = {suffix_of(path) or 'none'}",
+            expected=READABLE,
+            hint="the folder of the slices" if suffix_of(path) in FAMILIES else "",
+        )
+    return reader(path, settings)
+
+
+def _read_folder(folder: Path, settings: ReadSettings, select: Sequence[int] | None) -> Volume:
+    """Read what its DICOMDIR names, all DICOM below it, or its images; where it holds none, those of sub-folders."""
+    if (index := index_in(folder)) is not None:
+        return read_index(index, settings, study=str(folder))
+    slices = slices_in(folder)
+    if (alone := lone_object(slices.dicom)) is not None:
+        return _read_one_dicom(alone, settings, select, study=str(folder))
+    if slices.dicom:
+        return read_dicom(slices.dicom, settings, study=str(folder), others=slices.others)
+    if slices.images:
+        return read_images(slices.images, settings, folder=str(folder))
+    others = slices.others + Counter(_kind(path) for path in slices.rest)
+    if not others:
+        raise UnreadableError("the folder is empty", file=str(folder), expected=READABLE)
+    raise FormatError(
+        f"0 of {sum(others.values())} files are images",
+        file=str(folder),
+        found=counted(others),
+        expected=READABLE,
+    )
+
+
+def _kind(path: Path) -> str:
+    return f"{suffix_of(path)} files" if suffix_of(path) in VOLUME_READERS else "of an unknown kind"

@@ -1,0 +1,105 @@
+"""Stored numbers to gray levels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import FormatError, GeometryError
+
+if TYPE_CHECKING:
+    from numpy.typing import DTypeLike, NDArray
+
+
+def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
+    """Return real numbers in the machine's own byte order.
+
+    Raises
+    ------
+    FormatError
+        For complex and other kinds of voxels.
+    """
+    if voxels.dtype.kind not in "iuf" or voxels.dtype.itemsize > 8:
+        raise FormatError(
+            "the voxels are of a kind that cannot be read",
+            file=file,
+            found=f"data type = {voxels.dtype}",
+            expected="integers or real numbers of at most 64 bits",
+        )
+    return voxels.astype(voxels.dtype.newbyteorder("="), copy=False)
+
+
+def check_scale(slope: float, intercept: float, *, file: str) -> None:
+    """Refuse a scale that would wipe out or invalidate the gray levels.
+
+    Raises
+    ------
+    FormatError
+        For a slope of 0, and for NaN or infinite values.
+    """
+    if slope == 0 or not np.isfinite([slope, intercept]).all():
+        raise FormatError(
+            "the scale of the gray levels is invalid",
+            file=file,
+            found=f"slope = {slope:g}, intercept = {intercept:g}",
+            expected="finite numbers, slope not 0",
+        )
+
+
+def scaled(stored: NDArray[Any], slope: float, intercept: float, dtype: DTypeLike) -> NDArray[Any]:
+    """Return ``slope * stored + intercept``, computed and kept in `dtype`."""
+    if slope == 1 and intercept == 0:
+        return stored.astype(dtype, copy=False)
+    kind: Any = np.dtype(dtype).type
+    return np.asarray(stored.astype(dtype) * kind(slope) + kind(intercept))
+
+
+def scaled_dtype(dtype: DTypeLike, scales: list[tuple[float, float]], bits: int = 64) -> np.dtype[Any]:
+    """Return the smallest type that keeps all gray levels: an integer where the scales are integral.
+
+    Parameters
+    ----------
+    dtype : data type
+        Of the stored numbers.
+    scales : list of (slope, intercept)
+        All scales in use.
+    bits : int
+        How many bits of a stored integer are in use.
+    """
+    stored = np.dtype(dtype)
+    if all(scale == (1, 0) for scale in scales):
+        return stored
+    if stored.kind != "f" and all(float(value).is_integer() for scale in scales for value in scale):
+        bits = min(bits, 8 * stored.itemsize)
+        low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1)) if stored.kind == "i" else (0, 2**bits)
+        ends = [int(slope) * end + int(intercept) for slope, intercept in scales for end in (low, high)]
+        for kind in (np.int16, np.int32):
+            if np.iinfo(kind).min <= min(ends) and max(ends) - 1 <= np.iinfo(kind).max:
+                return np.dtype(kind)
+    return np.dtype(np.float32 if stored.itemsize <= 2 or stored == np.float32 else np.float64)
+
+
+def without_holes(voxels: NDArray[Any], *, file: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """Set NaN and infinite voxels to the lowest finite gray level, and count them.
+
+    Raises
+    ------
+    GeometryError
+        Where more than half of the voxels are affected.
+    """
+    if voxels.dtype.kind != "f":
+        return voxels, ()
+    holes = ~np.isfinite(voxels)
+    count = int(holes.sum())
+    if 2 * count > voxels.size:
+        raise GeometryError(
+            "more than half of the voxels are no numbers",
+            file=file,
+            found=f"NaN or infinite = {count} of {voxels.size}",
+        )
+    if count == 0:
+        return voxels, ()
+    return np.where(holes, voxels.min(where=~holes, initial=np.inf), voxels), (
+        f"NaN or infinite voxels set to the background: {count}",
+    )

@@ -1,0 +1,144 @@
+"""PNG, TIFF and JPEG slices in a folder."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import FormatError, GeometryError, ResourceError
+from ...model.volume import Volume
+from ...settings import ReadSettings
+from ..files.limits import require_memory
+from ..files.source import existing_file, suffix_of, third_party
+from .affine import required_spacing, upright
+from .gray import native, without_holes
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+
+FAMILIES = {".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF", ".jpg": "JPEG", ".jpeg": "JPEG"}
+"""Suffixes of slices, and the format behind each."""
+
+CONVERTED_MODES = {"RGB": "RGB", "RGBA": "RGB", "P": "RGB", "1": "L", "LA": "L"}
+"""Pillow's modes that are turned into another before they are read."""
+
+GRAY_MODES = ("L", "I", "F", "I;16", "I;16B", "I;16L")
+"""Pillow's modes of one channel."""
+
+
+def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Volume:
+    """Stack slices in the natural order of their names.
+
+    Parameters
+    ----------
+    files : list of Path
+        PNG, TIFF or JPEG files, of one kind.
+    settings : ReadSettings
+        `spacing` must be given: such files hold none.
+    folder : str
+        The path as the user typed it.
+
+    Returns
+    -------
+    Volume
+        Columns run to +x (left), rows to +y (posterior), slices to +z (superior); the origin is 0.
+
+    Raises
+    ------
+    FormatError
+        For a slice that cannot be read, several pages in a file, or mixed kinds.
+    GeometryError
+        Without `spacing`, or where the slices differ in size.
+    ResourceError
+        Where the stack does not fit into the memory.
+    """
+    kinds = sorted({FAMILIES[suffix_of(path)] for path in files})
+    if len(kinds) > 1:
+        raise FormatError(
+            "the folder holds slices of several kinds",
+            file=folder,
+            found=" and ".join(kinds),
+            expected="one kind",
+        )
+    spacing = required_spacing(settings.spacing, file=folder, what=f"{kinds[0]} slices hold no spacing")
+    ordered = sorted(files, key=natural)
+    first = _pixels(ordered[0])
+    require_memory(first.nbytes * len(ordered), file=folder)
+    stack = np.empty((len(ordered), *first.shape), first.dtype)
+    for k, path in enumerate(ordered):
+        pixels = _pixels(path)
+        _check_same_kind(pixels, first, path.name, ordered[0].name)
+        stack[k] = pixels
+    voxels, notes = without_holes(stack, file=folder)
+    note = f"{len(ordered)} {kinds[0]} slices in the order of their names: columns left, rows back, slices up"
+    return Volume.from_stored(voxels, upright(spacing), notes=(note, *notes))
+
+
+def read_picture(path: str | Path) -> Volume:
+    """Read one PNG, TIFF or JPEG picture as a slice of pixels of 1 mm.
+
+    Raises
+    ------
+    UnreadableError, FormatError
+        Where it is missing, or no such picture.
+    """
+    file = existing_file(path)
+    if suffix_of(file) not in FAMILIES:
+        found = f"suffix = {suffix_of(file) or 'none'}"
+        raise FormatError(
+            "the picture is of an unknown kind", file=str(path), found=found, expected="PNG, TIFF or JPEG"
+        )
+    return read_images([file], ReadSettings(spacing=(1.0, 1.0, 1.0)), folder=str(path))
+
+
+def natural(path: Path) -> tuple[list[tuple[int, int, str]], str]:
+    """Order names as people do: slice 2 before slice 10."""
+    parts = re.split(r"([0-9]+)", path.name)
+    return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in parts if part], str(path)
+
+
+def _pixels(path: Path) -> NDArray[Any]:
+    """Return one slice, (J, I) or (J, I, 3)."""
+    from PIL import Image
+
+    with third_party("Pillow", path.name):
+        try:
+            image = Image.open(path, formats=tuple(set(FAMILIES.values())))
+        except Image.DecompressionBombError:
+            raise ResourceError("the slice is too large to be read", file=path.name) from None
+        with image:
+            require_memory(image.width * image.height * 4, file=path.name)
+            if getattr(image, "n_frames", 1) > 1:
+                raise FormatError("the file holds several pages", file=path.name, expected="one slice a file")
+            image.load()
+            pixels = np.asarray(image.convert(CONVERTED_MODES[image.mode]) if image.mode in CONVERTED_MODES else image)
+            if image.mode not in CONVERTED_MODES and image.mode not in GRAY_MODES:
+                raise FormatError(
+                    "the slice's colors cannot be read",
+                    file=path.name,
+                    found=f"mode = {image.mode}",
+                    expected="gray or RGB",
+                )
+    return native(pixels, file=path.name)
+
+
+def _check_same_kind(pixels: NDArray[Any], first: NDArray[Any], name: str, first_name: str) -> None:
+    if pixels.shape[:2] != first.shape[:2]:
+        raise GeometryError(
+            f"the slice differs in size from {first_name}",
+            file=name,
+            found=f"size = {pixels.shape[1]} x {pixels.shape[0]}",
+            expected=f"{first.shape[1]} x {first.shape[0]}",
+        )
+    if pixels.shape != first.shape or pixels.dtype != first.dtype:
+        raise FormatError(
+            f"the slice is of another kind than {first_name}",
+            file=name,
+            found=f"pixels = {pixels.dtype}{pixels.shape[2:] or ''}",
+            expected=f"{first.dtype}{first.shape[2:] or ''}",
+        )

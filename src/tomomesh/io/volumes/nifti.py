@@ -1,0 +1,144 @@
+"""NIfTI studies, in one file or as a pair of header and voxels: RAS becomes LPS here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import FormatError, GeometryError
+from ...model.volume import Volume
+from ..files.detached import beside
+from ..files.source import existing_file, suffix_of, third_party
+from ..files.unpack import GZIP, PLAIN, check_promise, fill, unpacked
+from .affine import (
+    GIVEN,
+    SMALLEST_SPACING,
+    SPACING_HINT,
+    brought_to_mm,
+    check_affine,
+    check_spacing,
+    passed_over,
+    upright,
+)
+from .gray import native, scaled, scaled_dtype, without_holes
+from .nifti_header import NIFTI_HEADERS, NiftiLayout, layout_of, unpack_header
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from ...settings import ReadSettings
+
+FLIP = np.diag([-1.0, -1.0, 1.0, 1.0])
+"""RAS to LPS and back."""
+
+NIFTI_UNITS_MM = {0: 1.0, 1: 1000.0, 2: 1.0, 3: 0.001}
+"""Millimeters in the header's units of space (nifti1.h): unknown, meter, millimeter, micron."""
+
+PAIRED = {".hdr": ".img", ".img": ".hdr"}
+"""Suffixes of a pair of files, and their partners'."""
+
+UNPLACED = "no orientation in the file (sform_code = qform_code = 0): taken for columns right, rows front, slices up"
+"""The note on a file of the standard's method 1."""
+
+
+def read_nifti(path: Path, settings: ReadSettings) -> Volume:
+    """Read a study from a ``.nii`` file or from a ``.hdr`` and its ``.img``, each packed by gzip or not.
+
+    Parameters
+    ----------
+    path : Path
+        The file; of a pair, either, and the other one beside it.
+    settings : ReadSettings
+        `spacing` stands in for a frame that the file does not hold.
+
+    Returns
+    -------
+    Volume
+        In patient millimeters, LPS. The sform is used where its code is not 0, else the qform, else the pixel sizes
+        alone, with a note: the standard's method 1, x = pixdim[1] i to the right, y = pixdim[2] j to the front,
+        z = pixdim[3] k up.
+
+    Raises
+    ------
+    UnreadableError, FormatError, GeometryError, ResourceError
+        As the header or the voxels demand; `GeometryError` too for Analyze 7.5 without a `spacing`.
+    """
+    name = str(path)
+    front, back = _files(existing_file(path))
+    with unpacked(front, _packing(front), file=name) as stream:
+        header = unpack_header(stream.read(max(NIFTI_HEADERS)), settings, paired=front != back, file=name)
+    layout = layout_of(header, paired=front != back, file=name)
+    affine, notes = _frame(header, settings, name)
+    check_promise(layout.offset + layout.promised, back.stat().st_size, _packing(back), file=name)
+    data = np.empty(layout.promised, np.uint8)
+    with unpacked(back, _packing(back), file=name) as stream:
+        stream.seek(layout.offset)
+        fill(data, stream, file=name)
+    stored, more = _gray(data, layout, name)
+    return Volume.from_stored(stored, affine, notes=notes + more)
+
+
+def _packing(path: Path) -> str:
+    return GZIP if suffix_of(path).endswith(".gz") else PLAIN
+
+
+def _files(path: Path) -> tuple[Path, Path]:
+    """Return the file with the header and that with the voxels; never one outside of the folder."""
+    plain = path.with_suffix("") if _packing(path) == GZIP else path
+    suffix = plain.suffix.lower()
+    if suffix not in PAIRED:
+        return path, path
+    other = PAIRED[suffix].upper() if plain.suffix.isupper() else PAIRED[suffix]
+    names = [plain.with_suffix(other + packed).name for packed in ("", ".gz")]
+    found = [name for name in names if path.with_name(name).exists()]
+    if not found:
+        raise FormatError(
+            "the other file of the pair is missing",
+            file=str(path),
+            expected=f"{names[0]} beside it",
+            hint="the header together with its voxels",
+        )
+    partner = beside(path, found[0])
+    return (path, partner) if suffix == ".hdr" else (partner, path)
+
+
+def _frame(header: Any, settings: ReadSettings, name: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Return the affine in millimeters, LPS, and notes."""
+    pixdim = [float(size) for size in header["pixdim"][1:4]]
+    forms = [form for form in ("sform", "qform") if int(header[f"{form}_code"]) > 0]
+    broken = not forms or not all(SMALLEST_SPACING <= size < np.inf for size in pixdim)
+    if settings.spacing and broken:
+        return upright(settings.spacing), (GIVEN,)
+    check_spacing(pixdim, ["pixdim[1]", "pixdim[2]", "pixdim[3]"], file=name, hint=SPACING_HINT)
+    with third_party("nibabel", name):
+        affine = getattr(header, f"get_{forms[0]}")() if forms else upright(pixdim)
+    unit, notes = _unit(header, name)
+    affine = np.diag([unit, unit, unit, 1.0]) @ FLIP @ np.asarray(affine, np.float64)
+    check_affine(affine, file=name, hint="a file with a valid sform")
+    return affine, (() if forms else (UNPLACED,)) + notes + passed_over(settings.spacing)
+
+
+def _unit(header: Any, name: str) -> tuple[float, tuple[str, ...]]:
+    code = int(header["xyzt_units"]) & 7
+    if code not in NIFTI_UNITS_MM:
+        raise GeometryError(
+            "the unit of the coordinates is unknown",
+            file=name,
+            found=f"xyzt_units = {code}",
+            expected="0 to 3",
+        )
+    factor = NIFTI_UNITS_MM[code]
+    return factor, brought_to_mm(factor)
+
+
+def _gray(data: NDArray[np.uint8], layout: NiftiLayout, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """Return voxels (K, J, I[, 3]); they are stored fastest axis first."""
+    shape = layout.shape[::-1]
+    if layout.dtype.names:
+        return data.reshape(*shape, len(layout.dtype.names))[..., :3], ()
+    stored = native(data.view(layout.dtype).reshape(shape), file=name)
+    dtype = scaled_dtype(stored.dtype, [(layout.slope, layout.intercept)])
+    return without_holes(scaled(stored, layout.slope, layout.intercept, dtype), file=name)

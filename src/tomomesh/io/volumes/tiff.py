@@ -1,0 +1,200 @@
+"""Multi-page TIFF: OME-TIFF and ImageJ's with their spacing, others with ``--spacing``; through tifffile.
+
+Pillow, which reads single slices, knows neither of them, no BigTIFF and few kinds of numbers. tifffile is one module on
+NumPy; files packed by LZW, JPEG and others need imagecodecs too, 20 MB of compiled code: hence the extra ``tiff``.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+
+from ...errors import FormatError
+from ...model.volume import Volume
+from ..files.extras import required
+from ..files.limits import require_bytes, require_memory
+from ..files.source import existing_file, third_party
+from .affine import GIVEN, UNTURNED, check_spacing, passed_over, required_spacing, upright
+from .gray import native
+from .raster import gray_or_color
+from .tiff_pages import check_chain
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from ...settings import ReadSettings
+
+STACKS = ("ZYX", "IYX", "QYX", "ZYXS", "IYXS", "QYXS")
+"""tifffile's letters for the axes of a stack: Z, or pages of an unknown kind; S is a color."""
+
+UNPACKED_WITHOUT = (1, 8, 32946)
+"""Compressions, none and deflate, that need no further package."""
+
+TIFF_RATIO = 2**14
+"""A packed byte is never taken to hold more bytes of voxels: ten times what deflate (1,032) and LZW (1,243, measured on
+zeros) reach."""
+
+TIFF_UNITS_MM = {
+    "nm": 1e-6, "µm": 1e-3, "μm": 1e-3, "um": 1e-3, "micron": 1e-3, "\\u00b5m": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3,
+    "inch": 25.4,
+}  # fmt: skip
+"""Millimeters in the units of OME-XML and of ImageJ."""
+
+Spacing = tuple[tuple[float, ...], tuple[str, ...]]
+"""Distances along columns, rows and slices, and the unit of each."""
+
+
+def read_tiff(path: Path, settings: ReadSettings) -> Volume:
+    """Read a stack from the pages of one file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; files that it names beside it are not opened.
+    settings : ReadSettings
+        `spacing` stands in for one that the file does not hold.
+
+    Returns
+    -------
+    Volume
+        Columns run to +x (left), rows to +y (posterior), slices to +z (superior); the origin is 0.
+
+    Raises
+    ------
+    UnreadableError, FormatError, GeometryError, ResourceError
+        As the pages demand; `FormatError` too where the package is not installed.
+    """
+    name = str(existing_file(path))
+    tifffile = required("tifffile", file=name)
+    check_chain(path, file=name)
+    with _complaints_refused(name), third_party("tifffile", name), tifffile.TiffFile(path, _multifile=False) as pages:
+        series = _only(pages.series, name)
+        _check_promise(series, path.stat().st_size, name)
+        spacing, notes = _spacing(pages, settings, name)
+        stored = native(series.asarray(), file=name)
+        if stored.shape != series.shape:
+            raise ValueError(stored.shape)
+    voxels, more = _voxels(stored, name)
+    return Volume.from_stored(voxels, upright(spacing), notes=notes + more)
+
+
+class _Complaints(logging.Handler):
+    """Keep what is logged as an error."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.ERROR)
+        self.found: list[logging.LogRecord] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.found.append(record)
+
+
+@contextmanager
+def _complaints_refused(name: str) -> Iterator[None]:
+    """Refuse what tifffile only logs: pages behind a broken link would be missing in silence."""
+    complaints, logger = _Complaints(), logging.getLogger("tifffile")
+    propagate, logger.propagate = logger.propagate, False
+    logger.addHandler(complaints)
+    try:
+        yield
+    except FormatError:
+        if not complaints.found:  # else they tell why
+            raise
+    finally:
+        logger.removeHandler(complaints)
+        logger.propagate = propagate
+    if complaints.found:
+        raise FormatError(
+            "the pages of the file are damaged",
+            file=name,
+            found=f"tifffile = {len(complaints.found)} complaints",
+            expected="a whole and valid file",
+            hint="a fresh copy of the file",
+        )
+
+
+def _only(found: list[Any], name: str) -> Any:
+    """Return the one stack of a file."""
+    if len(found) != 1:
+        raise FormatError(
+            "the file holds several images",
+            file=name,
+            found=f"images = {len(found)}",
+            expected="one stack of pages of one size",
+            hint="one stack, written to a file of its own",
+        )
+    if found[0].axes in ("YX", "YXS"):
+        raise FormatError("the file holds one slice", file=name, hint="the folder of the slices")
+    if found[0].axes not in STACKS:
+        raise FormatError(
+            "the file holds several frames",
+            file=name,
+            found=f"axes = {found[0].axes}, shape = {found[0].shape}",
+            expected="slices, rows and columns",
+            hint="one frame, written to a file of its own",
+        )
+    return found[0]
+
+
+def _check_promise(series: Any, size: int, name: str) -> None:
+    """Compare what the pages promise with the memory and with the file's bytes."""
+    keyframe = series.keyframe
+    chunk = math.prod(keyframe.chunks) * keyframe.dtype.itemsize
+    require_memory(max(series.nbytes, chunk), file=name)
+    if series.dataoffset is not None:
+        require_bytes(series.dataoffset + series.nbytes, size, file=name)
+        return
+    packed = 0
+    for page in series.pages:
+        if page is None:
+            raise FormatError("a page is missing", file=name, expected=f"{len(series.pages)} pages")
+        ends = [start + count for start, count in zip(page.dataoffsets, page.databytecounts, strict=True)]
+        require_bytes(max(ends, default=0), size, file=name)
+        packed += sum(page.databytecounts)
+    require_bytes(series.nbytes, packed * (1 if keyframe.compression == 1 else TIFF_RATIO), file=name)
+    if keyframe.compression not in UNPACKED_WITHOUT:
+        required("imagecodecs", file=name)
+
+
+def _spacing(pages: Any, settings: ReadSettings, name: str) -> Spacing:
+    """Return the distances in mm, and notes: the file's own, else those that were given."""
+    own = _of_ome(pages.ome_metadata, name) if pages.is_ome else _of_imagej(pages) if pages.is_imagej else None
+    if own is not None and all(unit in TIFF_UNITS_MM for unit in own[1]):
+        check_spacing(own[0], ["spacing along x", "spacing along y", "spacing along z"], file=name, hint="another file")
+        placed = tuple(value * TIFF_UNITS_MM[unit] for value, unit in zip(*own, strict=True))
+        return placed, (UNTURNED, *passed_over(settings.spacing))
+    return required_spacing(settings.spacing, file=name), (GIVEN,)
+
+
+def _of_ome(text: str, name: str) -> Spacing | None:
+    """Return what OME-XML says of the first image, None where it is not all there."""
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise FormatError("the OME text declares entities", file=name, expected="plain OME-XML")
+    with third_party("the XML parser", name):
+        pixels = ElementTree.fromstring(text).find(".//{*}Pixels")
+        sizes = [] if pixels is None else [pixels.get(f"PhysicalSize{axis}") for axis in "XYZ"]
+        if pixels is None or None in sizes:
+            return None
+        units = tuple(pixels.get(f"PhysicalSize{axis}Unit", "µm") for axis in "XYZ")
+        return tuple(float(size or "nan") for size in sizes), units
+
+
+def _of_imagej(pages: Any) -> Spacing | None:
+    """Return what ImageJ says: the distance of slices in its text, pixels per unit as the resolution."""
+    told, tags = pages.imagej_metadata or {}, pages.pages[0].tags
+    if "spacing" not in told or "unit" not in told or not {"XResolution", "YResolution"} <= {tag.name for tag in tags}:
+        return None
+    per_unit = [tags[axis].value for axis in ("XResolution", "YResolution")]
+    across = [below / above if above else math.nan for above, below in per_unit]
+    return (*across, float(told["spacing"])), (str(told["unit"]),) * 3
+
+
+def _voxels(stored: NDArray[Any], name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+    stored = stored.reshape(*stored.shape[:3], -1)
+    return gray_or_color(stored, stored.shape[3], file=name)

@@ -1,0 +1,47 @@
+"""Closed polygons in a plane: what they enclose, how long their sides are, what lies inside."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.measure.polygons import distance_to_polygon, inside_polygon
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def lattice_inside(ring: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+    """Return the points of a square lattice about the middle of a ring that lie inside it, (n, 2)."""
+    low, high = ring.min(axis=0), ring.max(axis=0)
+    half = ((high - low) // (2 * spacing)).astype(int)
+    x, y = ((low[a] + high[a]) / 2 + spacing * np.arange(-half[a], half[a] + 1) for a in (0, 1))
+    lattice = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return lattice[inside(ring, lattice)]
+
+
+def inside(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which points (n, 2) lie inside a closed polygon (u, 2)."""
+    found = np.empty(len(points), bool)
+    inside_polygon(np.ascontiguousarray(ring), np.ascontiguousarray(points), found)
+    return found
+
+
+def distance(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance of points (n, 2) to the line of a closed polygon (u, 2)."""
+    found = np.empty(len(points))
+    distance_to_polygon(np.ascontiguousarray(ring), np.ascontiguousarray(points), found)
+    return found
+
+
+def area(ring: NDArray[np.float64]) -> float:
+    """Return the area of a closed polygon (u, 2); below 0 where the inside is on its right."""
+    x, y = (ring - ring[0]).T
+    return float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)
+
+
+def side_lengths(line: NDArray[np.float64], *, closed: bool = True) -> NDArray[np.float64]:
+    """Return the lengths of the sides of a line (u, 2), the first from point 0 to point 1."""
+    onward = np.roll(line, -1, axis=0) if closed else line[1:]
+    return np.asarray(np.sqrt(((onward - line[: len(onward)]) ** 2).sum(axis=1)))

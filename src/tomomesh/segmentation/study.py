@@ -1,0 +1,192 @@
+"""What of a study is looked at: its slices, the part that matters, and the voxels that are kept of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..model.volume import AXES, Volume, order_along
+from ..stage import Stage, folded, timed
+from .crop import crop, inside_roi
+from .grid import onto_grid
+from .labels import doubted, labels_in
+from .selection import Chosen, choose
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..settings import Settings
+    from .window import Limit
+
+APART = 4
+"""One slice in so many is looked at for labels."""
+
+
+@dataclass(frozen=True)
+class Selected:
+    """A study, and what is kept of it.
+
+    Attributes
+    ----------
+    study : Volume
+        Its slices along K.
+    plane : str
+        Of the slices: axial, coronal or sagittal.
+    chosen : Chosen
+        The voxels that are kept.
+    """
+
+    study: Volume
+    plane: str
+    chosen: Chosen
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """The voxels that are kept, (K, J, I)."""
+        return self.chosen.mask
+
+
+def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> Stage[Selected]:
+    """Turn the slices of a study the way they are asked for, crop them, and choose voxels by gray level or label.
+
+    Parameters
+    ----------
+    volume : Volume
+    labels : Volume or None
+        A label map, for ``select``; where there is none, the study is the label map itself.
+    settings : Settings
+
+    Raises
+    ------
+    UsageError, EmptyError
+        Where the input is no study, or nothing is left of it.
+    """
+    if not isinstance(volume, Volume):
+        raise UsageError(
+            "a study is a Volume",
+            found=type(volume).__name__,
+            expected="read_volume(path) or Volume.from_stored(array, affine)",
+        )
+    axis = _slice_axis(volume, settings.network.slices)
+    part, box = crop(volume, settings.crop, axis)
+    study = part.along(axis)
+    notes = study.notes
+    if labels is not None:
+        labels = _fitting(labels, volume, settings).cropped(box).along(axis)
+        notes += labels.notes
+    chosen = _choose(study, labels, settings)
+    kept = tuple(box[n] for n in order_along(axis))
+    section = _section(study, AXES[axis], _cropped(kept, volume.along(axis).shape), notes + _dropped(chosen, settings))
+    doubt = settings.window.select is not None and doubted(study if labels is None else labels)
+    warnings = (*_doubts(chosen.value, settings), *((doubt,) if doubt else ()))
+    window = {"window": _window(chosen.value, settings)}
+    selected = Selected(study, AXES[axis], chosen.value)
+    return folded(selected, Stage(None, {"study": section}), chosen, Stage(None, window, warnings))
+
+
+def _slice_axis(volume: Volume, slices: str) -> int:
+    if slices == "auto":
+        return volume.thickest_axis()
+    return volume.stored_axis if slices == "stored" else AXES.index(slices)
+
+
+def _fitting(labels: Volume, volume: Volume, settings: Settings) -> Volume:
+    """Lay a label map onto the study's grid; refuse one of which no label is asked for."""
+    if settings.window.select is None:
+        raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
+    return onto_grid(labels, volume)
+
+
+@timed("window")
+def _choose(study: Volume, labels: Volume | None, settings: Settings) -> Stage[Chosen]:
+    return Stage(choose(study, labels, settings, inside_roi(study, settings.crop.roi)))
+
+
+def _section(study: Volume, plane: str, cropped: dict[str, list[int]] | None, notes: tuple[str, ...]) -> dict[str, Any]:
+    columns, rows, slices = study.spacing_mm
+    return {
+        "slices": study.shape[0],
+        "rows": study.shape[1],
+        "columns": study.shape[2],
+        "plane": plane,
+        "column_spacing_mm": columns,
+        "row_spacing_mm": rows,
+        "slice_spacing_mm": slices,
+        "gray_unit": study.unit,
+        "crop": cropped,
+        "notes": list(notes),
+    }
+
+
+def _cropped(box: tuple[slice, ...], sizes: tuple[int, int, int]) -> dict[str, list[int]] | None:
+    """Return the first and last of the slices, rows and columns that are left of a study that was cropped."""
+    kept = [[int(side.start), int(side.stop) - 1] for side in box]
+    whole = kept == [[0, size - 1] for size in sizes]
+    return None if whole else dict(zip(("slices", "rows", "columns"), kept, strict=True))
+
+
+def _dropped(chosen: Stage[Chosen], settings: Settings) -> tuple[str, ...]:
+    """Say which components a guess has left out."""
+    found = chosen.value
+    if not found.dropped or settings.window.keep != "auto":
+        return ()
+    return (
+        f"{found.dropped} of {found.found} components of the window ({found.dropped_voxels} voxels) were "
+        "left out, which lie in nothing that is 12 mm thick, as a scanner's table: --keep all keeps them",
+    )
+
+
+def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:
+    """Tell what the window kept, and the limits of its layers."""
+    asked, mask, layers = settings.window, chosen.mask, chosen.volume.layers
+    lower, upper = (chosen.lower, chosen.upper) if asked.select is None else (-np.inf, np.inf)
+    return {
+        "lower": _limits(lower),
+        "upper": _limits(upper),
+        "layers": layers,
+        "joined_by": asked.layers if layers > 1 else None,
+        "chosen_by": _chosen_by(settings),
+        "voxels": int(mask.sum()),
+        "share": float(mask.mean()),
+        "touches_border": bool(any(_edges(mask))),
+        "components": chosen.found or None,
+        "dropped_components": chosen.dropped,
+        "dropped_voxels": chosen.dropped_voxels,
+    }
+
+
+def _chosen_by(settings: Settings) -> str:
+    asked = settings.window
+    given = asked.lower is not None or asked.upper is not None
+    return "labels" if asked.select else "preset" if asked.preset else "given" if given else "otsu"
+
+
+def _edges(mask: NDArray[np.bool_]) -> list[np.bool_]:
+    """Tell of both sides of each axis whether a kept voxel lies on them."""
+    return [np.take(mask, end, axis=axis).any() for axis in range(3) for end in (0, -1)]
+
+
+def _doubts(chosen: Chosen, settings: Settings) -> list[str]:
+    """Say what about a window may not be as it was meant."""
+    warnings = []
+    if 0 < chosen.spared_voxels == int(chosen.mask.sum()):
+        warnings.append("nothing of the window lies in a body, 12 mm thick and denser than air: all of it was kept")
+    elif chosen.spared_voxels:
+        warnings.append(
+            f"most of the window ({chosen.spared_voxels} of {int(chosen.mask.sum())} voxels) lies in nothing that is "
+            "12 mm thick, and was kept for all that: --keep body leaves it out"
+        )
+    if _chosen_by(settings) == "otsu" and len(labels_in(chosen.volume.voxels[::APART])) > 1:
+        warnings.append("labels of a label map were taken for gray levels: --select chooses labels")
+    if any(_edges(chosen.mask)[2:]):
+        warnings.append("the window touches the border of the slices: the surface is closed along it")
+    return warnings
+
+
+def _limits(limit: Limit) -> float | list[float | None] | None:
+    """Return a limit, or one a layer, with None where there is none; one that all layers share once."""
+    found = [None if np.isinf(one) else float(one) for one in np.ravel(limit)]
+    return found if len(set(found)) > 1 else found[0]

@@ -1,0 +1,206 @@
+"""Any points: points -> samples of a surface -> cubes, holes bridged -> mesh drawn to the surface under the samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..cuberille.leak_test import SURE, close_leaks
+from ..cuberille.neighbors import once_each
+from ..cuberille.partition import cubes_over, is_flat
+from ..dynamics.low_pass import OneRing
+from ..dynamics.moving_least_squares import SurfaceFit, fit_to_surface
+from ..dynamics.untangle import untangle
+from ..errors import GeometryError
+from ..measure.intersections import Crossings
+from ..model.columns import any_of
+from ..model.cubes import cells_of
+from ..model.mesh import QuadMesh, TriMesh
+from ..opensurface.gaps import gaps
+from ..pointcloud.bridges import bridges
+from ..pointcloud.forecast import require_room
+from ..results import Surface
+from ..stage import Stage, folded, measured, timed
+from .points import place_found
+from .samples import cell_edges, lowest_corner, settle
+from .sections import FLAT_SHELL, LEAKY_SHELL, body_of_cubes, fit_found, shell_found, walls_found
+from .way import CUBES, POINTS, Way, on_input, parameters
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..cuberille.faces import Faces
+    from ..cuberille.leak_test import LeakTest
+    from ..pointcloud.bridges import Bridges
+    from ..pointcloud.samples import Samples
+    from ..progress import Progress
+    from ..settings import Settings
+    from .points import Points
+
+    Floats = NDArray[np.float64]
+
+SPANS = (5.0, 12.0)
+"""Longest bridges that are tried, sampling distances."""
+WIDEST = 6.0
+"""Widest closing that is tried, sampling distances: large cubes are closed by fewer."""
+TRIED = ((0, 1, 2), (3, 4, 5, 6, 7, 8))
+"""Closings that are tried before and after longer bridges, cubes."""
+
+
+@dataclass(frozen=True)
+class Shell:
+    """Cubes of an edge (3,) from a lowest corner, what spans their holes, and how they hold."""
+
+    cell: Floats
+    lowest: Floats
+    cubes: int
+    spanned: Bridges
+    held: LeakTest
+
+    def taken(self, settings: Settings) -> NDArray[np.bool_]:
+        """Tell of each surface whether it is kept."""
+        return self.held.faces.worth_keeping(largest=settings.cubes.largest)
+
+
+@dataclass(frozen=True)
+class Rough:
+    """The faces that are kept, their corners (n, 3) on the lattice, and where these lie after the low-pass filter."""
+
+    faces: Faces
+    lattice: Floats
+    ring: OneRing
+    mesh: TriMesh
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A mesh, its faces (m,) where there are no samples, and the fit; None where the shell was only smoothed."""
+
+    mesh: TriMesh
+    filled: NDArray[np.bool_]
+    fitted: SurfaceFit | None
+
+
+def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
+    """Turn a cloud into a closed surface."""
+    settled = settle(points, settings, progress)
+    samples, origin = settled.value, lowest_corner(points)
+    shell = _hold(points, samples, settings, progress)
+    walls = _walls(shell.value, samples, origin, settings)
+    rough = measured("smooth", _smoothed, shell.value, settings)
+    kept, smoothed, ring = rough.value.faces, rough.value.mesh, rough.value.ring
+    rest = measured("fit", _fitted, shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
+    apart = measured(
+        "untangle", untangle, rest.value.mesh, smoothed.vertices, ring, Crossings(settings.run.threads)
+    )  # fmt: skip
+    mesh, taken_back, crossing = apart.value
+    cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64))
+    trace = None if rest.value.fitted is None else rest.value.fitted.trace
+    surface = Surface(
+        points.cloud, cuberille, smoothed.moved(smoothed.vertices + origin),
+        mesh.moved(mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=rest.value.filled,
+        cavities=int(kept.inward.sum()), crossing=crossing,
+        encloses_mm3=_hollow(shell.value, settings) if walls.value == 1 else 0.0,
+    )  # fmt: skip
+    fitted = fit_found(trace, len(smoothed.vertices), taken_back=taken_back, filled=rest.value.filled)
+    return folded(surface, settled, shell, walls, rough, rest, apart, fitted, place_found(points))
+
+
+@timed("cubes")
+def _hold(points: Points, samples: Samples, settings: Settings, progress: Progress) -> Stage[Shell]:
+    shell = _holding(len(points.cloud), samples, settings, progress)
+    return folded(
+        shell, shell_found(shell.held, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
+    )  # fmt: skip
+
+
+def _holding(count: int, samples: Samples, settings: Settings, progress: Progress) -> Shell:
+    """Return the shell that holds with the least that is made up: short bridges, narrow closings, large cubes."""
+    cubes, best = settings.cubes, None
+    closings = TRIED if cubes.closing is None else ((cubes.closing,),)
+    reach = WIDEST * float(np.median(samples.spacing))
+    for tried, span, cell in product(closings, SPANS, cell_edges(samples, settings)):
+        require_room(count, samples, cell)
+        spanned = bridges(samples, float(cell.min()), span=span, threads=settings.run.threads, progress=progress)
+        lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
+        cells = cells_of(once_each(keys))
+        steps = [k for k in tried if cubes.closing is not None or k * cell.min() <= reach]
+        held = close_leaks(
+            cells, steps, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
+        )  # fmt: skip
+        if best is None or held.two_sided >= SURE or held.is_better_than(best.held):
+            best = Shell(cell, lowest, len(cells), spanned, held)
+        if held.two_sided >= SURE:
+            break
+    assert best is not None
+    return best
+
+
+def _hollow(shell: Shell, settings: Settings) -> float:
+    """Return the volume inside a shell without that of its cubes, which may be two walls with nothing between them."""
+    enclosed = int(shell.held.faces.volumes[shell.taken(settings)].sum())
+    return float(max(0, enclosed - shell.cubes) * shell.cell.prod())
+
+
+def _walls(shell: Shell, samples: Samples, origin: Floats, settings: Settings) -> Stage[int]:
+    """Count the walls of a shell; refuse one that leaks, unless that was allowed or the points are flat.
+
+    One of two is not fitted: both walls would rest on the same samples, and the mesh would fall flat.
+    """
+    if shell.held.tight:
+        return walls_found(1)
+    if is_flat(samples.positions, float(np.median(samples.spacing))):
+        return walls_found(2, FLAT_SHELL)
+    if settings.cubes.allow_leaks:
+        return walls_found(2, LEAKY_SHELL)
+    cell = float(shell.cell.min())
+    found = gaps(samples, cell, threads=settings.run.threads)
+    where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]
+    raise GeometryError(
+        ("the points look like an open surface: " if found else "")
+        + "the outside leaks into the shell of cubes, so its surface would have two walls",
+        found=f"{len(found)} border(s), the widest {where[0]}" if found else f"cell = {cell:.4g}",
+        expected="points all around the object, without gaps as wide as its holes",
+        hint="--open for a sheet with borders, a larger --closing or --cell, or --allow-leaks",
+    )
+
+
+def _place(place: Floats) -> str:
+    return "(" + ", ".join(f"{c:.6g}" for c in place) + ")"
+
+
+def _smoothed(shell: Shell, settings: Settings) -> Rough:
+    faces = shell.held.faces.only(shell.taken(settings))
+    ring = OneRing.of_quads(faces.quads, len(faces.corners), settings.run.threads)
+    lattice = shell.lowest + faces.corners * shell.cell
+    vertices = ring.smoothed(lattice, settings.cubes.smoothing)
+    return Rough(faces, lattice, ring, TriMesh(vertices, _halves(faces.quads)))
+
+
+def _halves(quads: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Split each square by its diagonal 0-2 (the paper's systematic triangulation, Fig. 8b)."""
+    return quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int64)
+
+
+def _fitted(
+    shell: Shell, rough: Rough, samples: Samples, settings: Settings, progress: Progress, *, still: bool
+) -> Rest:
+    """Draw the mesh to the surface under its samples, unless it is to stay as it is."""
+    if still:
+        return Rest(rough.mesh, np.zeros(len(rough.mesh.faces), np.bool_), None)
+    edge, threads = float(shell.cell.min()), settings.run.threads
+    start = rough.mesh.vertices
+    fitted = fit_to_surface(start, rough.ring, samples, edge, settings.fit, threads=threads, progress=progress)
+    return Rest(TriMesh(fitted.vertices, fitted.faces), any_of(fitted.filled[fitted.faces]), fitted)
+
+
+WAY = Way(
+    applies=lambda settings, input: input in POINTS,
+    because=on_input,
+    reads=CUBES | parameters("stacks", "open", "attraction", "damping", "step"),
+    surface=surface_of_cloud,
+    of_body=body_of_cubes,
+)

@@ -1,0 +1,164 @@
+"""From points to a mesh that rests on them: cubes -> cuberille -> low-pass filter -> dynamic mesh (the paper's way)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..cuberille.leak_test import CLOSINGS, close_leaks
+from ..cuberille.partition import is_flat, partition
+from ..dynamics.collapse import without_collapse
+from ..dynamics.low_pass import OneRing, low_pass
+from ..dynamics.mass_spring import Fit, fit
+from ..dynamics.untangle import untangle
+from ..errors import GeometryError
+from ..measure.intersections import Crossings
+from ..results import LEAST, Surface
+from ..stage import Stage, folded, measured, timed
+from .sections import FLAT_SHELL, LEAKY_SHELL, fit_found, shell_found, walls_found
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..cuberille.leak_test import LeakTest
+    from ..model.cubes import CubeGrid
+    from ..model.mesh import QuadMesh, TriMesh
+    from ..model.points import PointSet
+    from ..progress import Progress
+    from ..settings import Settings
+
+    Floats = NDArray[np.float64]
+    Tracked = tuple[CubeGrid, QuadMesh, NDArray[np.int64]]
+
+
+@dataclass(frozen=True)
+class Shell:
+    """Cubes that hold the points, and the faces around them; `taken` tells of each surface whether it is kept."""
+
+    grid: CubeGrid
+    held: LeakTest
+    taken: NDArray[np.bool_]
+
+    @property
+    def volume(self) -> float:
+        """Volume inside the surfaces that are kept."""
+        return float(self.held.faces.volumes[self.taken].sum() * self.grid.cell_mm.prod())
+
+    @property
+    def hollow(self) -> float:
+        """The same without the cubes themselves, which may be two walls with nothing between them."""
+        return max(0.0, self.volume - float(len(self.grid.keys) * self.grid.cell_mm.prod()))
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A mesh at rest, its faces that pass through others, and the point that draws each vertex."""
+
+    fit: Fit
+    mesh: TriMesh
+    crossing: NDArray[np.bool_]
+
+
+def surface_on_cubes(
+    points: PointSet, spacing: float, settings: Settings, progress: Progress, *, encloses: float = 0.0
+) -> Stage[Surface]:
+    """Turn points into a closed surface that rests on them.
+
+    Parameters
+    ----------
+    points : PointSet
+    spacing : float
+        r, the edge of the cubes where none is asked for.
+    settings : Settings
+    progress : callable
+    encloses : float
+        Volume that the rings enclose; 0 where there are none.
+
+    Raises
+    ------
+    GeometryError
+        Where the outside leaks in.
+    """
+    shell = _close(points.positions, spacing, settings, progress)
+    tracked = measured("cuberille", _track, shell.value)
+    walls = _walls(shell.value, points.positions, settings, encloses)
+    cubes, cuberille, _ = tracked.value
+    smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.smoothing)
+    still = settings.replace(max_steps=0)
+    rest = _fit(tracked.value, smoothed.value, points.positions, settings if walls.value == 1 else still, progress)
+    told = encloses or shell.value.hollow
+    if settings.cubes.allow_leaks and walls.value == 1 and rest.value.mesh.face_volumes.sum() < LEAST * told:
+        walls = walls_found(2, LEAKY_SHELL)
+        rest = _fit(tracked.value, smoothed.value, points.positions, still, progress)
+    made = Surface(
+        points, cuberille, smoothed.value, rest.value.mesh, rest.value.fit.nearest, cubes, rest.value.fit.trace,
+        cavities=int((shell.value.held.faces.inward & shell.value.taken).sum()), crossing=rest.value.crossing,
+        encloses_mm3=told if walls.value == 1 else 0.0,
+    )  # fmt: skip
+    return folded(made, shell, tracked, walls, smoothed, rest)
+
+
+@timed("cubes")
+def _close(positions: Floats, spacing: float, settings: Settings, progress: Progress) -> Stage[Shell]:
+    asked, threads = settings.cubes, settings.run.threads
+    grid = partition(positions, _cell(spacing, settings))
+    closings = CLOSINGS if asked.closing is None else (asked.closing,)
+    held = close_leaks(
+        grid.cells, closings, cavities=asked.surface == "all", tracking=asked.tracking, threads=threads,
+        progress=progress,
+    )  # fmt: skip
+    taken = held.faces.worth_keeping(largest=asked.largest)
+    return folded(Shell(grid, held, taken), shell_found(held, taken, grid.cell_mm, len(grid.keys)))
+
+
+def _cell(spacing: float, settings: Settings) -> Floats:
+    """Return the edge of the cubes along each axis: r, or what was asked for, times the dilation factor."""
+    asked = settings.cubes.cell_mm or (spacing,)
+    return np.broadcast_to(np.array(asked, np.float64) * settings.cubes.cell_factor, 3).copy()
+
+
+def _track(shell: Shell) -> Tracked:
+    return shell.held.faces.only(shell.taken).over(shell.grid)
+
+
+def _walls(shell: Shell, positions: Floats, settings: Settings, encloses: float) -> Stage[int]:
+    """Count the walls of a shell; refuse one that leaks, unless that was allowed or the points are flat.
+
+    One of two is not fitted: both walls would rest on the same points, and the mesh would fall flat.
+    """
+    cell = float(shell.grid.cell_mm.min())
+    if shell.volume >= LEAST * encloses if encloses else shell.held.tight:
+        return walls_found(1)
+    if is_flat(positions, cell):
+        return walls_found(2, FLAT_SHELL)
+    if settings.cubes.allow_leaks:
+        return walls_found(2, LEAKY_SHELL)
+    raise GeometryError(
+        "the outside leaks into the shell of cubes, so its surface would have two walls",
+        found=f"cell = {cell:.4g}",
+        expected="gaps between the points that are narrower than a hole of the surface",
+        hint="a larger --cell-mm or --closing, or --allow-leaks",
+    )
+
+
+def _smoothed(cuberille: QuadMesh, passes: int) -> TriMesh:
+    rough = cuberille.triangulated()
+    return rough.moved(low_pass(cuberille.vertices, cuberille.edges, passes))
+
+
+@timed("fit")
+def _fit(tracked: Tracked, smoothed: TriMesh, positions: Floats, settings: Settings, progress: Progress) -> Stage[Rest]:
+    (cubes, cuberille, origins), threads = tracked, settings.run.threads
+    springs = cuberille.edges if settings.fit.springs == "quads" else smoothed.edges
+    rest = fit(
+        smoothed.vertices, springs, origins, positions, cubes, settings.fit,
+        threads=threads, progress=progress,
+    )  # fmt: skip
+    mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))
+    ring = OneRing.of_quads(cuberille.quads.astype(np.int32), len(mesh.vertices), threads)
+    mesh, taken_back, crossing = untangle(mesh, smoothed.vertices, ring, Crossings(threads))
+    trace = rest.trace if settings.fit.max_steps else None
+    told = fit_found(trace, len(mesh.vertices), collapsed=collapsed, taken_back=taken_back)
+    return folded(Rest(rest, mesh, crossing), told)

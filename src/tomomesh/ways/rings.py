@@ -1,0 +1,130 @@
+"""One network a slice (the paper's way): networks -> regions -> points -> cubes -> mesh."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..measure.rings import assess_contours
+from ..results import Segmentation
+from ..segmentation.contours.inputs import share_of_holes, slices_with_several
+from ..segmentation.sample import Sampling, sample
+from ..segmentation.training import regions, train_study
+from ..segmentation.window import by_layer
+from ..som.schedules import schedule_warning
+from ..stage import Stage, folded, measured, timed
+from .cubes import surface_on_cubes
+from .sections import body_of_cubes, missed, points_found
+from .way import CUBES, POINTS, SPRINGS, TRAINING, Way, parameters
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ..model.networks import Networks
+    from ..progress import Progress
+    from ..results import Surface
+    from ..segmentation.study import Selected
+    from ..settings import Settings
+
+CROWDED = 0.25
+"""Share of the slices with several components side by side over which one network a slice is warned of."""
+HOLES = 0.15
+"""Area of the holes in the slices over that of the window from which an outline that fills them is warned of."""
+
+
+def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Networks]]:
+    """Train a network on every slice, and place its neurons in space."""
+    study, mask, run = kept.study, kept.mask, settings.run
+    trained = measured(
+        "networks", train_study, mask, settings.network, layers=_layers(kept, settings),
+        pixel_mm=study.spacing_mm[:2], seed=run.seed, threads=run.threads, progress=progress,
+    )  # fmt: skip
+    labels = measured("regions", regions, mask, trained.value, pixel_mm=study.spacing_mm[:2], threads=run.threads)
+    placed = _place(kept, trained.value, settings)
+    sampling = placed.value
+    found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value)
+    return folded(found, trained, labels, _networks_found(trained.value, kept, settings), placed)
+
+
+def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress: Progress) -> Stage[Surface]:
+    """Turn the neurons of all slices into a closed surface."""
+    sampling = found.sampling
+    return surface_on_cubes(
+        found.points, sampling.spacing_mm, settings, progress, encloses=sampling.volume_mm3
+    )  # fmt: skip
+
+
+def _layers(kept: Selected, settings: Settings) -> NDArray[np.bool_] | None:
+    """Return the window of each layer (K, J, I, L), where networks are shown layers."""
+    chosen = kept.chosen
+    if chosen.volume.layers == 1 or settings.network.inputs != "layers":
+        return None
+    return by_layer(chosen.volume, lower=chosen.lower, upper=chosen.upper) & chosen.mask[..., None]
+
+
+@timed("points")
+def _place(kept: Selected, networks: Networks, settings: Settings) -> Stage[Sampling]:
+    cubes = settings.cubes
+    sampling = sample(
+        networks, kept.study, caps=cubes.caps, bridge=settings.network.bridge, cell_from=cubes.cell_from
+    )  # fmt: skip
+    return folded(sampling, points_found(sampling.points, sampling.spacing_mm, bridged=sampling.bridged))
+
+
+def _networks_found(networks: Networks, kept: Selected, settings: Settings) -> Stage[None]:
+    """Tell what was trained, and what one network a slice does not show."""
+    without, lost = missed(networks.slices, kept.mask)
+    stats: dict[str, dict[str, Any]] = {
+        "networks": {
+            "topology": networks.lattice.name,
+            "neurons": len(networks.lattice),
+            "trained": len(networks.slices),
+            "signal": "boundary" if networks.outlined else "region",
+            "pixels": int(networks.pixels.sum()),
+            "strays": int(networks.strays.sum()),
+            "slices_without": without,
+        }
+    }
+    if len(networks.lines):
+        closed = networks.lattice.name == "ring"
+        stats["rings"] = assess_contours(networks.lines, kept.study.spacing_mm[:2], closed=closed)
+    schedule = schedule_warning(settings.network)
+    return Stage(None, stats, (*((schedule,) if schedule else ()), *lost, *_overlooked(networks, kept, settings)))
+
+
+def _overlooked(networks: Networks, kept: Selected, settings: Settings) -> list[str]:
+    """Warn where many slices hold several components, and of outlines that fill what is not in the window."""
+    warnings, threads = [], settings.run.threads
+    several = slices_with_several(kept.mask, threads)
+    if several > CROWDED * len(networks.slices):
+        warnings.append(
+            f"{several} slices hold several components side by side: --contours components has a ring for each"
+        )
+    share = share_of_holes(kept.mask, threads) if networks.outlined else 0.0
+    if share > HOLES:
+        warnings.append(f"holes of {share:.0%} of the window's area are filled: --contours loops follows them too")
+    return warnings
+
+
+def _of_networks(report: dict[str, Any]) -> list[str]:
+    networks = report["networks"]
+    return [
+        f"networks  {networks['trained']} {networks['topology']}s of {networks['neurons']} neurons on the window's "
+        f"{'outline' if networks['signal'] == 'boundary' else 'pixels'}, {networks['strays']} stray pixels dropped"
+    ]
+
+
+def _pictures(found: Segmentation[Networks]) -> dict[str, Any]:
+    return {"networks": found.source, "labels": found.labels}
+
+
+WAY = Way(
+    applies=lambda settings, input: input not in POINTS,
+    because=lambda settings, input: "on networks of slices",
+    reads=TRAINING | CUBES | SPRINGS | parameters("bridge", "even", "caps", "cell_from", "tracking"),
+    segment=segment_by_rings,
+    surface=surface_by_rings,
+    of_networks=_of_networks,
+    of_body=body_of_cubes,
+    pictures=_pictures,
+)

@@ -1,0 +1,83 @@
+"""What the ways from any points share: the samples of a surface, and the edges of cubes that suit them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..model.columns import box
+from ..pointcloud.forecast import require_room_for_points
+from ..pointcloud.samples import Samples, settle_points
+from ..stage import Stage, timed
+from .sections import unit_in_words
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..progress import Progress
+    from ..settings import Settings
+    from .points import Points
+
+    Floats = NDArray[np.float64]
+
+FINE, COARSE = 0.95, 1.5
+"""Least and greatest edge of the cubes over the sampling distance, but for noise."""
+BENT = 0.08
+"""Bend of the samples from which the finest cubes are taken; for less, the sagitta of an edge stays as it is there."""
+MANY = 250_000
+"""Samples up to which the finest cubes are taken in any case: the mesh then has a million faces."""
+NOISE = (1.8, 1.3, 1.0)
+"""Edges of the cubes over the noise of the points, tried one after the other: small cubes show noise as handles,
+large ones fill thin parts."""
+STRAYS = 0.05
+"""Share of strays among the points over which a result is warned of."""
+
+
+def lowest_corner(points: Points) -> Floats:
+    """Return the corner (3,) that the samples of a cloud are counted from."""
+    return box(points.cloud.positions)[0]
+
+
+@timed("samples")
+def settle(points: Points, settings: Settings, progress: Progress) -> Stage[Samples]:
+    """Let each point settle on the surface around it; strays are left out. Positions count from the lowest corner."""
+    positions = points.cloud.positions
+    require_room_for_points(len(positions))
+    samples = settle_points(positions - lowest_corner(points), threads=settings.run.threads, progress=progress)
+    return _samples_found(len(positions), samples, settings.run.units)
+
+
+def _samples_found(count: int, samples: Samples, unit: str) -> Stage[Samples]:
+    """Tell how far apart the points are, how noisy, and how many are strays."""
+    section: dict[str, Any] = {
+        "unit": unit,
+        "count": count,
+        "distinct": len(samples.positions) + samples.strays,
+        "strays": samples.strays,
+        "spacing_mm": float(np.median(samples.spacing)),
+        "spacing_p5_mm": float(np.percentile(samples.spacing, 5)),
+        "spacing_p95_mm": float(np.percentile(samples.spacing, 95)),
+        "noise_mm": float(np.median(samples.noise)),
+        "noise_p95_mm": float(np.percentile(samples.noise, 95)),
+    }
+    many = samples.strays > STRAYS * count
+    warnings = (f"{samples.strays} of {count} points are strays, and were left out",) if many else ()
+    return Stage(samples, {"points": section}, warnings)
+
+
+def cell_edges(samples: Samples, settings: Settings) -> list[Floats]:
+    """Return the edges of the cubes along each axis: the sampling distance, or what the noise needs, or as asked."""
+    spacing, noise = float(np.median(samples.spacing)), float(np.median(samples.noise))
+    most = min(COARSE, FINE * max(1.0, np.sqrt(len(samples.positions) / MANY)))
+    fine = float(np.clip(FINE * np.sqrt(BENT / max(samples.bend, 1e-300)), FINE, most))
+    own = dict.fromkeys(max(fine * spacing, factor * noise) for factor in NOISE)
+    asked = [settings.cubes.cell_mm] if settings.cubes.cell_mm else [(edge,) for edge in own]
+    return [np.broadcast_to(np.array(one) * settings.cubes.cell_factor, 3).copy() for one in asked]
+
+
+def points_in_words(report: dict[str, Any]) -> str:
+    """Say in the summary how far apart the points of a cloud are, and how noisy."""
+    points, unit = report["points"], unit_in_words(report)
+    apart = f"{points['spacing_mm']:.4g} {unit} apart, noise {points['noise_mm']:.2g} {unit}"
+    return f"{points['count']}, {points['strays'] or 'no'} stray(s) left out, {apart}"

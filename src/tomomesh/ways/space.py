@@ -1,0 +1,287 @@
+"""One network in space: the window's boundary or voxels -> network -> its own faces, divided -> mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..cuberille.partition import partition
+from ..dynamics.low_pass import OneRing
+from ..dynamics.mass_spring import fit
+from ..dynamics.moving_least_squares import fit_to_surface
+from ..dynamics.subdivision import squares_of
+from ..dynamics.untangle import untangle
+from ..errors import UsageError
+from ..isosurface.voxels import boundary
+from ..measure.intersections import Crossings
+from ..model.columns import any_of
+from ..model.mesh import QuadMesh, TriMesh
+from ..model.points import PointSet
+from ..pointcloud.samples import settle_points
+from ..results import Segmentation, Surface, window_volume
+from ..segmentation.sample import Sampling
+from ..segmentation.space import is_wall, pieces_of, regions_in_space, train_space
+from ..settings import SURFACES
+from ..stage import Stage, folded, measured, timed
+from .sections import fit_found, points_found
+from .way import POINTS, TRAINING, Way, parameters
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.networks import SpaceNetwork
+    from ..model.trace import Trace
+    from ..progress import Progress
+    from ..segmentation.study import Selected
+    from ..settings import Settings
+
+    Floats = NDArray[np.float64]
+
+NOTHING = np.empty(0)
+REACH = 1.5
+"""Most that a vertex moves in a step of the fit, sides of the finer mesh."""
+LEFT_OUT = 0.01
+"""Share of the window in small pieces over which a network in space is warned of."""
+
+
+@dataclass(frozen=True)
+class SpaceFound:
+    """One network in space, and what it was trained on.
+
+    Attributes
+    ----------
+    network : SpaceNetwork
+    places : (n, 3) float array
+        The window's boundary or its voxels in patient millimeters, all of them.
+    """
+
+    network: SpaceNetwork
+    places: Floats
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a network is shown: voxels (n, 3) in patient millimeters, or the boundary around them."""
+
+    voxels: Floats
+    places: Floats
+    outlined: bool
+
+
+def require_surface(settings: Settings) -> None:
+    """Refuse to make a surface of a network in space that has no faces.
+
+    Raises
+    ------
+    UsageError
+    """
+    network = settings.network
+    if network.in_space and network.network not in SURFACES:
+        raise UsageError(
+            "the network has no faces, and bounds nothing", found=f"--network = {network.network}, --space = volume",
+            expected=f"--network {' | '.join(SURFACES)}, or --space slice",
+            hint="`tomomesh segment` writes its neurons",
+        )  # fmt: skip
+
+
+def segment_in_space(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[SpaceFound]]:
+    """Train one network on the whole window."""
+    run = settings.run
+    pieces = measured("window", pieces_of, kept.mask)
+    mask, count = pieces.value
+    shown = measured("points", _shown, kept, mask, settings)
+    voxels, places, outlined = shown.value.voxels, shown.value.places, shown.value.outlined
+    progress("networks", 0, 1)
+    trained = measured("networks", train_space, places, settings.network, outlined=outlined, seed=run.seed)
+    progress("networks", 1, 1)
+    labels = measured("regions", regions_in_space, mask, voxels, trained.value, run.threads)
+    network, sampling = trained.value, _sampled(trained.value)
+    source = SpaceFound(network, places)
+    found = Segmentation(kept.study, kept.plane, kept.mask, labels.value, sampling.points, sampling, source)
+    inside = not outlined and settings.network.network in SURFACES and not is_wall(mask)
+    dropped = int(np.count_nonzero(kept.mask) - np.count_nonzero(mask))
+    told = _network_found(network, kept.mask, count, dropped, inside=inside)
+    return folded(found, pieces, shown, trained, labels, told, points_found(sampling.points, sampling.spacing_mm))
+
+
+def _shown(kept: Selected, mask: NDArray[np.bool_], settings: Settings) -> Shown:
+    voxels = kept.study.to_mm(np.argwhere(mask)[:, ::-1].astype(np.float64))
+    if not _outlined(mask, settings):
+        return Shown(voxels, voxels, outlined=False)
+    chosen = kept.chosen
+    found = boundary(
+        chosen.volume, mask, lower=chosen.lower, upper=chosen.upper, layers=settings.window.layers, surface="outer",
+        threads=settings.run.threads,
+    )  # fmt: skip
+    return Shown(voxels, found.points.positions, outlined=True)
+
+
+def _network_found(
+    network: SpaceNetwork, mask: NDArray[np.bool_], pieces: int, dropped: int, *, inside: bool
+) -> Stage[None]:
+    """Tell of the one network in space, and what of the window it does not stand for."""
+    voxels = int(np.count_nonzero(mask))
+    stats: dict[str, dict[str, Any]] = {
+        "networks": {
+            "topology": network.lattice.name,
+            "neurons": len(network.lattice),
+            "trained": 1,
+            "signal": "boundary" if network.outlined else "region",
+            "pixels": network.inputs,
+            "strays": network.strays,
+            "slices_without": [],
+        },
+        "space": {"pieces": pieces, "dropped_voxels": dropped},
+    }
+    warnings = []
+    if inside:
+        warnings.append("the window is a solid, and the surface lies inside of it: --signal boundary lays it around")
+    if pieces > 1:
+        warnings.append(f"the window is in {pieces} pieces, and one network spans them all")
+    if dropped > LEFT_OUT * voxels:
+        warnings.append(f"{dropped} of {voxels} voxels of the window lie in small pieces, and were left out")
+    return Stage(None, stats, tuple(warnings))
+
+
+def _outlined(mask: NDArray[np.bool_], settings: Settings) -> bool:
+    """Tell whether the network sees the window's boundary; a torus, which has a hole of its own, is no wall."""
+    asked = settings.network
+    if asked.signal != "auto" or asked.network not in SURFACES:
+        return asked.signal == "boundary"
+    return asked.network == "torus" or not is_wall(mask)
+
+
+def _sampled(network: SpaceNetwork) -> Sampling:
+    """Return the neurons as the point set P; r is the longest edge."""
+    ends = network.codebook[network.lattice.edges]
+    spacing = float(np.sqrt(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1)).max())
+    points = replace(
+        PointSet.from_positions(network.codebook), neurons=np.arange(len(network.codebook), dtype=np.int32)
+    )
+    return Sampling(points, spacing, 0, NOTHING, NOTHING)
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """A finer mesh at rest; `filled` (m,) are its faces where there was nothing to rest on."""
+
+    mesh: TriMesh
+    filled: NDArray[np.bool_]
+    trace: Trace | None
+
+
+def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progress: Progress) -> Stage[Surface]:
+    """Make a network's own faces a closed surface that rests on the boundary of the window."""
+    threads = settings.run.threads
+    apart = measured("untangle", _untangled, found.source.network, threads)
+    faces = _divide(*apart.value)
+    rough = faces.value
+    ring = OneRing.of_quads(rough.quads.astype(np.int32), len(rough.vertices), threads)
+    rest = measured("fit", _fitted, rough, ring, found.source, settings, progress)
+    mesh = measured("untangle", untangle, rest.value.mesh, rough.vertices, ring, Crossings(threads))
+    made, taken_back, crossing = mesh.value
+    surface = Surface(
+        found.points, rough, rough.triangulated(), made, np.empty(0, np.int32), trace=rest.value.trace,
+        filled=rest.value.filled, crossing=crossing, rests_on=found.source.places, encloses_mm3=window_volume(found),
+    )  # fmt: skip
+    fitted = fit_found(rest.value.trace, len(rough.vertices), taken_back=taken_back)
+    filled: Stage[None] = Stage(None, {"fit": {"filled_faces": int(rest.value.filled.sum())}})
+    return folded(surface, apart, faces, rest, mesh, fitted, filled)
+
+
+@timed("smooth")
+def _divide(network: TriMesh, moved: int) -> Stage[QuadMesh]:
+    """Divide a network's own faces into finer squares."""
+    vertices, quads = squares_of(network)
+    rough = QuadMesh(vertices, quads.astype(np.int64))
+    stats: dict[str, dict[str, Any]] = {
+        "space": {"faces": len(network.faces), "untangled": moved},
+        "surface": {
+            "found": 1, "cavities": 0, "taken": 1, "debris": 0, "square_faces": len(quads), "enclosed_cubes": 0,
+        },
+    }  # fmt: skip
+    return Stage(rough, stats)
+
+
+def _untangled(network: SpaceNetwork, threads: int) -> tuple[TriMesh, int]:
+    """Return a network as a mesh that faces outward and does not pass through itself, if smoothing can help it."""
+    mesh = TriMesh(network.codebook, network.lattice.faces)
+    ring = OneRing.of_edges(mesh.edges, len(mesh.vertices), threads)
+    mesh, moved, _ = untangle(mesh, mesh.vertices, ring, Crossings(threads))
+    outward = mesh.face_volumes.sum() > 0
+    return mesh if outward else replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1])), moved
+
+
+def _fitted(rough: QuadMesh, ring: OneRing, found: SpaceFound, settings: Settings, progress: Progress) -> _Rest:
+    """Draw the finer mesh to the boundary of the window; over a wall the network itself is the middle surface."""
+    start, threads, origin = rough.triangulated(), settings.run.threads, found.places.min(axis=0)
+    unfilled = np.zeros(len(start.faces), np.bool_)
+    if not found.network.outlined:
+        return _Rest(start, unfilled, None)
+    edge = REACH * float(np.median(_lengths(rough)))
+    if settings.fit.attraction == "nearest":
+        mesh, trace = _drawn_to_points(rough, found.places, edge, settings, progress)
+        return _Rest(mesh, unfilled, trace)
+    samples = settle_points(found.places - origin, threads=threads, progress=progress)
+    vertices = rough.vertices - origin
+    rest = fit_to_surface(vertices, ring, samples, edge, settings.fit, threads=threads, progress=progress)
+    mesh = TriMesh(rest.vertices + origin, rest.faces)
+    return _Rest(mesh, any_of(rest.filled[rest.faces]), rest.trace)
+
+
+def _lengths(rough: QuadMesh) -> Floats:
+    ends = rough.vertices[rough.edges]
+    return np.asarray(np.sqrt(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1)))
+
+
+def _drawn_to_points(
+    rough: QuadMesh, places: Floats, edge: float, settings: Settings, progress: Progress
+) -> tuple[TriMesh, Trace]:
+    """Draw each vertex to the nearest place, first of all places, then around the last one (the paper's attraction)."""
+    start = rough.triangulated()
+    grid = partition(places, np.full(3, edge))
+    cube_of = np.empty(len(places), np.int64)
+    cube_of[grid.order] = np.repeat(np.arange(len(grid.keys)), np.diff(grid.start))
+    cubes = cube_of[cKDTree(places).query(rough.vertices)[1]]
+    springs = rough.edges if settings.fit.springs == "quads" else start.edges
+    rest = fit(
+        rough.vertices, springs, cubes, places, grid, settings.fit, threads=settings.run.threads, progress=progress
+    )  # fmt: skip
+    return start.moved(rest.vertices), rest.trace
+
+
+def _of_networks(report: dict[str, Any]) -> list[str]:
+    """Say what the one network in space is."""
+    networks, left = report["networks"], report["space"]["dropped_voxels"]
+    return [
+        f"network   a {networks['topology']} of {networks['neurons']} neurons in space on the window's "
+        f"{'boundary' if networks['signal'] == 'boundary' else 'voxels'}, "
+        f"{left or 'no'} voxel(s) of small pieces left out"
+    ]
+
+
+def _of_body(report: dict[str, Any]) -> list[str]:
+    space = report["space"]
+    return [f"faces     {space['faces']} of the network, divided into {report['surface']['square_faces']} squares"]
+
+
+def _because(settings: Settings, input: str) -> str:
+    network = settings.network
+    return f"with {'--space volume' if network.space == 'volume' else f'--network {network.network}'}"
+
+
+NEAREST = {"attraction": ("nearest",)}
+WAY = Way(
+    applies=lambda settings, input: input not in POINTS and settings.network.in_space,
+    because=_because,
+    reads=TRAINING
+    | parameters("allow_leaks", "attraction", "damping", "step", stiffness=NEAREST, springs=NEAREST, limit=NEAREST),
+    segment=segment_in_space,
+    surface=surface_in_space,
+    require=require_surface,
+    of_networks=_of_networks,
+    of_body=_of_body,
+)

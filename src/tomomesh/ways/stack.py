@@ -1,0 +1,106 @@
+"""A stack of contours: points -> slices -> insides -> voxels between the slices -> mesh."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..contours.stack import ContourSurface, contour_surface
+from ..results import Surface
+from ..stage import Stage, folded, measured
+from .points import place_found
+from .sections import body_of_voxels, boundary_found, points_found
+from .way import Way, on_input, parameters
+
+if TYPE_CHECKING:
+    from ..contours.slices import Slices
+    from ..model.points import PointSet
+    from ..progress import Progress
+    from ..settings import Settings
+    from .points import Points
+
+APART = 1.5
+"""Distance of two slices of a stack of contours, in median ones, over which a result is warned of."""
+
+
+def surface_of_stack(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
+    """Close a cloud that is a stack of contours."""
+    assert points.slices is not None
+    made = surface_of_slices(points.cloud, points.slices, settings, progress, unit=settings.run.units, told=True)
+    return folded(made.value, made, place_found(points))
+
+
+def surface_of_slices(
+    cloud: PointSet, slices: Slices, settings: Settings, progress: Progress,
+    *, finest: float | None = None, bridged: int = 0, encloses: float = 0.0, unit: str = "mm", told: bool = False,
+) -> Stage[Surface]:  # fmt: skip
+    """Turn contours into a closed surface.
+
+    Parameters
+    ----------
+    cloud : PointSet
+    slices : Slices
+    settings : Settings
+    progress : callable
+    finest : float, optional
+        Edge of the voxels between the slices, where no cell is asked for.
+    bridged : int
+        Gaps of the contours that were bridged.
+    encloses : float
+        Volume that the contours enclose, where it is known.
+    unit : str
+    told : bool
+        Whether to warn of slices that lie far apart.
+    """
+    asked = settings.cubes
+    edge = finest if asked.cell_mm is None else float(np.min(asked.cell_mm))
+    closed = measured(
+        "contours", contour_surface, cloud.positions, slices, edge=None if edge is None else edge * asked.cell_factor,
+        allow_leaks=asked.allow_leaks, fit=settings.fit, threads=settings.run.threads, progress=progress,
+    )  # fmt: skip
+    made = closed.value
+    surface = Surface(
+        cloud, made.boundary.cuberille, made.rest.smoothed, made.mesh, made.rest.nearest, filled=made.filled,
+        cavities=made.boundary.cavities, encloses_mm3=encloses,
+    )  # fmt: skip
+    spaced = points_found(cloud, slices.spacing, unit=unit, bridged=bridged)
+    return folded(surface, closed, spaced, boundary_found(made.boundary, made.rest), _stack_found(made, slices, told))
+
+
+def _stack_found(made: ContourSurface, slices: Slices, told: bool) -> Stage[None]:
+    """Tell of the slices, and the voxels between them."""
+    widest = float(np.diff(slices.heights).max())
+    stats: dict[str, dict[str, Any]] = {
+        "stack": {
+            "slices": made.slices,
+            "contours": made.contours,
+            "open": made.open,
+            "slice_distance_mm": slices.distance,
+            "widest_slice_distance_mm": widest,
+            "longest_gap": made.reach,
+            "voxel_mm": made.edge,
+            "voxels": made.voxels,
+        },
+        "fit": {"filled_faces": int(made.filled.sum())},
+    }
+    warnings = []
+    if told and widest > APART * slices.distance:
+        warnings.append(f"slices lie up to {widest:.4g} apart, {slices.distance:.4g} as a rule: that is interpolated")
+    if made.edge > made.asked_edge:
+        warnings.append(f"voxels of {made.asked_edge:.4g} would not fit: they are {made.edge:.4g} wide")
+    return Stage(None, stats, tuple(warnings))
+
+
+def body_of_stack(report: dict[str, Any]) -> list[str]:
+    """Say in the summary what voxels lie between the slices."""
+    return body_of_voxels(report, "insides of contours interpolated")
+
+
+WAY = Way(
+    applies=lambda settings, input: input == "stack",
+    because=on_input,
+    reads=parameters("cell_mm", "cell_factor", "stacks", "allow_leaks", "attraction", "stiffness"),
+    surface=surface_of_stack,
+    of_body=body_of_stack,
+)
