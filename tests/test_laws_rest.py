@@ -45,6 +45,11 @@ def edge_of(surface: Surface) -> float:
     return float(min(surface.report["cubes"]["cell_mm"]))
 
 
+def trace_of(surface: Surface) -> Trace:
+    assert surface.trace is not None
+    return surface.trace
+
+
 def assert_honest(trace: Trace, tolerance: float = TOLERANCE) -> None:
     """A mesh is called at rest only where the last speed and acceleration say so."""
     assert not trace.converged or max(trace.speed[-1], trace.acceleration[-1]) < tolerance
@@ -65,24 +70,24 @@ class TestClouds:
     def test_come_to_rest_however_noisy(self, seed: int, attraction: str) -> None:
         made = reconstruct_points(noisy_torus(seed), attraction=attraction)
         assert made.report["fit"]["converged"]
-        assert_honest(made.trace)
+        assert_honest(trace_of(made))
 
     @pytest.mark.parametrize("points", [sphere(size(3000, 600)), torus(size(3000, 900))])
     def test_come_to_rest_in_the_paper_s_twenty_to_thirty_steps(self, points: Floats) -> None:
         made = reconstruct_points(points)
         assert made.report["fit"]["converged"]
-        assert len(made.trace.speed) <= 30
+        assert len(trace_of(made).speed) <= 30
 
     @pytest.mark.parametrize("attraction", ["surface", "nearest"])
     def test_one_more_step_from_rest_moves_nothing(self, attraction: str) -> None:
         points = noisy_torus(7)
         made = reconstruct_points(points, attraction=attraction, tolerance=TOLERANCE)
-        count = len(made.trace.speed)
+        count = len(trace_of(made).speed)
         same, more = (
             reconstruct_points(points, attraction=attraction, tolerance=NEVER, max_steps=count + n) for n in (0, 1)
         )
-        assert made.trace.converged
-        assert not same.trace.converged
+        assert trace_of(made).converged
+        assert not trace_of(same).converged
         assert made.mesh.vertices.tobytes() == same.mesh.vertices.tobytes()
         moved = np.linalg.norm(more.mesh.vertices - same.mesh.vertices, axis=1)
         assert moved.max() < TOLERANCE * edge_of(made)
@@ -92,14 +97,14 @@ class TestClouds:
     def test_are_never_called_at_rest_while_they_move(self, seed: int, most: int, tolerance: float) -> None:
         points = noisy_torus(seed, size(2500, 900), 0.06)
         made = reconstruct_points(points, max_steps=most, tolerance=tolerance)
-        assert_honest(made.trace, tolerance)
-        assert made.report["fit"]["converged"] == made.trace.converged
-        assert len(made.trace.speed) == most or made.trace.converged
+        assert_honest(trace_of(made), tolerance)
+        assert made.report["fit"]["converged"] == trace_of(made).converged
+        assert len(trace_of(made).speed) == most or trace_of(made).converged
 
     def test_are_not_at_rest_before_the_last_projection(self) -> None:
         """Whatever the tolerance: the projections would still be sought anew."""
         made = reconstruct_points(noisy_torus(1, size(2500, 900)), tolerance=1e6)
-        assert len(made.trace.speed) == 21
+        assert len(trace_of(made).speed) == 21
 
 
 class TestProjections:
@@ -108,7 +113,7 @@ class TestProjections:
     def test_springs_that_hold_let_the_mesh_slow_down(self) -> None:
         """Without them it would creep: four times as fast at the twentieth step."""
         made = reconstruct_points(torus(size(3000, 1500)))
-        assert made.trace.speed[19] < 0.004
+        assert trace_of(made).speed[19] < 0.004
 
     def test_springs_even_the_mesh_out_all_the_same(self, monkeypatch: pytest.MonkeyPatch) -> None:
         points = torus(size(3000, 900))
@@ -119,7 +124,7 @@ class TestProjections:
     def test_little_is_left_to_do_after_the_last(self) -> None:
         """Vertices that have moved some way are projected anew before: each of the next jumps is short."""
         made = reconstruct_points(torus(size(3000, 1500)))
-        assert made.trace.acceleration[20] < 0.015
+        assert trace_of(made).acceleration[20] < 0.015
 
     def test_the_last_are_exact(self) -> None:
         """Projected once more where they came to rest, the vertices of a smooth surface lie on it already."""

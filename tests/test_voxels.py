@@ -24,6 +24,7 @@ from tomomesh.errors import EmptyError, ResourceError
 from tomomesh.io import read_mesh, read_points, read_volume
 from tomomesh.isosurface import surface_nets as nets
 from tomomesh.isosurface.crossings import CLOSEST
+from tomomesh.isosurface.diagonals import _is_odd
 from tomomesh.isosurface.surface_nets import TENSION, WALL
 from tomomesh.isosurface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
 from tomomesh.isosurface.well_composed import without_contacts
@@ -185,6 +186,24 @@ class TestParts:
         one, other = (halves_above(levels, cut + 8) for levels in (gray, part))
         assert one
         assert one == other
+
+    @law(20)
+    @given(seed=seeds, cut=st.integers(1, 12))
+    def test_squares_take_turns_by_where_they_lie(self, seed: int, cut: int) -> None:
+        gray = np.random.default_rng(seed).normal(size=(24, 5, 5))
+        part = gray.copy()
+        part[:cut] = -1.0
+        one, other = (turns_of(levels) for levels in (gray, part))
+        both = one.keys() & other.keys()
+        assert {one[square] for square in both} == {False, True}
+        assert all(one[square] == other[square] for square in both)
+
+
+def turns_of(gray: Floats) -> dict[tuple[int, ...], bool]:
+    """Return whose turn it is at each square, by the voxel behind it and the direction to the one before it."""
+    net = boundary(volume_of(gray), gray > 0, lower=0.0).net
+    squares = np.column_stack([net.inner, net.directions]).tolist()
+    return dict(zip(map(tuple, squares), _is_odd(net).tolist(), strict=True))
 
 
 def halves_above(gray: Floats, height: float) -> set[tuple[tuple[float, ...], ...]]:
