@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import pkgutil
+from importlib import import_module
 from itertools import product
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from numba.core import config
 
+from tomomesh import kernels
 from tomomesh.cuberille.bitmasks import Blocks
 from tomomesh.cuberille.closing import Shell
 from tomomesh.cuberille.faces import Faces, exposed_faces
@@ -25,16 +30,34 @@ COMPILED = not config.DISABLE_JIT
 """Whether the kernels run as machine code; where they do not, the tests are smaller."""
 
 
+settings.register_profile(
+    "repeatable", deadline=None, derandomize=True, database=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+)  # fmt: skip
+settings.load_profile("repeatable")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
+    """Run a single file in this process: its fixtures are made once, and starting others takes longer."""
+    return 0 if len(config.args) == 1 and Path(config.args[0].partition("::")[0]).is_file() else None
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile the kernels once, before there are several processes that would."""
+    if config.getoption("dist", "no") != "no" and not hasattr(config, "workerinput"):
+        for module in pkgutil.walk_packages(kernels.__path__, f"{kernels.__name__}."):
+            import_module(module.name)
+
+
 def size(compiled: Number, plain: Number) -> Number:
     """Return the first size for compiled kernels, the second for kernels in plain Python."""
     return compiled if COMPILED else plain
 
 
 def law(examples: int) -> settings:
-    """Try a law on a number of examples, the same every time."""
-    few = size(examples, max(examples // 5, 3))
-    slow = [HealthCheck.too_slow, HealthCheck.data_too_large]
-    return settings(max_examples=few, deadline=None, derandomize=True, database=None, suppress_health_check=slow)
+    """Try a law on a number of examples."""
+    return settings(max_examples=size(examples, max(examples // 5, 3)))
 
 
 seeds = st.integers(0, 2**32 - 1)

@@ -108,10 +108,7 @@ def fuzz(
     whole = path.read_bytes()
     read(path)
 
-    @settings(
-        max_examples=LONG or SHORT, derandomize=not LONG, deadline=None, database=None,
-        suppress_health_check=list(HealthCheck),
-    )  # fmt: skip
+    @settings(max_examples=LONG or SHORT, derandomize=not LONG, suppress_health_check=list(HealthCheck))
     @given(st.lists(edits(), min_size=1, max_size=5), st.none() | st.floats(0, 0.999))
     def damaged(chosen: list[Edit], cut: float | None) -> None:
         raw = bytearray(whole)

@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -312,6 +313,7 @@ class TestFaults:
         running = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.PIPE, env=os.environ)
         while not ready.exists():
             assert running.poll() is None, running.communicate()
+            time.sleep(0.01)
         running.send_signal(number)
         _, said = running.communicate(timeout=60)
         assert running.returncode == code

@@ -120,7 +120,7 @@ class TestMeasured:
             "import re, pathlib\n"
             "from conftest import sphere\n"
             "from tomomesh import reconstruct_points\n"
-            "from tomomesh.cuberille import forecast as f\n"
+            "from tomomesh.pointcloud import forecast as f\n"
             "status = pathlib.Path('/proc/self/status')\n"
             "peak = lambda: 1024 * int(re.search(r'VmHWM:\\s+(\\d+)', status.read_text())[1])\n"
             "reconstruct_points(sphere(1000)); before = peak()\n"

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
+import shutil
+import tempfile
 import warnings
-from typing import TYPE_CHECKING
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pydicom
@@ -17,15 +21,20 @@ from tomomesh.errors import FormatError, GeometryError
 from tomomesh.io import read_volume
 from tomomesh.settings import ReadSettings
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 AXIAL = AFFINES["axial"]
 STORED = sampled(AXIAL)
 
 
 def write_disc(folder: Path, *, series: int = 1) -> Path:
-    """Write a disc with some series of five slices."""
+    """Write a disc with some series of five slices: a copy of the one that pydicom wrote once."""
+    return Path(shutil.copytree(pressed(series), folder))
+
+
+@cache
+def pressed(series: int) -> Path:
+    """Let pydicom write a disc, which is slow."""
+    folder = Path(tempfile.mkdtemp()) / "disc"
+    atexit.register(shutil.rmtree, folder.parent)
     disc = FileSet()
     for number in range(1, series + 1):
         for k in range(5):

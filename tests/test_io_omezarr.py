@@ -379,9 +379,7 @@ def test_damage_ends_in_a_result_or_in_one_line(tmp_path: Path, zarr_format: int
     whole = {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
     edit = st.tuples(st.integers(0, len(whole) - 1), st.integers(0, 2**12), st.integers(0, 6), st.binary(max_size=6))
 
-    @hypothesis_settings(
-        max_examples=40, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
-    )
+    @hypothesis_settings(max_examples=40, suppress_health_check=list(HealthCheck))
     @given(edits=st.lists(edit, min_size=1, max_size=3))
     def damage(edits: list[tuple[int, int, int, bytes]]) -> None:
         for path, data in whole.items():

@@ -324,9 +324,7 @@ def test_damage_ends_in_a_result_or_in_one_line(tmp_path: Path, name: str) -> No
     (tmp_path / name).write_bytes(whole)
     assert read_volume(tmp_path / name, settings=SPACING).shape == STORED.shape
 
-    @hypothesis_settings(
-        max_examples=60, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
-    )
+    @hypothesis_settings(max_examples=60, suppress_health_check=list(HealthCheck))
     @given(edits=EDITS, cut=st.one_of(st.none(), st.integers(1, len(whole))))
     def damage(edits: list[tuple[int, int, bytes]], cut: int | None) -> None:
         raw = bytearray(whole)

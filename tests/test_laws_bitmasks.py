@@ -61,7 +61,7 @@ def stepped(blocks: Blocks, bitmask: Bitmask, offset: tuple[int, int, int]) -> B
     return found
 
 
-class TestBoard:
+class TestBitmask:
     @law(100)
     @given(cells=scattered())
     def test_lists_the_cells_that_it_was_made_of(self, cells: Cells) -> None:
@@ -202,7 +202,7 @@ class TestSpace:
         assert blocks.count(reached).sum() == EDGE**3 * len(blocks) - len(cells)
 
 
-def test_threads_change_no_board(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_threads_change_no_bitmask(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "SHARE", 3)
     cells = np.random.default_rng(0).integers(-20, size(60, 5), (200, 3))
     one, two = (Blocks.around(cells, 4, threads=n) for n in (1, 2))

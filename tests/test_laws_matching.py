@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds
-from tomomesh.measure.matching import alike, matched
+from tomomesh.measure.matching import matched, similar
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,5 +62,5 @@ def test_where_none_costs_nothing_only_what_is_worth_it_is_paired(
     assert sum(worth[pair] for pair in matched(-worth, allowed, alone=0.0)) == pytest.approx(best, rel=1e-9)
 
 
-def test_areas_are_alike_up_to_four_times() -> None:
-    assert alike([1.0, 8.0], [4.0, 4.1, 2.0]).tolist() == [[True, False, True], [True, True, True]]
+def test_areas_are_similar_up_to_four_times() -> None:
+    assert similar([1.0, 8.0], [4.0, 4.1, 2.0]).tolist() == [[True, False, True], [True, True, True]]

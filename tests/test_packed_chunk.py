@@ -22,7 +22,7 @@ PACKERS: dict[str, Callable[[bytes], bytes]] = {
     "gzip": gzip.compress,
     "zlib": zlib.compress,
     "bz2": bz2.compress,
-    "lzma": lzma.compress,
+    "lzma": lambda data: lzma.compress(data, preset=0),
 }
 
 

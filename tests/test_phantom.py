@@ -6,9 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from conftest import law
 from tomomesh.errors import UsageError
 from tomomesh.head_phantom import NASAL_OPENING, Head, Phantom, phantom
 
@@ -98,7 +99,7 @@ class TestWindow:
 
 
 class TestMaking:
-    @settings(max_examples=40, deadline=None)
+    @law(40)
     @given(
         shape=st.tuples(st.integers(2, 9), st.integers(16, 48), st.integers(16, 48)),
         across=st.floats(0.05, 20),

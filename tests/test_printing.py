@@ -17,7 +17,7 @@ from tomomesh.measure.topology import check_promise, topology
 from tomomesh.measure.winding import linings, winding_number
 from tomomesh.model.mesh import TriMesh
 from tomomesh.printing import solids
-from tomomesh.printing.base import direction_of
+from tomomesh.printing.flat_base import direction_of
 from tomomesh.printing.part import make_part
 from tomomesh.settings import Settings
 from tomomesh.settings.printing import SIDES

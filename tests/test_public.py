@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import pkgutil
 import re
 from pathlib import Path
@@ -15,6 +16,8 @@ from tomomesh.segmentation.signal import pixels_of
 from tomomesh.segmentation.training import train_study
 from tomomesh.settings import NetworkSettings
 from tomomesh.som.region import train_region
+
+PAGES = sorted(Path(__file__).parents[1].glob("docs/*.md"))
 
 
 def test_public_names_are_found_and_no_others() -> None:
@@ -38,6 +41,20 @@ def test_the_readmes_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.chdir(tmp_path)
     exec(example[1], {})
     assert (tmp_path / "skull.ply").exists()
+
+
+@pytest.mark.parametrize("name", sorted({*tomomesh.__all__} - {"__version__"}))
+def test_a_public_name_has_an_example_that_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (example,) = doctest.DocTestFinder(recurse=False).find(getattr(tomomesh, name), name, globs={})
+    assert any(line.want for line in example.examples)
+    assert doctest.DocTestRunner().run(example).failed == 0
+
+
+@pytest.mark.parametrize("page", [path for path in PAGES if ">>> " in path.read_text("utf-8")], ids=lambda p: p.name)
+def test_the_examples_of_a_page_run(page: Path) -> None:
+    found = doctest.DocTestParser().get_doctest(page.read_text("utf-8"), {}, page.name, str(page), 0)
+    assert doctest.DocTestRunner().run(found).failed == 0
 
 
 def test_what_is_no_study_is_refused() -> None:

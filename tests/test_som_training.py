@@ -59,6 +59,13 @@ class TestFall:
         np.testing.assert_allclose(falling(8, 2, 11, fall="inverse"), 8 / (1 + 3 * t))
         np.testing.assert_allclose(falling(8, 2, 11, fall=lambda t: (1 - t) ** 2), 2 + 6 * (1 - t) ** 2)
 
+    @pytest.mark.parametrize("fall", ["linear", "power", "exponential", "inverse"])
+    @pytest.mark.parametrize("scale", [1e-3, 0.0625, 1.0, 1e3])
+    def test_are_the_same_in_every_unit(self, fall: str, scale: float) -> None:
+        """A learning rate falls from below 1, a radius from above: both alike."""
+        whole = falling(8, 2, 11, fall=fall)
+        np.testing.assert_allclose(falling(8 * scale, 2 * scale, 11, fall=fall), scale * whole, rtol=1e-12)
+
     @pytest.mark.parametrize("wrong", [lambda t: t[:-1], lambda t: t * np.nan, "steep"])
     def test_refuses_what_is_none(self, wrong: Any) -> None:
         with pytest.raises(UsageError, match="fall"):

@@ -29,6 +29,15 @@ class TomomeshError(Exception):
         The flag or action that may help.
     flags : sequence of str
         The options among these that make the same command go on, as ``"--fill-gaps"``: for programs, in place of words.
+
+    Examples
+    --------
+    >>> from tomomesh import TomomeshError, read_mesh
+    >>> try:
+    ...     read_mesh("nowhere.stl")
+    ... except TomomeshError as error:
+    ...     print(error.exit_code, error)
+    3 the path cannot be read. File: nowhere.stl [no such file or directory].
     """
 
     exit_code = 1

@@ -200,6 +200,13 @@ def phantom(
     ------
     UsageError
         For a shape, spacing, contrast or noise outside these limits.
+
+    Examples
+    --------
+    >>> from tomomesh import phantom
+    >>> head = phantom((12, 32, 32), (7.5, 7.5, 12.0))
+    >>> head.volume, head.lower, head.upper
+    (Volume(12 x 32 x 32 of uint8, 7.5 x 7.5 x 12 mm), 200, 255)
     """
     _check(shape, spacing_mm, contrast, noise)
     tissue, head = CONTRASTS[contrast], Head.fitted(shape, spacing_mm)

@@ -62,6 +62,14 @@ def reconstruct(
     ------
     TomomeshError
         Of the kind that fits; see `tomomesh.errors`.
+
+    Examples
+    --------
+    >>> from tomomesh import phantom, reconstruct
+    >>> head = phantom((12, 32, 32), (7.5, 7.5, 12.0))
+    >>> found = reconstruct(head.volume, lower=head.lower, neurons=40)
+    >>> found.report["quality"]["closed"], found.report["quality"]["genus"]
+    (True, 0)
     """
     settings = _settled(settings, changes)
     begun = _begin(settings, changes, input=_input_of(volume))
@@ -84,6 +92,14 @@ def segment(
     """Run stage one alone: window, networks, regions, points.
 
     Parameters and errors are those of `reconstruct`.
+
+    Examples
+    --------
+    >>> from tomomesh import phantom, segment
+    >>> head = phantom((12, 32, 32), (7.5, 7.5, 12.0))
+    >>> found = segment(head.volume, lower=head.lower, neurons=40)
+    >>> found.report["networks"]["trained"]
+    12
     """
     settings = _settled(settings, changes)
     return _segmented(volume, labels, settings, _begin(settings, changes, input=_input_of(volume)), progress)
@@ -108,6 +124,18 @@ def reconstruct_points(
     Returns
     -------
     Surface
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tomomesh import reconstruct_points
+    >>> turn = np.arange(500) + 0.5
+    >>> z, angle = 1 - turn / 250, 2.4 * turn
+    >>> flat = np.sqrt(1 - z**2)
+    >>> ball = np.column_stack([flat * np.cos(angle), flat * np.sin(angle), z])
+    >>> found = reconstruct_points(ball)
+    >>> round(found.report["quality"]["volume_mm3"] / (4 / 3 * np.pi), 2)
+    1.0
     """
     settings = _settled(settings, changes)
     cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ..measure.matching import SHARED, alike, matched
+from ..measure.matching import SHARED, matched, similar
 from .curves import mask_of, moments_of
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def link_slices(slices: Sequence[Sequence[Part]], heights: Floats, pixel: float)
 def _successors(below: Sequence[Part], above: Sequence[Part], step: float, pixel: float) -> list[tuple[int, int]]:
     cost, like = (
         np.zeros((len(below), len(above))),
-        alike(*([part.moments.area for part in one] for one in (below, above))),
+        similar(*([part.moments.area for part in one] for one in (below, above))),
     )
     allowed = np.zeros(like.shape, np.bool_)
     for a, one in enumerate(below):

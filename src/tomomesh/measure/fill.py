@@ -39,6 +39,18 @@ def fill_mesh(mesh: TriMesh, volume: Volume) -> Mask:
     ------
     GeometryError
         Where the mesh is not closed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tomomesh import TriMesh, Volume, fill_mesh
+    >>> corner = TriMesh(3.5 * np.eye(4, 3, -1) - 0.25, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> grid = Volume.from_stored(np.zeros((4, 4, 4)), np.eye(4))
+    >>> fill_mesh(corner, grid)[:, 0].astype(int)
+    array([[1, 1, 1, 0],
+           [1, 1, 0, 0],
+           [1, 0, 0, 0],
+           [0, 0, 0, 0]])
     """
     _require_closed(mesh)
     inside = np.zeros(volume.shape, np.bool_)

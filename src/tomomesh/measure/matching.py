@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-ALIKE = 4.0
+SIMILAR = 4.0
 """Most that the areas differ of two parts that go on as each other. Chosen: half of it changes the distance by -0.1 %,
 twice nothing."""
 SHARED = 0.1
@@ -20,10 +20,10 @@ SHARED = 0.1
 and twice of it change no case of benchmarks/constants.py."""
 
 
-def alike(before: Sequence[float], here: Sequence[float]) -> NDArray[np.bool_]:
+def similar(before: Sequence[float], here: Sequence[float]) -> NDArray[np.bool_]:
     """Tell which areas (a,) of a slice are like which (b,) of the next, (a, b)."""
     one, other = np.array(before, np.float64)[:, None], np.array(here, np.float64)[None, :]
-    return np.asarray(np.maximum(one, other) <= ALIKE * np.minimum(one, other))
+    return np.asarray(np.maximum(one, other) <= SIMILAR * np.minimum(one, other))
 
 
 def matched(cost: NDArray[np.float64], allowed: NDArray[np.bool_], alone: float | None = None) -> list[tuple[int, int]]:

@@ -63,6 +63,17 @@ def assess(
     -------
     dict
         Counts, areas, volumes, triangle shapes and distances; each key names its unit (see docs/report.md).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tomomesh import TriMesh, assess
+    >>> corner = TriMesh(np.eye(4, 3, -1), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> found = assess(corner)
+    >>> found["closed"], found["genus"], round(6 * found["volume_mm3"], 9)
+    (True, 0, 1.0)
+    >>> assess(TriMesh(corner.vertices, corner.faces[:3]))["boundary_edges"]
+    3
     """
     found, table = _of_surface(mesh, cavities, threads, progress)
     tree = Tree.of_faces(mesh, threads=threads)

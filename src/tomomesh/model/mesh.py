@@ -22,6 +22,14 @@ class TriMesh:
         Positions (x, y, z).
     faces : (m, 3) int64 array
         Vertex numbers, counter-clockwise seen from outside.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tomomesh import TriMesh
+    >>> corner = TriMesh(np.eye(4, 3, -1), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> round(6 * float(corner.face_volumes.sum()), 9), len(corner.edges)
+    (1.0, 6)
     """
 
     vertices: NDArray[np.float64]

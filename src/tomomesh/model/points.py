@@ -52,6 +52,14 @@ class PointSet:
         ``"LPS"`` where the file of a cloud says that it is in patient millimeters; else ``"unknown"``.
     notes : tuple of str
         What the reader decided or dropped, one line each, without patient data.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tomomesh import PointSet
+    >>> cloud = PointSet.from_positions(np.eye(3))
+    >>> len(cloud), cloud.slices.tolist(), cloud.frame
+    (3, [-1, -1, -1], 'unknown')
     """
 
     positions: NDArray[np.float64]

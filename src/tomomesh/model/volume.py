@@ -72,6 +72,17 @@ class Volume:
         ``"HU"`` for CT, else ``"stored"``.
     notes : tuple of str
         What the reader decided or dropped, one line each, without patient data.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tomomesh import Volume
+    >>> to_the_right = np.diag([-0.5, 0.5, 2.0, 1.0])
+    >>> study = Volume.from_stored(np.arange(24).reshape(4, 3, 2), to_the_right)
+    >>> study
+    Volume(4 x 3 x 2 of int64, 0.5 x 0.5 x 2 mm)
+    >>> study.voxels[0, 0].tolist(), study.grid.flipped
+    ([1, 0], (False, False, True))
     """
 
     voxels: NDArray[Any]

@@ -14,7 +14,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..kernels.pointcloud.samples import tangents
+from ..kernels.pointcloud.linear_algebra import tangents
 from ..kernels.pointcloud.sheet import DIRECTIONS, find_depths, find_disks, flatten
 from ..kernels.threads import in_blocks
 from ..pointcloud.search import Index

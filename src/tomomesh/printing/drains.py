@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..measure.winding import pieces_of
-from .base import direction_of
+from .flat_base import direction_of
 from .solids import mesh_of, solid_of
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from ..errors import GeometryError, UsageError
 from ..measure.topology import check_promise, topology
 from ..measure.winding import linings
 from ..progress import Progress, silent
-from .base import stood
 from .cavity import hollowed
 from .drains import drained
+from .flat_base import stood
 from .solids import require_solids
 from .verdict import verdict
 

@@ -11,7 +11,7 @@ from ..measure.thickness import SHARE, walls_and_gaps
 from ..measure.topology import topology
 from ..measure.winding import linings, pieces_of
 from ..progress import Progress, silent
-from .base import direction_of
+from .flat_base import direction_of
 
 if TYPE_CHECKING:
     from ..measure.thickness import Thickness

@@ -45,6 +45,14 @@ def window(volume: Volume, *, lower: Limit = -np.inf, upper: Limit = np.inf, lay
         Where the limits leave no gray level between them.
     EmptyError
         Where nothing lies in the window; names the range of the data.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tomomesh import Volume, window
+    >>> study = Volume.from_stored(np.arange(8).reshape(2, 2, 2), np.eye(4))
+    >>> window(study, lower=2, upper=5).sum(axis=(1, 2))
+    array([1, 2])
     """
     kept, levels = by_layer(volume, lower=lower, upper=upper), volume.voxels
     joined = kept if levels.ndim == 3 else ~any_of_layers(~kept) if layers == "all" else any_of_layers(kept)

@@ -51,7 +51,17 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Settings:
-    """All parameters of a run, in groups."""
+    """All parameters of a run, in groups.
+
+    Examples
+    --------
+    >>> from tomomesh import Settings
+    >>> settings = Settings().replace(neurons=80, lower=200.0)
+    >>> settings.network.neurons, settings.window.lower
+    (80, 200.0)
+    >>> Settings().network.neurons == settings.network.neurons
+    False
+    """
 
     read: ReadSettings = field(default_factory=ReadSettings)
     cloud: CloudSettings = field(default_factory=CloudSettings)

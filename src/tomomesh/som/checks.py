@@ -7,8 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import UsageError
+from ..kernels.som.online import INDEX_BITS
+from ..model.graph import lattice_of
+from ..model.lattice import lattice
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+    from ..model.lattice import Lattice
 
 
 def checked_matrix(X: ArrayLike, estimator: str, *, features: int | None = None) -> NDArray[np.float64]:
@@ -55,6 +62,25 @@ def checked_weights(sample_weight: ArrayLike | None, samples: int) -> NDArray[np
     if not np.isfinite(weights).all() or (weights < 0).any() or not weights.any():
         raise ValueError("Sample weights must be finite, none negative, and not all zero.")
     return weights
+
+
+def checked_lattice(topology: str, neurons: int, *, shape: tuple[int, int] | None, edges: ArrayLike | None) -> Lattice:
+    """Return the network of a topology, or of a graph's edges (e, 2).
+
+    Raises
+    ------
+    UsageError
+        Where edges are given to another topology, or there are too many neurons.
+    """
+    if topology == "graph":
+        found = lattice_of(np.empty((0, 2), int) if edges is None else edges, neurons)
+    elif edges is not None:
+        raise UsageError("edges are a graph's", found=f"topology = {topology}", expected="graph")
+    else:
+        found = lattice(topology, neurons, shape=shape)
+    if len(found) > INDEX_BITS:
+        raise UsageError("the network is too large", found=f"{len(found)} neurons", expected=f"{INDEX_BITS}")
+    return found
 
 
 def seed_of(random_state: Any) -> int:

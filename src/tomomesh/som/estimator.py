@@ -8,12 +8,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..errors import UsageError
-from ..kernels.som.online import INDEX_BITS
-from ..model.graph import lattice_of
-from ..model.lattice import lattice
 from ..settings import NetworkSettings
-from .checks import checked_matrix, checked_weights, not_fitted, seed_of
+from .checks import checked_lattice, checked_matrix, checked_weights, not_fitted, seed_of
 from .fit import fit, match
 from .inputs import flat
 from .measures import quantization_error
@@ -172,11 +168,7 @@ class SOM(Parametrized):
         alpha_fall, radius_fall = (None if isinstance(f, str) else f for f in (self.alpha_fall, self.radius_fall))
         if warning := schedule_warning(settings, alpha_fall=alpha_fall, radius_fall=radius_fall):
             warnings.warn(warning, stacklevel=2)
-        self.lattice_ = self._lattice()
-        if len(self.lattice_) > INDEX_BITS:
-            raise UsageError(
-                "the network is too large", found=f"{len(self.lattice_)} neurons", expected=f"{INDEX_BITS}"
-            )
+        self.lattice_ = checked_lattice(self.topology, self.n_neurons, shape=self.shape, edges=self.edges)
         self.seed_ = seed_of(self.random_state)
         start = None if isinstance(self.start, str) else np.asarray(self.start, np.float64)
         fitted = fit(
@@ -274,13 +266,6 @@ class SOM(Parametrized):
             radius_fall=self.radius_fall if isinstance(self.radius_fall, str) else "power",
             radius_power=self.radius_power, least_move=self.least_move, trim=self.trim,
         )  # fmt: skip
-
-    def _lattice(self) -> Lattice:
-        if self.topology == "graph":
-            return lattice_of(np.empty((0, 2), int) if self.edges is None else self.edges, self.n_neurons)
-        if self.edges is not None:
-            raise UsageError("edges are a graph's", found=f"topology = {self.topology}", expected="graph")
-        return lattice(self.topology, self.n_neurons, shape=self.shape)
 
     def _settle(
         self, codebook: NDArray[np.float64], inputs: NDArray[np.float64], weights: NDArray[np.float64] | None

@@ -147,7 +147,7 @@ def _error(codebook: Floats, shown: Shown) -> float:
 def match(codebook: Floats, by_axis: Floats) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return the winner of each input and the squared distance to it (eq. 1); arrays are (d, u) and (d, n), d > 1.
 
-    In single precision, relative to the first neuron, or to their middle in over `wide.WIDE` dimensions.
+    In single precision, relative to the first neuron, or to their middle in over `products.WIDE` dimensions.
     """
     if len(codebook) > wide.WIDE:
         return wide.best_matching_units(codebook.T, by_axis.T)

@@ -61,6 +61,15 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
         For a file without points.
     ResourceError
         For a file that would not fit into the memory.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tomomesh import read_points
+    >>> np.savetxt("cloud.csv", [[0, 0, 0, 7], [1, 0, 2, 8]], "%d", ",", header="x,y,z,intensity", comments="")
+    >>> cloud = read_points("cloud.csv")
+    >>> cloud.positions.tolist(), cloud.attributes["intensity"].tolist()
+    ([[0.0, 0.0, 0.0], [1.0, 0.0, 2.0]], [7, 8])
     """
     path = existing_file(path)
     if suffix_of(path) not in POINT_READERS and is_dicom(path):

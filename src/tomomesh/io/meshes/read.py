@@ -36,6 +36,15 @@ def read_mesh(path: str | Path) -> TriMesh:
         For broken files, vertices that are not finite, and unknown suffixes.
     EmptyError
         For a file without faces.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tomomesh import TriMesh, read_mesh, write_mesh
+    >>> corner = TriMesh(np.eye(4, 3, -1), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> write_mesh(corner, "corner.off")
+    >>> read_mesh("corner.off").faces.tolist() == corner.faces.tolist()
+    True
     """
     path = existing_file(path)
     read, file = reader_of(path, MESH_READERS), str(path)

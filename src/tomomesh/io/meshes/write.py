@@ -8,6 +8,7 @@ from ...model.points import COLORS
 from ..fields import AXES, flat_columns
 from ..files.atomic import check_output
 from ..files.source import suffix_of
+from .attributes import MeshAttributes
 from .gifti import write_gifti
 from .glb import write_glb
 from .obj import write_obj
@@ -16,7 +17,6 @@ from .ply import write_ply_mesh
 from .stl import write_stl
 from .threemf import write_3mf
 from .vtp import write_vtp_mesh
-from .written import Written
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -59,11 +59,21 @@ def write_mesh(
         For a suffix that has no writer, and fields of another length or without numbers.
     OutputError
         Where the file cannot be written, the format cannot keep distinct vertices apart, or needs a unit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pathlib import Path
+    >>> from tomomesh import TriMesh, write_mesh
+    >>> corner = TriMesh(np.eye(4, 3, -1), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> write_mesh(corner, "corner.stl")
+    >>> Path("corner.stl").stat().st_size == 84 + 50 * len(corner.faces)
+    True
     """
     check_output(path, MESH_WRITERS)
     at_vertices = flat_columns(vertex_fields or {}, len(mesh.vertices), AXES)
     on_faces = flat_columns(face_fields or {}, len(mesh.faces), ["count", "corners", "vertex_indices"])
-    MESH_WRITERS[suffix_of(path)](mesh, path, Written(unit, frame, at_vertices, on_faces))
+    MESH_WRITERS[suffix_of(path)](mesh, path, MeshAttributes(unit, frame, at_vertices, on_faces))
 
 
 KEEP_ALL = (".ply", ".vtp")
@@ -80,7 +90,7 @@ def keeps(path: str | Path, field: str, *, on_faces: bool = False) -> bool:
     return suffix in KEEP_AT_VERTICES or (suffix in KEEP_COLORS and field in COLORS)
 
 
-MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, Written], None]] = {
+MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, MeshAttributes], None]] = {
     ".stl": write_stl,
     ".ply": write_ply_mesh,
     ".obj": write_obj,

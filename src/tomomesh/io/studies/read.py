@@ -125,6 +125,17 @@ def read_volume(
         For a series that there is not.
     ResourceError
         Where the voxels do not fit into the memory.
+
+    Examples
+    --------
+    >>> import nibabel
+    >>> import numpy as np
+    >>> from tomomesh import read_volume
+    >>> stored = np.arange(24, dtype=np.int16).reshape(2, 3, 4)
+    >>> nibabel.save(nibabel.Nifti1Image(stored, np.diag([0.5, 0.5, 2.0, 1.0])), "study.nii.gz")
+    >>> study = read_volume("study.nii.gz")
+    >>> study
+    Volume(4 x 3 x 2 of int16, 0.5 x 0.5 x 2 mm)
     """
     path, settings = existing(path), settings or ReadSettings()
     if path.is_dir() and is_zarr(path):

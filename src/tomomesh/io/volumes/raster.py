@@ -25,7 +25,7 @@ TEXT = "text"
 
 LONGEST_HEADER = 2**20
 """A header that does not end within these bytes is none: real ones have some thousand, and the names of
-`detached.MOST_FILES` data files, of 16 letters each, are as many."""
+`files.detached.MOST_FILES` data files, of 16 letters each, are as many."""
 
 HeaderFields = dict[str, str]
 """The fields of a text header, by their names."""

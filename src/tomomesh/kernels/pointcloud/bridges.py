@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compile import kernel
-from .samples import MOST, gather, tangents
+from .linear_algebra import tangents
+from .samples import MOST, gather
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,7 +23,7 @@ TANGENT = 0.41421356237309503
 """Tangent of the angle of a sector: pi / 8."""
 STEEP = 0.5
 """Slope over which a bridge would leave the surface at its end."""
-ALIKE = 0.5
+SAME_SIDE = 0.5
 """Cosine of the angle between the normals over which two rims belong together."""
 
 
@@ -148,7 +149,7 @@ def bridge(
                 same += samples[p, 3 + axis] * samples[q, 3 + axis]
             length = np.sqrt(length)
             pieces = np.int64(length / gap) + 1
-            if pieces < 2 or max(abs(here), abs(there)) > STEEP * length or abs(same) < ALIKE:
+            if pieces < 2 or max(abs(here), abs(there)) > STEEP * length or abs(same) < SAME_SIDE:
                 continue
             if not is_open(sectors[p], sector(axes, step)):
                 continue

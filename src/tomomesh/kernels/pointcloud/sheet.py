@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compile import kernel
-from .samples import MOST, gather, tangents
+from .linear_algebra import tangents
+from .samples import MOST, gather
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -73,7 +73,7 @@ def unshrunk(
 
 
 def evened(ring: Floats, gaps: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.bool_]]:
-    """Slide the neurons of a ring along its curve until they are equally far apart; see `even.even_spacing`.
+    """Slide the neurons of a ring along its curve until they are equally far apart; see `tomomesh.som.even_spacing`.
 
     Along the curve, and not along the sides as there: few neurons would cut off its bends.
     """

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...measure.matching import SHARED, alike, matched
+from ...measure.matching import SHARED, matched, similar
 from ...model.contours import BIRTH, BRANCH, DEATH, MERGE, Event
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def track(insides: Sequence[Sequence[Patch]], sides: Sequence[Sequence[int]]) ->
 
 def _successors(shared: NDArray[np.int64], before: Sequence[int], here: Sequence[int]) -> dict[int, int]:
     """Return which contour of the slice before goes on as which, by the number of the later one."""
-    pairs = matched(-shared.astype(np.float64), alike(before, here) & (shared > 0), alone=0.0)
+    pairs = matched(-shared.astype(np.float64), similar(before, here) & (shared > 0), alone=0.0)
     return {b: a for a, b in pairs}
 
 
