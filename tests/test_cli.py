@@ -306,9 +306,8 @@ class TestFaults:
         program = (
             "import sys, pathlib, signal, tomomesh.dynamics.mass_spring as d, tomomesh.cli as c\n"
             "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background jobs ignore it
-            "rests = d._Motion.rests\n"
-            f"def slow(self): pathlib.Path({str(ready)!r}).touch(); return False\n"
-            "d._Motion.rests = slow\n"
+            f"def slow(self, motion, count): pathlib.Path({str(ready)!r}).touch(); return False\n"
+            "d._EulerSteps.rested = slow\n"
             f"sys.exit(c.main({line!r}))"
         )
         running = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.PIPE, env=os.environ)

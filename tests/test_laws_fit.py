@@ -16,7 +16,7 @@ from conftest import composed, cuberille_of, law, seeds, size, solids, sphere
 from tomomesh.cuberille.leak_test import CLOSINGS, close_leaks
 from tomomesh.cuberille.partition import partition
 from tomomesh.dynamics.low_pass import adjacency, low_pass
-from tomomesh.dynamics.mass_spring import Fit, fit
+from tomomesh.dynamics.mass_spring import Fit, _EulerSteps, _State, fit
 from tomomesh.errors import UsageError
 from tomomesh.settings import FitSettings
 
@@ -237,3 +237,95 @@ class TestLimit:
         settings = FitSettings(step=1.0, max_steps=2)
         moved = fit(far, mesh.edges, origins, points, cubes, settings).vertices - far
         assert np.linalg.norm(moved, axis=1).max() == pytest.approx(1.5)
+
+
+class TestCorrespondence:
+    """The paper's: at every step, search in the cube that holds the point last assigned, and in its 26 neighbors."""
+
+    @law(20)
+    @given(length=st.integers(8, 40), stiffness=st.floats(20, 200), springs=st.integers(1, 4), seed=seeds)
+    def test_goes_with_a_vertex_over_many_cubes(self, length: int, stiffness: float, springs: int, seed: int) -> None:
+        """Stiff springs of no length draw the ends of a chain together, along points that lie everywhere."""
+        rng = np.random.default_rng(seed)
+        along = np.arange(0, length, 0.25)
+        points = np.column_stack([along, rng.uniform(-0.05, 0.05, (2, len(along))).T])
+        start = np.column_stack([np.linspace(0, length - 1, springs + 1), np.zeros((springs + 1, 2))])
+        edges = np.column_stack([np.arange(springs), np.arange(springs) + 1])
+        grid = partition(points, np.ones(3))
+        cubes = cubes_under(points, grid)[nearest_of(start, points)]
+        found = fit(start, edges, cubes, points, grid, FitSettings(stiffness=stiffness, max_steps=3000))
+        apart = np.linalg.norm(points[found.nearest] - found.vertices, axis=1)
+        wanted = np.linalg.norm(points[nearest_of(found.vertices, points)] - found.vertices, axis=1)
+        assert (apart < wanted + 0.35).all(), "the nearest point, or the next, where a vertex has left the nearest"
+        assert np.abs(found.vertices - start)[:, 0].max() > 3
+
+    def test_sees_no_farther_than_the_26_cubes_around(self) -> None:
+        """A point that is nearer but two cubes away has no say."""
+        points = np.array([[0.5, 0.5, 0.5], [2.5, 0.5, 0.5]])
+        grid = partition(points, np.ones(3))
+        start = np.array([[2.1, 0.5, 0.5]])
+        found = fit(start, NO_SPRINGS, cubes_under(points, grid)[:1], points, grid, FitSettings())
+        assert found.nearest.tolist() == [0]
+        np.testing.assert_allclose(found.vertices, points[:1], atol=0.01)
+
+
+NO_SPRINGS = np.empty((0, 2), np.int64)
+
+
+def nearest_of(places: Floats, points: Floats) -> NDArray[np.int64]:
+    """Return the nearest of all points."""
+    return np.asarray(((places[:, None] - points) ** 2).sum(axis=2).argmin(axis=1))
+
+
+class TestReturns:
+    """Half way between two points at 0 and 2, one step h carries a vertex from 1 - q to 1 + q and the next one back.
+
+    That is so for q = h^2 / (4 - 4 h + h^2) and the velocities +-2 q / h; there explicit Euler swings for ever.
+    """
+
+    @law(20)
+    @given(step=st.floats(0.3, 0.9))
+    def test_let_a_vertex_swing_for_ever_between_two_points(self, step: float) -> None:
+        speeds, places = swinging(FitSettings(step=step, allow_returns=True))
+        q = step**2 / (2 - step) ** 2
+        np.testing.assert_allclose(np.abs(places - 1), q, atol=1e-9)
+        np.testing.assert_allclose(speeds, 2 * q / step, rtol=1e-9)
+
+    @law(20)
+    @given(step=st.floats(0.3, 0.9))
+    def test_are_not_allowed_by_default(self, step: float) -> None:
+        speeds, places = swinging(FitSettings(step=step))
+        assert speeds[-1] < 1e-3
+        assert min(abs(places[-1]), abs(places[-1] - 2)) < 1e-2
+
+    @pytest.mark.parametrize("seed", [637, 1330, 1415, 2543])
+    def test_keep_a_mesh_from_its_rest(self, seed: int) -> None:
+        """Three vertices on springs among six points, from rest: 4 of 3,000 such swing."""
+        rng = np.random.default_rng(seed)
+        points, start = rng.uniform(-2, 2, (6, 3)), rng.uniform(-2, 2, (3, 3))
+        grid = partition(points, np.full(3, 4.0))
+        cubes = cubes_under(points, grid)[nearest_of(start, points)]
+        edges = np.array([[0, 1], [1, 2], [0, 2]])
+        still, swings = (
+            fit(start, edges, cubes, points, grid, FitSettings(allow_returns=allowed)) for allowed in (False, True)
+        )
+        assert still.trace.converged
+        assert not swings.trace.converged
+
+
+def swinging(settings: FitSettings) -> tuple[Floats, Floats]:
+    """Start a vertex half way between two points with the velocity of a swing; return its speeds and places."""
+    points = np.array([[0.0, 0, 0], [2.0, 0, 0]])
+    grid = partition(points, np.full(3, 4.0))
+    h = settings.step
+    q = h**2 / (2 - h) ** 2
+    place, none = np.array([[1 - q, 0, 0]]), np.full(1, -1, np.int32)
+    steps = _EulerSteps(place, points - grid.origin, NO_SPRINGS, np.zeros(1, np.int32), grid, settings, 1)
+    velocity = np.array([[2 * q / h, 0, 0]])
+    state = _State(place - grid.origin, velocity, none, none, np.zeros(1, np.int32))
+    speeds, places = list[float](), list[float]()
+    for count in range(400):
+        state, _ = steps.step(state, count)
+        speeds.append(float(np.linalg.norm(state.velocity)))
+        places.append(float((state.position + grid.origin)[0, 0]))
+    return np.array(speeds), np.array(places)

@@ -148,6 +148,13 @@ class TestTrimming:
         on_frame = (np.abs(part.vertices[:, :2] - SIDE / 2) > SIDE / 2 - 1e-9).any(axis=1)
         assert ((np.abs(height) < 1e-9) | on_frame)[sides].all()
 
+    def test_a_vertex_moves_to_the_nearest_place_of_the_cut(self) -> None:
+        """Nearest by length, whichever way it lies: here 1 / 11 to the right, and 10 / 11 to the left."""
+        vertices = np.array([[0.0, 0, 0], [-10.0, 0, 0], [1.0, 0, 0], [0.0, 5.0, 0]])
+        mesh = TriMesh(vertices, np.array([[0, 3, 1], [0, 2, 3]]))
+        part, _ = trimmed(mesh, np.array([0.1, -1.0, -1.0, 50.0]), 0.3)
+        assert np.abs(part.vertices - [1 / 11, 0, 0]).max(axis=1).min() < 1e-12
+
     def test_nothing_is_cut_where_all_lies_above(self) -> None:
         mesh = grid()
         part, source = trimmed(mesh, np.ones(len(mesh.vertices)), 0.3)

@@ -24,6 +24,7 @@ from tomomesh.errors import EmptyError, ResourceError
 from tomomesh.io import read_mesh, read_points, read_volume
 from tomomesh.isosurface import surface_nets as nets
 from tomomesh.isosurface.crossings import CLOSEST
+from tomomesh.isosurface.diagonals import _is_odd
 from tomomesh.isosurface.surface_nets import TENSION, WALL
 from tomomesh.isosurface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
 from tomomesh.isosurface.well_composed import without_contacts
@@ -54,10 +55,12 @@ def volume_of(levels: NDArray[Any], affine: Floats | None = None) -> Volume:
     return Volume(levels, affine, Grid((0, 1, 2), (False, False, False), affine))
 
 
-def surface_of(volume: Volume, lower: float = 0.0, upper: float = np.inf, **kind: Any) -> tuple[Boundary, VoxelSurface]:
+def surface_of(
+    volume: Volume, lower: float = 0.0, upper: float = np.inf, *, settings: FitSettings | None = None, **kind: Any
+) -> tuple[Boundary, VoxelSurface]:
     mask = window(volume, lower=lower, upper=upper)
     found = boundary(volume, mask, lower=lower, upper=upper, **kind)
-    return found, voxel_surface(found, FitSettings())
+    return found, voxel_surface(found, settings or FitSettings())
 
 
 @st.composite
@@ -134,7 +137,7 @@ class TestLaws:
     @given(gray=levels())
     def test_vertices_stay_in_their_cells_and_crossings_between_their_voxels(self, gray: Floats) -> None:
         found, made = surface_of(volume_of(gray))
-        within = made.rest.positions - found.net.low
+        within = made.net_fit.positions - found.net.low
         assert within.min() > 0
         assert within.max() < 1
         ways = (found.crossings.positions - found.net.inner) * found.net.steps
@@ -153,10 +156,10 @@ class TestLaws:
     def test_a_mirrored_study_gives_the_mirrored_surface(self, gray: Floats, axis: int) -> None:
         _, one = surface_of(volume_of(gray))
         _, other = surface_of(volume_of(np.flip(gray, 2 - axis)))
-        mirrored = other.rest.positions.copy()
+        mirrored = other.net_fit.positions.copy()
         mirrored[:, axis] = gray.shape[2 - axis] - 1 - mirrored[:, axis]
-        order, turned = (np.lexsort(np.round(places, 9).T) for places in (one.rest.positions, mirrored))
-        np.testing.assert_allclose(one.rest.positions[order], mirrored[turned], atol=1e-9)
+        order, turned = (np.lexsort(np.round(places, 9).T) for places in (one.net_fit.positions, mirrored))
+        np.testing.assert_allclose(one.net_fit.positions[order], mirrored[turned], atol=1e-9)
 
     @law(20)
     @given(gray=levels())
@@ -169,6 +172,45 @@ class TestLaws:
             made = [voxel_surface(one, FitSettings(), threads=n) for one, n in zip(found, (1, 3), strict=True)]
         assert made[0].mesh.vertices.tobytes() == made[1].mesh.vertices.tobytes()
         assert made[0].mesh.faces.tobytes() == made[1].mesh.faces.tobytes()
+
+
+class TestParts:
+    @law(20)
+    @given(seed=seeds, cut=st.integers(1, 12))
+    def test_squares_are_split_by_where_they_lie(self, seed: int, cut: int) -> None:
+        """Not by their numbers: voxels that are left out below change nothing far above."""
+        rng = np.random.default_rng(seed)
+        gray = rng.normal(size=(24, 12, 12))
+        part = gray.copy()
+        part[:cut] = -1.0
+        one, other = (halves_above(levels, cut + 8) for levels in (gray, part))
+        assert one
+        assert one == other
+
+    @law(20)
+    @given(seed=seeds, cut=st.integers(1, 12))
+    def test_squares_take_turns_by_where_they_lie(self, seed: int, cut: int) -> None:
+        gray = np.random.default_rng(seed).normal(size=(24, 5, 5))
+        part = gray.copy()
+        part[:cut] = -1.0
+        one, other = (turns_of(levels) for levels in (gray, part))
+        both = one.keys() & other.keys()
+        assert {one[square] for square in both} == {False, True}
+        assert all(one[square] == other[square] for square in both)
+
+
+def turns_of(gray: Floats) -> dict[tuple[int, ...], bool]:
+    """Return whose turn it is at each square, by the voxel behind it and the direction to the one before it."""
+    net = boundary(volume_of(gray), gray > 0, lower=0.0).net
+    squares = np.column_stack([net.inner, net.directions]).tolist()
+    return dict(zip(map(tuple, squares), _is_odd(net).tolist(), strict=True))
+
+
+def halves_above(gray: Floats, height: float) -> set[tuple[tuple[float, ...], ...]]:
+    """Return the triangles over a height of a surface that is not fitted, by their places."""
+    _, made = surface_of(volume_of(gray), settings=FitSettings(max_steps=0))
+    corners = np.round(made.mesh.corners[(made.mesh.corners[:, :, 2] > height).all(axis=1)], 6)
+    return {tuple(sorted(map(tuple, face))) for face in corners.tolist()}
 
 
 class TestPlace:
@@ -184,7 +226,7 @@ class TestPlace:
     def test_a_plane_along_the_voxels_is_exact(self, offset: float, axis: int) -> None:
         heights = np.broadcast_to(np.arange(8.0)[:, None, None], (8, 33, 33))
         _, made = surface_of(volume_of(np.moveaxis(3 + offset - heights, 0, 2 - axis)))
-        across, *along = np.moveaxis(made.rest.positions, 1, 0)[[axis, (axis + 1) % 3, (axis + 2) % 3]]
+        across, *along = np.moveaxis(made.net_fit.positions, 1, 0)[[axis, (axis + 1) % 3, (axis + 2) % 3]]
         deep = (np.abs(np.array(along) - 16) < 3).all(axis=0) & (across > 1)
         assert deep.sum() == 36
         np.testing.assert_allclose(across[deep], 3 + offset, rtol=0, atol=1e-12)
@@ -194,8 +236,8 @@ class TestPlace:
         z, y, x = np.mgrid[:36, :36, :36]
         normal = np.array([0.37, 0.55, 0.75])
         _, made = surface_of(volume_of(28.9 - (normal[0] * x + normal[1] * y + normal[2] * z)))
-        deep = (np.abs(made.rest.positions - 17.5) < 5).all(axis=1)
-        apart = np.abs(made.rest.positions[deep] @ normal - 28.9)
+        deep = (np.abs(made.net_fit.positions - 17.5) < 5).all(axis=1)
+        apart = np.abs(made.net_fit.positions[deep] @ normal - 28.9)
         assert apart.max() < 3 * CLOSEST
         assert apart.mean() < 0.2 * CLOSEST
 
@@ -210,12 +252,12 @@ class TestPlace:
     def test_the_net_rests_where_its_forces_balance(self, stiffness: float) -> None:
         """mean(p - c) + s mean(x_j - x) = 0, but where it presses a vertex against a wall of its cell."""
         found, _ = surface_of(ball(6))
-        rest = voxel_surface(found, FitSettings(tolerance=1e-10, stiffness=stiffness, max_steps=5000)).rest
+        rest = voxel_surface(found, FitSettings(tolerance=1e-10, stiffness=stiffness, max_steps=5000)).net_fit
         net, x = found.net, rest.positions
         pull = _mean(found.crossings.positions - _mean(x, net.quads), net.fans)
         force = pull + TENSION * stiffness * (_mean(x, net.links) - x)
         free = np.abs(x - net.low - 0.5) < 0.5 - WALL - 1e-12
-        assert rest.converged
+        assert rest.trace.converged
         assert free.mean() > 0.8
         assert np.abs(force[free]).max() < 1e-8
         assert (force[~free] * np.sign(x - net.low - 0.5)[~free] > -1e-8).all()

@@ -14,11 +14,13 @@ if TYPE_CHECKING:
     from ..model.mesh import TriMesh
 
 CLOSE = 1e-4
-"""Distance, over the median edge, under which two vertices count as meeting: far above what 32 bits lose."""
+"""Distance, over the median edge, under which two vertices count as meeting: above what the 32 bits of a mesh file lose
+of a mesh a thousand edges wide, 1000 / 2^24 = 6e-5."""
 BACK = 1 / 16
-"""Share of the way back to its smoothed place that a vertex takes where it meets another."""
+"""Share of the way back to its smoothed place that a vertex takes where it meets another: no vertex goes back by more
+than a sixteenth of its way too far."""
 MOST = 32
-"""Steps back, after which a vertex is all but there."""
+"""Most steps back: (1 - 1/16)^32, an eighth of the way, is then left."""
 
 
 def without_collapse(smoothed: TriMesh, fitted: TriMesh) -> tuple[TriMesh, int]:

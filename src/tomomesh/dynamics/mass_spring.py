@@ -8,7 +8,7 @@ a step h <= 1 is stable on every mesh: nobody has to know the unit of a stiffnes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,14 +16,16 @@ import numpy as np
 from ..cuberille.neighbors import neighbor_table
 from ..kernels.cuberille.cells import nearest_points
 from ..kernels.threads import in_blocks
-from ..model.trace import Trace
+from ..model.trace import Motion
 from ..progress import Progress, silent
+from .iterate import iterate
 from .low_pass import adjacency
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.cubes import CubeGrid
+    from ..model.trace import Trace
     from ..settings import FitSettings
 
 BLOCK = 20_000
@@ -32,7 +34,7 @@ BLOCK = 20_000
 
 @dataclass(frozen=True)
 class Fit:
-    """A mesh at rest.
+    """A mesh after the fit.
 
     Attributes
     ----------
@@ -62,7 +64,7 @@ def fit(
 
     Each vertex is drawn to the point nearest to it: at first among those of the cube it came from and its 26
     neighbors, then at every step among those of the cube that holds the point last assigned and its 26
-    neighbors. Where those hold none it has no k_d and follows its springs.
+    neighbors (the paper's dynamic correspondence). Where those hold none it has no k_d and follows its springs.
 
     Parameters
     ----------
@@ -83,117 +85,112 @@ def fit(
     Fit
     """
     position, targets = (np.ascontiguousarray(places - grid.origin) for places in (vertices, points))
-    motion = _Motion(position, targets, edges, cubes.astype(np.int32), grid, settings, threads)
-    most = settings.max_steps
-    while len(motion.history) < most and not motion.rests():
-        motion.advance()
-        progress("fit", len(motion.history), most)
-    motion.match()
-    steps = max(len(motion.history), 1)
-    progress("fit", steps, steps)
-    trace = motion.trace()
-    return Fit(np.asarray(grid.origin + motion.position), motion.nearest, trace)
+    motion = _EulerSteps(position, targets, edges, cubes.astype(np.int32), grid, settings, threads)
+    state, trace = iterate(motion, settings.max_steps, progress)
+    state = motion.matched(state)
+    return Fit(np.asarray(grid.origin + state.position), state.nearest, trace)
+
+
+@dataclass(frozen=True)
+class _State:
+    """Positions and velocities of the vertices, relative to the grid's origin, and their correspondence.
+
+    `nearest` are the points that draw the vertices, `left` those that drew them before, -1 where there are none;
+    `cube` are the cubes in and around which the next are sought.
+    """
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    nearest: NDArray[np.int32]
+    left: NDArray[np.int32]
+    cube: NDArray[np.int32]
 
 
 @dataclass
-class _Motion:
-    """Positions and velocities of the vertices, relative to the grid's origin, and one step of Euler's."""
+class _EulerSteps:
+    """Steps of explicit Euler."""
 
-    position: NDArray[np.float64]
+    start: NDArray[np.float64]
     points: NDArray[np.float64]
     edges: NDArray[np.int64]
-    cube: NDArray[np.int32]
+    cubes: NDArray[np.int32]
     grid: CubeGrid
     settings: FitSettings
     threads: int
 
     def __post_init__(self) -> None:
-        count, grid = len(self.position), self.grid
-        self.velocity = np.zeros_like(self.position)
-        self.springs = adjacency(self.edges, count)
+        grid = self.grid
+        self.springs = adjacency(self.edges, len(self.start))
         self.degree = np.diff(self.springs.indptr)[:, None]
         self.stiffness = self.settings.stiffness / max(self.degree.mean(), 1.0)
         self.table = neighbor_table(grid.keys)
         self.cube_of_point = np.empty(len(self.points), np.int32)
         self.cube_of_point[grid.order] = np.repeat(np.arange(len(grid.keys)), np.diff(grid.start))
-        self.nearest = np.full(count, -1, np.int32)
-        self.left = self.nearest
         self.edge = float(grid.cell_mm.min())
-        self.history: list[tuple[float, ...]] = []
 
-    def rests(self) -> bool:
+    def init(self) -> _State:
+        """Return the mesh where it starts, drawn by no point yet."""
+        none = np.full(len(self.start), -1, np.int32)
+        return _State(self.start, np.zeros_like(self.start), none, none, self.cubes)
+
+    def rested(self, motion: Motion, count: int) -> bool:
         """Tell whether speed and acceleration have fallen below the tolerance."""
-        return bool(self.history) and max(self.history[-1][:2]) < self.settings.tolerance
+        return motion.rests(self.settings.tolerance)
 
-    def trace(self) -> Trace:
-        """Return the history as arrays."""
-        steps = np.array(self.history).reshape(-1, 7).T
-        speed, acceleration, kinetic, potential, distance = steps[:5]
-        clamped, unattracted = steps[5:].astype(np.int64)
-        return Trace(speed, acceleration, kinetic, potential, distance, clamped, unattracted, self.rests())
-
-    def match(self) -> None:
+    def matched(self, state: _State) -> _State:
         """Assign its nearest point to every vertex.
 
-        A vertex does not go back to the point it left last: half way between two points, explicit Euler could
-        swing between them for ever.
+        Unless that is allowed, a vertex does not go back to the point it left last: half way between two points,
+        explicit Euler could swing between them for ever.
         """
-        found = np.empty_like(self.nearest)
+        found = np.empty_like(state.nearest)
 
         def work(start: int, stop: int) -> None:
             nearest_points(
-                self.position, self.points, self.table, self.grid.order, self.grid.start,
-                self.cube, found, start, stop,
+                state.position, self.points, self.table, self.grid.order, self.grid.start,
+                state.cube, found, start, stop,
             )  # fmt: skip
 
-        in_blocks(work, len(self.position), block=BLOCK, threads=self.threads)
-        moves = (found != self.nearest) & (found != self.left)
-        self.left = np.where(moves, self.nearest, self.left)
-        self.nearest = np.where(moves, found, self.nearest)
-        self.cube = np.where(self.nearest >= 0, self.cube_of_point[self.nearest], self.cube)
+        in_blocks(work, len(found), block=BLOCK, threads=self.threads)
+        moves = found != state.nearest
+        if not self.settings.allow_returns:
+            moves &= found != state.left
+        nearest = np.where(moves, found, state.nearest)
+        cube = np.where(nearest >= 0, self.cube_of_point[nearest], state.cube)
+        return replace(state, nearest=nearest, left=np.where(moves, state.nearest, state.left), cube=cube)
 
-    def advance(self) -> None:
+    def step(self, state: _State, count: int) -> tuple[_State, Motion]:
         """Take one step: x += h x', x' += h x''; no vertex moves more than one cube edge."""
-        self.match()
-        drawn = (self.nearest >= 0)[:, None]
-        pull = np.where(drawn, self.points[self.nearest] - self.position, 0.0)
-        tension = self.stiffness * (self.springs @ self.position - self.degree * self.position)
+        state = self.matched(state)
+        drawn = (state.nearest >= 0)[:, None]
+        pull = np.where(drawn, self.points[state.nearest] - state.position, 0.0)
+        tension = self.stiffness * (self.springs @ state.position - self.degree * state.position)
         mass = np.maximum(drawn + self.stiffness * self.degree, 1e-300)
-        acceleration = (pull + tension) / mass - 2 * self.settings.damping * self.velocity
-        step, clamped = self._limited_step()
-        self._record(pull, drawn, mass, acceleration, clamped)
-        self.position = self.position + step * self.velocity
-        self.velocity = self.velocity + step * acceleration
+        step, velocity, clamped = self._limited(state.velocity)
+        acceleration = (pull + tension) / mass - 2 * self.settings.damping * velocity
+        stretched = state.position[self.edges[:, 0]] - state.position[self.edges[:, 1]]
+        motion = Motion(
+            speed=float(_length(velocity).max()) / self.edge,
+            acceleration=float(_length(acceleration).max()) / self.edge,
+            kinetic=0.5 * float((mass * velocity**2).sum()),
+            potential=0.5 * float((pull**2).sum() + self.stiffness * (stretched**2).sum()),
+            distance_mm=float(_length(pull).sum() / max(int(drawn.sum()), 1)),
+            clamped=clamped,
+            unattracted=int((~drawn).sum()),
+        )
+        moved = state.position + step * velocity
+        return replace(state, position=moved, velocity=velocity + step * acceleration), motion
 
-    def _limited_step(self) -> tuple[float, int]:
-        """Return the time step, once vertices that would move too far are slowed or the step is shortened."""
+    def _limited(self, velocity: NDArray[np.float64]) -> tuple[float, NDArray[np.float64], int]:
+        """Return the time step and the velocities, once vertices that would move too far are slowed or it is cut."""
         step = self.settings.step
-        reach = step * _length(self.velocity) / self.edge
+        reach = step * _length(velocity) / self.edge
         far = reach > 1
         if far.any() and self.settings.limit == "shorten":
-            return step / float(reach.max()), int(far.sum())
+            return step / float(reach.max()), velocity, int(far.sum())
         if far.any():
-            self.velocity = self.velocity / np.maximum(reach, 1.0)[:, None]
-        return step, int(far.sum())
-
-    def _record(
-        self,
-        pull: NDArray[np.float64],
-        drawn: NDArray[np.bool_],
-        mass: NDArray[np.float64],
-        acceleration: NDArray[np.float64],
-        clamped: int,
-    ) -> None:
-        stretched = self.position[self.edges[:, 0]] - self.position[self.edges[:, 1]]
-        self.history.append((
-            float(_length(self.velocity).max()) / self.edge,
-            float(_length(acceleration).max()) / self.edge,
-            0.5 * float((mass * self.velocity**2).sum()),
-            0.5 * float((pull**2).sum() + self.stiffness * (stretched**2).sum()),
-            float(_length(pull).sum() / max(int(drawn.sum()), 1)),
-            clamped,
-            int((~drawn).sum()),
-        ))  # fmt: skip
+            velocity = velocity / np.maximum(reach, 1.0)[:, None]
+        return step, velocity, int(far.sum())
 
 
 def _length(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,26 +14,22 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.mesh import TriMesh
+    from .low_pass import OneRing
 
     Tangled = Callable[..., NDArray[np.bool_]]
 
-    class Smoother(Protocol):
-        """Whatever smooths vertices."""
-
-        def smoothed(self, vertices: NDArray[np.float64], passes: int) -> NDArray[np.float64]:
-            """Return the vertices after some passes of a low-pass filter."""
-
-
 ROUNDS = 24
-"""Rounds after which what still passes through itself is left, and reported."""
+"""Rounds after which what still passes through itself is left, and reported: (1 - .25)^20 = .003 of the way back is
+then left."""
 GENTLE = 4
-"""Rounds in which the mesh is only smoothed; later it also goes back."""
+"""Rounds in which the mesh is only smoothed, which undoes most folds; later it also goes back. The region that is
+worked on grows by one ring of faces as often."""
 BACK = 0.25
 """Share of the way back to where it came from that a vertex takes in a later round."""
 
 
 def untangle(
-    mesh: TriMesh, origin: NDArray[np.float64], ring: Smoother, tangled: Tangled
+    mesh: TriMesh, origin: NDArray[np.float64], ring: OneRing, tangled: Tangled
 ) -> tuple[TriMesh, int, NDArray[np.bool_]]:
     """Smooth a mesh where it passes through itself, and take it back towards where it came from.
 
@@ -42,7 +38,7 @@ def untangle(
     mesh : TriMesh
     origin : (n, 3) float array
         Its vertices where it does not pass through itself: before the fit.
-    ring : Smoother
+    ring : OneRing
         The neighbors of its vertices.
     tangled : callable
         Marks the faces (m,) of a mesh that pass through others; told which vertices have moved since it last did.

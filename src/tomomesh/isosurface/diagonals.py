@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .crossings import Crossings
-    from .surface_nets import Net, Rest
+    from .surface_nets import Net, NetFit
 
 ROUNDS = (0, 1, 0)
-"""Squares of even and of odd number choose in turn, with regard to those that have chosen; more change little."""
+"""Squares at even and at odd places choose in turn, with regard to those that have chosen; more change little."""
 
 
 def triangulated(
-    net: Net, rest: Rest, crossings: Crossings, affine: NDArray[np.float64], threads: int = 0
+    net: Net, made: NetFit, crossings: Crossings, affine: NDArray[np.float64], threads: int = 0
 ) -> tuple[TriMesh, TriMesh, NDArray[np.int32]]:
     """Split every square by the diagonal that bends it least, and place the net before and after in space.
 
@@ -33,7 +33,7 @@ def triangulated(
     Parameters
     ----------
     net : Net
-    rest : Rest
+    made : NetFit
     crossings : Crossings
     affine : (4, 4) float array
         Voxel indices to millimeters.
@@ -47,8 +47,8 @@ def triangulated(
     fours : (f,) int32 array
         The squares that are split into four.
     """
-    before, after = (placed(indices, affine, threads) for indices in (rest.start, rest.positions))
-    choice = _diagonals(net, rest, crossings, after, threads)
+    before, after = (placed(indices, affine, threads) for indices in (made.start, made.positions))
+    choice = _diagonals(net, made, crossings, after, threads)
     halves = _halves(net.quads, choice, threads)
     fours = np.flatnonzero(choice == NEITHER).astype(np.int32)
     quarters = _quarters(net.quads[fours], len(after))
@@ -61,19 +61,24 @@ def triangulated(
 
 
 def _diagonals(
-    net: Net, rest: Rest, crossings: Crossings, after: NDArray[np.float64], threads: int
+    net: Net, made: NetFit, crossings: Crossings, after: NDArray[np.float64], threads: int
 ) -> NDArray[np.uint8]:
     """Choose a diagonal for every square, (q,): 0, 1 or `NEITHER`."""
     allowed = np.empty(len(net.quads), np.uint8)
 
     def allow(start: int, stop: int) -> None:
-        allow_diagonals(rest.positions, net.quads, crossings.positions, net.directions, allowed, start, stop)
+        allow_diagonals(made.positions, net.quads, crossings.positions, net.directions, allowed, start, stop)
 
     in_blocks(allow, len(allowed), block=BLOCK, threads=threads)
-    choice = np.where(allowed > 0, OPEN, NEITHER).astype(np.uint8)
+    choice, odd = np.where(allowed > 0, OPEN, NEITHER).astype(np.uint8), _is_odd(net)
     for parity in ROUNDS:
-        choice = _chosen(net, after, allowed, choice, parity, threads)
+        choice = _chosen(net, after, allowed, choice, odd == parity, threads)
     return choice
+
+
+def _is_odd(net: Net) -> NDArray[np.bool_]:
+    """Tell which squares (q,) lie at odd places: neighbors in a plane take turns, whichever part of a study is seen."""
+    return np.asarray((net.inner.sum(axis=1) + (net.directions & 1)) % 2 == 1)
 
 
 def _chosen(
@@ -81,14 +86,14 @@ def _chosen(
     after: NDArray[np.float64],
     allowed: NDArray[np.uint8],
     choice: NDArray[np.uint8],
-    parity: int,
+    turns: NDArray[np.bool_],
     threads: int,
 ) -> NDArray[np.uint8]:
-    """Let the squares of even or odd number choose."""
+    """Let some of the squares choose."""
     chosen = np.empty_like(choice)
 
     def work(start: int, stop: int) -> None:
-        choose_diagonals(after, net.quads, net.fans, allowed, choice, chosen, parity, start, stop)
+        choose_diagonals(after, net.quads, net.fans, allowed, choice, turns, chosen, start, stop)
 
     in_blocks(work, len(choice), block=BLOCK, threads=threads)
     return chosen

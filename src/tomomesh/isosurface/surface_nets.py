@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..cuberille.neighbors import DIRECTIONS
+from ..dynamics.iterate import iterate
 from ..kernels.cuberille.cells import find_neighbors
-from ..kernels.isosurface.surface_nets import mean_of
+from ..kernels.isosurface.surface_nets import mean_of, move_in_cells
 from ..kernels.isosurface.voxels import list_faces, list_fans
 from ..kernels.threads import in_blocks
 from ..model.cubes import key_step, keys_of
+from ..model.trace import Motion
 from ..progress import Progress, silent
 from .well_composed import CORNERS, cells_where
 
@@ -21,18 +23,24 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ..model.trace import Trace
     from ..settings import FitSettings
     from .crossings import Crossings
+
+    Floats = NDArray[np.float64]
+    Finish = Callable[[Floats, slice], None]
 
 BLOCK = 40_000
 """Vertices or faces handled in one call: far below 100 ms."""
 WALL = 1e-3
-"""Share of a cell that a vertex keeps from its walls."""
+"""Share of a cell that a vertex keeps from its walls, so that two vertices, each in a cell of its own, never meet."""
 TENSION = 2.4
 """Stiffness of the springs at a setting of 1. Measured on a CT and an MR at the default setting: more would turn less
 than marching cubes by more than a tenth, and lie farther from them than 0.06 and 0.09 voxel."""
 BENDING, BENDS = 0.4, 40
-"""Share of the bending force that is followed in a step, where half would never rest; and the most steps."""
+"""Share of the bending force that is followed in a step: a net that goes up and down from vertex to vertex keeps 1 - 4b
+of its height, and half would never rest. And the most steps: more would move it on for hundreds of them, by less than
+0.01 voxel each, and round off what the mask shows."""
 
 STEPS = np.array([key_step(direction) for direction in DIRECTIONS])
 MIXED = np.array([0 < case < 255 for case in range(256)])
@@ -118,32 +126,31 @@ def net_around(mask: NDArray[np.bool_], threads: int = 0) -> Net:
 
 
 @dataclass(frozen=True)
-class Rest:
-    """A net at rest.
+class NetFit:
+    """A net after the fit.
 
     Attributes
     ----------
-    start, positions : (n, 3) float arrays
+    start, positions : (n, 3) float array
         The vertices before and after, as voxel indices (x, y, z).
-    steps : int
-    converged : bool
-        Whether the last step moved no vertex farther than the tolerance; on a mask, also where `BENDS` were taken.
+    trace : Trace
+        In voxels; `potential`, `distance_mm`, `clamped` and `unattracted` are not measured.
     """
 
-    start: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    steps: int
-    converged: bool
+    start: Floats
+    positions: Floats
+    trace: Trace
 
 
 def settle(
     net: Net, crossings: Crossings, settings: FitSettings, *, threads: int = 0, progress: Progress = silent
-) -> Rest:
+) -> NetFit:
     """Draw the middles of the squares to their crossings, while springs even the net out.
 
     At rest  mean(p - c) + s mean(x_j - x) = 0  for every vertex x: p are the crossings and c the middles of the
     squares around it, x_j its neighbors, s the stiffness. No vertex leaves its cell. Where the gray levels are those
-    of a mask, nothing is drawn, and the net loses its bends instead:  x <- x - b mean(l_j - l),  l = mean(x_j - x).
+    of a mask, nothing is drawn, and the net loses its bends instead:  x <- x - b mean(l_j - l),  l = mean(x_j - x),
+    in `BENDS` steps at most, whether it is then at rest or not.
 
     Parameters
     ----------
@@ -156,85 +163,98 @@ def settle(
 
     Returns
     -------
-    Rest
+    NetFit
     """
-    motion = _Motion(net, crossings.positions, TENSION * settings.stiffness, threads)
-    start = position = motion.means(crossings.positions, net.fans)
-    advance = motion.unbent if crossings.stepped else motion.drawn
+    start = _means(crossings.positions, net.fans, threads)
     most = min(settings.max_steps, BENDS) if crossings.stepped else settings.max_steps
-    farthest, count = np.inf, 0
-    while farthest > settings.tolerance and count < most:
-        position, farthest = advance(position)
-        count += 1
-        progress("fit", count, most)
-    progress("fit", max(count, 1), max(count, 1))
-    return Rest(start, position, count, farthest <= settings.tolerance or (crossings.stepped and count == BENDS))
+    state, trace = iterate(_NetSteps(net, crossings, start, settings, threads), most, progress)
+    return NetFit(start, state.position, trace)
 
 
 @dataclass(frozen=True)
-class _Motion:
-    """The steps of a net; each reads one state and writes the next, block by block."""
+class _State:
+    """Where the vertices are, (n, 3), and how far each moved last, (n, 3)."""
+
+    position: Floats
+    moves: Floats
+
+
+@dataclass(frozen=True)
+class _NetSteps:
+    """The steps of a net without masses; each reads one state and writes the next, block by block."""
 
     net: Net
-    crossings: NDArray[np.float64]
-    stiffness: float
+    crossings: Crossings
+    start: Floats
+    settings: FitSettings
     threads: int
 
-    def means(
-        self,
-        values: NDArray[np.float64],
-        members: NDArray[np.int32],
-        finish: Callable[[NDArray[np.float64], slice], None] = lambda found, at: None,
-    ) -> NDArray[np.float64]:
-        """Average rows of an array over lists of them (m, s), and let each block be finished in place: (m, 3)."""
-        found = np.empty((len(members), 3))
+    def init(self) -> _State:
+        """Return the net where it starts."""
+        return _State(self.start, np.zeros_like(self.start))
 
-        def work(start: int, stop: int) -> None:
-            mean_of(values, members, found, start, stop)
-            finish(found[start:stop], slice(start, stop))
+    def rested(self, motion: Motion, count: int) -> bool:
+        """Tell whether all moves, and their changes from step to step, have fallen below the tolerance."""
+        return motion.rests(self.settings.tolerance)
 
-        in_blocks(work, len(members), block=BLOCK, threads=self.threads)
-        return found
+    def step(self, state: _State, count: int) -> tuple[_State, Motion]:
+        """Move every vertex by the forces on it; how far each moved last is changed in place."""
+        sums = np.zeros((-(-len(state.position) // BLOCK), 3))
 
-    def drawn(self, position: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-        """Move every vertex by the pull of its crossings and of its neighbors; return also the farthest move.
+        def move(steps: Floats, at: slice) -> None:
+            low, moves = self.net.low[at], state.moves[at]
+            move_in_cells(steps, state.position[at], low, WALL, moves, sums[at.start // BLOCK], 0, len(steps))
+
+        forced = self._unbent if self.crossings.stepped else self._drawn
+        position = forced(state.position, move)
+        speed, change = sums[:, :2].max(axis=0)
+        return _State(position, state.moves), Motion(speed, change, sums[:, 2].sum())
+
+    def _drawn(self, position: Floats, move: Finish) -> Floats:
+        """Move every vertex by the pull of its crossings and of its neighbors.
 
         Both pulls together are at most 1 + 2 s times a vertex' distance from rest, and no step up to twice the inverse
         overshoots.
         """
 
-        def pull(middle: NDArray[np.float64], at: slice) -> None:
-            np.subtract(self.crossings[at], middle, out=middle)
+        def pull(middle: Floats, at: slice) -> None:
+            np.subtract(self.crossings.positions[at], middle, out=middle)
 
-        def move(pulled: NDArray[np.float64], at: slice) -> None:
-            pulled += self.stiffness * tension[at]
+        def add(pulled: Floats, at: slice) -> None:
+            pulled += stiffness * tension[at]
             pulled *= share
-            moved.append(self._keep_in_cell(pulled, position, at))
+            move(pulled, at)
 
-        share, moved = min(1.0, 2 / (1 + 2 * self.stiffness)), [0.0]
+        stiffness = TENSION * self.settings.stiffness
+        share = min(1.0, 2 / (1 + 2 * stiffness))
         tension = self._tension(position)
-        return self.means(self.means(position, self.net.quads, pull), self.net.fans, move), max(moved)
+        return _means(_means(position, self.net.quads, self.threads, pull), self.net.fans, self.threads, add)
 
-    def unbent(self, position: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-        """Move every vertex to where the net bends as it does around; return also the farthest move."""
+    def _unbent(self, position: Floats, move: Finish) -> Floats:
+        """Move every vertex to where the net bends as it does around."""
 
-        def move(around: NDArray[np.float64], at: slice) -> None:
+        def relax(around: Floats, at: slice) -> None:
             np.subtract(tension[at], around, out=around)
             around *= BENDING
-            moved.append(self._keep_in_cell(around, position, at))
+            move(around, at)
 
-        moved = [0.0]
         tension = self._tension(position)
-        return self.means(tension, self.net.links, move), max(moved)
+        return _means(tension, self.net.links, self.threads, relax)
 
-    def _tension(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
-        def less(around: NDArray[np.float64], at: slice) -> None:
+    def _tension(self, position: Floats) -> Floats:
+        def less(around: Floats, at: slice) -> None:
             around -= position[at]
 
-        return self.means(position, self.net.links, less)
+        return _means(position, self.net.links, self.threads, less)
 
-    def _keep_in_cell(self, step: NDArray[np.float64], position: NDArray[np.float64], at: slice) -> float:
-        """Turn a block of steps into the places they lead to, the walls of the cells kept; return the farthest."""
-        step += position[at]
-        np.clip(step, self.net.low[at] + WALL, self.net.low[at] + (1 - WALL), out=step)
-        return float(np.abs(step - position[at]).max())
+
+def _means(values: Floats, members: NDArray[np.int32], threads: int, finish: Finish = lambda found, at: None) -> Floats:
+    """Average rows of an array over lists of them (m, s), and let each block be finished in place: (m, 3)."""
+    found = np.empty((len(members), 3))
+
+    def work(start: int, stop: int) -> None:
+        mean_of(values, members, found, start, stop)
+        finish(found[start:stop], slice(start, stop))
+
+    in_blocks(work, len(members), block=BLOCK, threads=threads)
+    return found

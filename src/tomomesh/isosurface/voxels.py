@@ -15,7 +15,7 @@ from ..model.points import PointSet
 from ..progress import Progress, silent
 from .crossings import Crossings, Levels, crossings
 from .diagonals import placed, right_handed, triangulated
-from .surface_nets import Net, Rest, net_around, settle
+from .surface_nets import Net, NetFit, net_around, settle
 from .well_composed import without_contacts
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def _filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class VoxelSurface:
-    """A net at rest in patient millimeters.
+    """A net after the fit in patient millimeters.
 
     Attributes
     ----------
@@ -134,13 +134,13 @@ class VoxelSurface:
         The surface before and after the fit, with the same faces.
     nearest : (n,) int32 array
         A crossing that draws each vertex.
-    rest : Rest
+    net_fit : NetFit
     """
 
     smoothed: TriMesh
     mesh: TriMesh
     nearest: NDArray[np.int32]
-    rest: Rest
+    net_fit: NetFit
 
 
 def voxel_surface(
@@ -162,7 +162,7 @@ def voxel_surface(
         Closed, 2-manifold, outward but for the linings of cavities, and without self-intersections.
     """
     net = found.net
-    rest = settle(net, found.crossings, settings, threads=threads, progress=progress)
-    smoothed, mesh, fours = triangulated(net, rest, found.crossings, found.volume.affine, threads)
+    made = settle(net, found.crossings, settings, threads=threads, progress=progress)
+    smoothed, mesh, fours = triangulated(net, made, found.crossings, found.volume.affine, threads)
     nearest = np.concatenate([net.fans[:, 0], fours])
-    return VoxelSurface(smoothed, mesh, nearest, rest)
+    return VoxelSurface(smoothed, mesh, nearest, made)

@@ -1,4 +1,4 @@
-"""An open surface as a sheet with borders: shell of cubes -> one of its two walls -> drape -> cut along the borders.
+"""An open surface as a sheet with borders: shell of cubes -> one of its two walls -> fit -> cut along the borders.
 
 The samples are carried on beyond their borders by an apron, and the cubes are dilated once: so the shell has no
 holes but those that are wide, and both walls reach over the borders. They come apart where the apron ends; the one
@@ -17,7 +17,8 @@ from ..cuberille.faces import exposed_faces
 from ..cuberille.leak_test import LeakTest
 from ..cuberille.neighbors import dilate
 from ..cuberille.partition import cubes_over
-from ..dynamics.moving_least_squares import Draped, Ring, drape
+from ..dynamics.low_pass import OneRing
+from ..dynamics.moving_least_squares import SurfaceFit, fit_to_surface
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError
 from ..model.columns import any_of
@@ -88,7 +89,7 @@ class OpenSheet:
         Faces that lie where there are no samples.
     crossing : (m,) bool array
         Faces that pass through others.
-    draped : Draped
+    fitted : SurfaceFit
     taken_back : int
         Vertices that do not lie where the fit had them.
     """
@@ -101,7 +102,7 @@ class OpenSheet:
     mesh: TriMesh
     filled: NDArray[np.bool_]
     crossing: NDArray[np.bool_]
-    draped: Draped
+    fitted: SurfaceFit
     taken_back: int
 
 
@@ -142,8 +143,8 @@ def open_sheet(
     found, samples = borders(samples, edge, threads=threads)
     wall = _wall(samples, spanned, found, cell, settings)
     ring = wall.side.ring
-    draped = drape(wall.start, ring, samples, edge, settings.fit, threads=threads, progress=progress)
-    mesh, taken_back, _ = untangle(TriMesh(draped.vertices, draped.faces), wall.start, ring, tangled)
+    fitted = fit_to_surface(wall.start, ring, samples, edge, settings.fit, threads=threads, progress=progress)
+    mesh, taken_back, _ = untangle(TriMesh(fitted.vertices, fitted.faces), wall.start, ring, tangled)
     height = np.minimum(found.depths(mesh.vertices, threads=threads) + OVER * edge, 2 * edge)
     even = ring.smoothed(np.repeat(height[:, None], 3, axis=1), EVEN)[:, 0]
     most = SHIFT * np.abs(height)
@@ -153,11 +154,11 @@ def open_sheet(
         crossing = tangled(sheet)
         if not crossing.any():
             break
-    filled = any_of(draped.filled[mesh.faces])[source]
+    filled = any_of(fitted.filled[mesh.faces])[source]
     quads, smoothed = ring.quads.astype(np.int64), TriMesh(wall.smoothed, mesh.faces)
     return OpenSheet(
         wall.held, wall.cubes, wall.lattice, quads, smoothed, sheet, filled, crossing,
-        draped, taken_back,
+        fitted, taken_back,
     )  # fmt: skip
 
 
@@ -182,7 +183,7 @@ def _wall(samples: Samples, spanned: Bridges, found: Borders, cell: Floats, sett
     for closing in CLOSINGS:
         shell = close_shell(cells, closing, threads=settings.run.threads)
         both = exposed_faces(shell)
-        ring = Ring(both.quads, len(both.corners), settings.run.threads)
+        ring = OneRing.of_quads(both.quads, len(both.corners), settings.run.threads)
         lattice = lowest + both.corners * cell
         smoothed = ring.smoothed(lattice, settings.cubes.smoothing)
         start = smoothed - edge * ring.normals(smoothed)

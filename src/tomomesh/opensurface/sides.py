@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..dynamics.moving_least_squares import Ring
+from ..dynamics.low_pass import OneRing
 from ..pointcloud.search import Index
 
 if TYPE_CHECKING:
@@ -39,20 +39,17 @@ HOLLOW = 0.01
 twice of it change no case of benchmarks/constants.py."""
 
 
-class SheetRing(Ring):
-    """The neighbors of each vertex of a sheet: a vertex on a border has only those along it."""
-
-    def __init__(self, quads: NDArray[np.int32], count: int, threads: int = 0) -> None:
-        self.quads, self.threads = quads, threads
-        sides = np.sort(quads[:, [0, 1, 1, 2, 2, 3, 3, 0]].reshape(-1, 2), axis=1)
-        edges, uses = np.unique(sides, axis=0, return_counts=True)
-        rim = np.zeros(count, bool)
-        rim[edges[uses == 1]] = True
-        pairs = np.concatenate([edges, edges[:, ::-1]])
-        pairs = pairs[(np.tile(uses, 2) == 1) | ~rim[pairs[:, 0]]]
-        pairs = pairs[np.lexsort(pairs.T[::-1])]
-        self.start = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=count))])
-        self.neighbors = np.ascontiguousarray(pairs[:, 1], np.int32)
+def sheet_ring(quads: NDArray[np.int32], count: int, threads: int = 0) -> OneRing:
+    """Take the neighbors of each vertex of a sheet: a vertex on a border has only those along it."""
+    sides = np.sort(quads[:, [0, 1, 1, 2, 2, 3, 3, 0]].reshape(-1, 2), axis=1)
+    edges, uses = np.unique(sides, axis=0, return_counts=True)
+    rim = np.zeros(count, bool)
+    rim[edges[uses == 1]] = True
+    pairs = np.concatenate([edges, edges[:, ::-1]])
+    pairs = pairs[(np.tile(uses, 2) == 1) | ~rim[pairs[:, 0]]]
+    pairs = pairs[np.lexsort(pairs.T[::-1])]
+    start = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=count))])
+    return OneRing(start, np.ascontiguousarray(pairs[:, 1], np.int32), quads, threads)
 
 
 @dataclass(frozen=True)
@@ -63,17 +60,17 @@ class Side:
     ----------
     vertices : (n,) bool array
     quads : (q,) bool array
-    ring : SheetRing
+    ring : OneRing
         Of the kept squares, over the kept vertices.
     """
 
     vertices: Marks
     quads: Marks
-    ring: SheetRing
+    ring: OneRing
 
 
 def one_side(
-    vertices: Floats, ring: Ring, samples: Samples, apron: Floats, tips: Marks, edge: float, *, largest: bool = False
+    vertices: Floats, ring: OneRing, samples: Samples, apron: Floats, tips: Marks, edge: float, *, largest: bool = False
 ) -> Side | None:
     """Cut the walls where they turn over the rim, and keep one side of each sheet.
 
@@ -82,7 +79,7 @@ def one_side(
     Parameters
     ----------
     vertices : (n, 3) float array
-    ring : Ring
+    ring : OneRing
         The squares of the walls.
     samples : Samples
     apron : (a, 3) float array
@@ -114,12 +111,12 @@ def one_side(
     return None if kept is None else _side(ring, quads, np.isin(pieces, kept[:1] if largest else kept))
 
 
-def _side(ring: Ring, quads: Marks, vertices: Marks) -> Side:
+def _side(ring: OneRing, quads: Marks, vertices: Marks) -> Side:
     quads = quads & vertices[ring.quads].all(axis=1)
     used = np.zeros(len(vertices), bool)
     used[ring.quads[quads]] = True
     number = np.cumsum(used, dtype=np.int32) - np.int32(1)
-    return Side(used, quads, SheetRing(number[ring.quads[quads]], int(used.sum()), ring.threads))
+    return Side(used, quads, sheet_ring(number[ring.quads[quads]], int(used.sum()), ring.threads))
 
 
 def _pieces(quads: NDArray[np.int32], count: int) -> Integers:

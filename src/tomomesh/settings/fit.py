@@ -28,7 +28,12 @@ class FitSettings(Group):
     stiffness: float = param(0.25, "sum of the structural stiffness at a vertex over k_d", low=0, paper=0.5)
     damping: float = param(1.0, "damping over critical damping", above=0)
     step: float = param(0.8, "time step, in units of 1/omega; at most the damping and its inverse", above=0, high=1)
-    tolerance: float = param(1e-3, "speed and acceleration at which the mesh rests", unit="cube edges", above=0)
+    tolerance: float = param(
+        1e-3,
+        "speed and acceleration of every vertex under which it rests",
+        unit="cube edges",
+        above=0,
+    )
     max_steps: int = param(200, "most steps", unit="steps", low=0)
     springs: str = param(
         "quads",
@@ -41,6 +46,10 @@ class FitSettings(Group):
         "where a vertex would move over one cube edge: clamp its step, or shorten the time step",
         choices=("clamp", "shorten"),
         paper="shorten",
+    )
+    allow_returns: bool = param(
+        False,
+        "let a vertex return to the point that it left last, as the paper's words do: the mesh may then never rest",
     )
 
     def __post_init__(self) -> None:

@@ -11,7 +11,8 @@ import numpy as np
 from ..cuberille.leak_test import SURE, close_leaks
 from ..cuberille.neighbors import once_each
 from ..cuberille.partition import cubes_over, is_flat
-from ..dynamics.moving_least_squares import Draped, Ring, drape
+from ..dynamics.low_pass import OneRing
+from ..dynamics.moving_least_squares import SurfaceFit, fit_to_surface
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError
 from ..measure.intersections import Crossings
@@ -70,7 +71,7 @@ class Rough:
 
     faces: Faces
     lattice: Floats
-    ring: Ring
+    ring: OneRing
     mesh: TriMesh
 
 
@@ -80,7 +81,7 @@ class Rest:
 
     mesh: TriMesh
     filled: NDArray[np.bool_]
-    draped: Draped | None
+    fitted: SurfaceFit | None
 
 
 def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
@@ -97,7 +98,7 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     )  # fmt: skip
     mesh, taken_back, crossing = apart.value
     cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64))
-    trace = None if rest.value.draped is None else rest.value.draped.trace
+    trace = None if rest.value.fitted is None else rest.value.fitted.trace
     surface = Surface(
         points.cloud, cuberille, smoothed.moved(smoothed.vertices + origin),
         mesh.moved(mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=rest.value.filled,
@@ -173,7 +174,7 @@ def _place(place: Floats) -> str:
 
 def _smoothed(shell: Shell, settings: Settings) -> Rough:
     faces = shell.held.faces.only(shell.taken(settings))
-    ring = Ring(faces.quads, len(faces.corners), settings.run.threads)
+    ring = OneRing.of_quads(faces.quads, len(faces.corners), settings.run.threads)
     lattice = shell.lowest + faces.corners * shell.cell
     vertices = ring.smoothed(lattice, settings.cubes.smoothing)
     return Rough(faces, lattice, ring, TriMesh(vertices, _halves(faces.quads)))
@@ -191,8 +192,9 @@ def _fitted(
     if still:
         return Rest(rough.mesh, np.zeros(len(rough.mesh.faces), np.bool_), None)
     edge, threads = float(shell.cell.min()), settings.run.threads
-    draped = drape(rough.mesh.vertices, rough.ring, samples, edge, settings.fit, threads=threads, progress=progress)
-    return Rest(TriMesh(draped.vertices, draped.faces), any_of(draped.filled[draped.faces]), draped)
+    start = rough.mesh.vertices
+    fitted = fit_to_surface(start, rough.ring, samples, edge, settings.fit, threads=threads, progress=progress)
+    return Rest(TriMesh(fitted.vertices, fitted.faces), any_of(fitted.filled[fitted.faces]), fitted)
 
 
 WAY = Way(

@@ -10,9 +10,8 @@ import numpy as np
 from ..cuberille.leak_test import CLOSINGS, close_leaks
 from ..cuberille.partition import is_flat, partition
 from ..dynamics.collapse import without_collapse
-from ..dynamics.low_pass import low_pass
+from ..dynamics.low_pass import OneRing, low_pass
 from ..dynamics.mass_spring import Fit, fit
-from ..dynamics.moving_least_squares import Ring
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError
 from ..measure.intersections import Crossings
@@ -158,7 +157,7 @@ def _fit(tracked: Tracked, smoothed: TriMesh, positions: Floats, settings: Setti
         threads=threads, progress=progress,
     )  # fmt: skip
     mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))
-    ring = Ring(cuberille.quads.astype(np.int32), len(mesh.vertices), threads)
+    ring = OneRing.of_quads(cuberille.quads.astype(np.int32), len(mesh.vertices), threads)
     mesh, taken_back, crossing = untangle(mesh, smoothed.vertices, ring, Crossings(threads))
     trace = rest.trace if settings.fit.max_steps else None
     told = fit_found(trace, len(mesh.vertices), collapsed=collapsed, taken_back=taken_back)

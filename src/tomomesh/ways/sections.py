@@ -127,7 +127,8 @@ def _course(trace: Trace) -> dict[str, Any]:
 
 def boundary_found(found: Boundary, surface: VoxelSurface) -> Stage[None]:
     """Tell of the boundary of voxels, and how its net came to rest."""
-    rest, stepped = surface.rest, found.crossings.stepped
+    trace, stepped = surface.net_fit.trace, found.crossings.stepped
+    steps = len(trace.speed)
     stats: dict[str, dict[str, Any]] = {
         "voxels": {
             "added_for_composition": found.added,
@@ -142,13 +143,15 @@ def boundary_found(found: Boundary, surface: VoxelSurface) -> Stage[None]:
             "square_faces": len(found.net.quads),
             "enclosed_cubes": int(found.volumes.sum()),
         },
-        "fit": {"iterations": rest.steps, "converged": rest.converged, "collapsed": 0},
+        "fit": {"iterations": steps, "converged": trace.converged, "collapsed": 0},
     }
+    if steps:
+        stats["fit"] |= {"speed": float(trace.speed[-1]), "acceleration": float(trace.acceleration[-1])}
     warnings: tuple[str, ...] = ()
     if stepped:
         warnings = ("the gray levels are those of a mask: the surface is evened out between the voxels",)
-    elif rest.steps and not rest.converged:
-        warnings = (f"the mesh had not come to rest after {rest.steps} steps",)
+    elif steps and not trace.converged:
+        warnings = (f"the mesh had not come to rest after {steps} steps",)
     return Stage(None, stats, warnings)
 
 

@@ -32,11 +32,11 @@ def surface_of_sheet(points: Points, settings: Settings, progress: Progress) -> 
     surface = Surface(
         points.cloud, QuadMesh(made.lattice + origin, made.quads),
         made.smoothed.moved(made.smoothed.vertices + origin), made.mesh.moved(made.mesh.vertices + origin),
-        np.empty(0, np.int32), trace=made.draped.trace, filled=made.filled, borders=True, crossing=made.crossing,
+        np.empty(0, np.int32), trace=made.fitted.trace, filled=made.filled, borders=True, crossing=made.crossing,
         cavities=int(made.held.faces.inward.sum()),
     )  # fmt: skip
     fitted = fit_found(
-        made.draped.trace, len(made.draped.vertices), taken_back=made.taken_back, filled=made.filled
+        made.fitted.trace, len(made.fitted.vertices), taken_back=made.taken_back, filled=made.filled
     )  # fmt: skip
     return folded(surface, settled, laid, fitted, place_found(points))
 

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..cuberille.partition import partition
-from ..dynamics.low_pass import low_pass
+from ..dynamics.low_pass import OneRing
 from ..dynamics.mass_spring import fit
-from ..dynamics.moving_least_squares import Ring, drape
+from ..dynamics.moving_least_squares import fit_to_surface
 from ..dynamics.subdivision import squares_of
 from ..dynamics.untangle import untangle
 from ..errors import UsageError
@@ -165,16 +165,6 @@ def _sampled(network: SpaceNetwork) -> Sampling:
 
 
 @dataclass(frozen=True)
-class _Sides:
-    """The low-pass filter along the sides of triangles."""
-
-    edges: NDArray[np.int64]
-
-    def smoothed(self, vertices: Floats, passes: int) -> Floats:
-        return low_pass(vertices, self.edges, passes)
-
-
-@dataclass(frozen=True)
 class _Rest:
     """A finer mesh at rest; `filled` (m,) are its faces where there was nothing to rest on."""
 
@@ -189,7 +179,7 @@ def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progre
     apart = measured("untangle", _untangled, found.source.network, threads)
     faces = _divide(*apart.value)
     rough = faces.value
-    ring = Ring(rough.quads.astype(np.int32), len(rough.vertices), threads)
+    ring = OneRing.of_quads(rough.quads.astype(np.int32), len(rough.vertices), threads)
     rest = measured("fit", _fitted, rough, ring, found.source, settings, progress)
     mesh = measured("untangle", untangle, rest.value.mesh, rough.vertices, ring, Crossings(threads))
     made, taken_back, crossing = mesh.value
@@ -219,12 +209,13 @@ def _divide(network: TriMesh, moved: int) -> Stage[QuadMesh]:
 def _untangled(network: SpaceNetwork, threads: int) -> tuple[TriMesh, int]:
     """Return a network as a mesh that faces outward and does not pass through itself, if smoothing can help it."""
     mesh = TriMesh(network.codebook, network.lattice.faces)
-    mesh, moved, _ = untangle(mesh, mesh.vertices, _Sides(mesh.edges), Crossings(threads))
+    ring = OneRing.of_edges(mesh.edges, len(mesh.vertices), threads)
+    mesh, moved, _ = untangle(mesh, mesh.vertices, ring, Crossings(threads))
     outward = mesh.face_volumes.sum() > 0
     return mesh if outward else replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1])), moved
 
 
-def _fitted(rough: QuadMesh, ring: Ring, found: SpaceFound, settings: Settings, progress: Progress) -> _Rest:
+def _fitted(rough: QuadMesh, ring: OneRing, found: SpaceFound, settings: Settings, progress: Progress) -> _Rest:
     """Draw the finer mesh to the boundary of the window; over a wall the network itself is the middle surface."""
     start, threads, origin = rough.triangulated(), settings.run.threads, found.places.min(axis=0)
     unfilled = np.zeros(len(start.faces), np.bool_)
@@ -235,9 +226,10 @@ def _fitted(rough: QuadMesh, ring: Ring, found: SpaceFound, settings: Settings, 
         mesh, trace = _drawn_to_points(rough, found.places, edge, settings, progress)
         return _Rest(mesh, unfilled, trace)
     samples = settle_points(found.places - origin, threads=threads, progress=progress)
-    draped = drape(rough.vertices - origin, ring, samples, edge, settings.fit, threads=threads, progress=progress)
-    mesh = TriMesh(draped.vertices + origin, draped.faces)
-    return _Rest(mesh, any_of(draped.filled[draped.faces]), draped.trace)
+    vertices = rough.vertices - origin
+    rest = fit_to_surface(vertices, ring, samples, edge, settings.fit, threads=threads, progress=progress)
+    mesh = TriMesh(rest.vertices + origin, rest.faces)
+    return _Rest(mesh, any_of(rest.filled[rest.faces]), rest.trace)
 
 
 def _lengths(rough: QuadMesh) -> Floats:

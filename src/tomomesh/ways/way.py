@@ -93,5 +93,5 @@ TRAINING = parameters(
 """What every way reads that trains networks."""
 CUBES = parameters("cell_mm", "cell_factor", "closing", "largest", "allow_leaks", "surface", "smoothing")
 """What every way reads that goes by cubes."""
-SPRINGS = parameters("stiffness", "damping", "step", "springs", "limit")
+SPRINGS = parameters("stiffness", "damping", "step", "springs", "limit", "allow_returns")
 """What every way reads whose mesh hangs on springs between masses."""

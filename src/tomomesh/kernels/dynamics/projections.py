@@ -1,4 +1,4 @@
-"""Loops that find the feet of places: what lies straight below them on the surface under the samples."""
+"""Loops that project places onto the surface under the samples: how high each lies over it, along its normal there."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
 
 LONGER = 1.25
-"""How many times as far is looked where samples are far, most."""
+"""Most that the reach grows where samples are far: at 2.25 x 1.25 = 2.8 widths a Gaussian weight is down to 2 %."""
 FACING = 0.2
-"""Cosine of the angle between a sample's normal and the mesh's under which the sample belongs to another side."""
+"""Cosine of the angle between a sample's normal and the mesh's under which the sample belongs to another side: 78
+degrees, so that both planes of a sharp edge have a say and the back of a thin part has none."""
 
 
 @kernel("void(f8[:,::1], f8[:,::1], i8[::1], i4[::1], f8[::1], i4[::1], i8, i8)")
@@ -65,7 +66,7 @@ def nearest_places(
 
 
 @kernel("b1(f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], i8[::1], f8[::1])")
-def find_foot(
+def project(
     samples: Floats,
     blocks: Integers,
     start: NDArray[np.int32],
@@ -73,7 +74,7 @@ def find_foot(
     place: Floats,
     normal: Floats,
     reach: float,
-    foot: Floats,
+    projection: Floats,
     found: Integers,
     weights: Floats,
 ) -> bool:
@@ -92,7 +93,7 @@ def find_foot(
         The normal of the mesh there: samples that face elsewhere have no say.
     reach : float
         How far to look.
-    foot : (4,) float array
+    projection : (4,) float array
         Result: height, and the unit normal of the surface.
     found, weights : (m,) int64 and float arrays
         Room to work in.
@@ -103,7 +104,7 @@ def find_foot(
         Whether there was any sample.
     """
     count = gather(samples, blocks, start, frame, place, reach, found)
-    foot[:] = 0.0
+    projection[:] = 0.0
     total = 0.0
     for n in range(count):
         p = found[n]
@@ -116,27 +117,28 @@ def find_foot(
         weights[n] = 0.0
         if facing < FACING:
             continue
+        # Half as far above a sample counts as far as beside it: a vertex on its way down sees what it will see there.
         width = samples[p, 6]
         weights[n] = facing * facing * np.exp(-0.5 * (squared - 0.75 * over * over) / (width * width))
         total += weights[n]
         for axis in range(3):
-            foot[1 + axis] += weights[n] * samples[p, 3 + axis]
-    length = np.sqrt(foot[1] ** 2 + foot[2] ** 2 + foot[3] ** 2)
+            projection[1 + axis] += weights[n] * samples[p, 3 + axis]
+    length = np.sqrt(projection[1] ** 2 + projection[2] ** 2 + projection[3] ** 2)
     if total < 1e-12 or length == 0.0:
         return False
     for axis in range(3):
-        foot[1 + axis] /= length
+        projection[1 + axis] /= length
     for n in range(count):
         p = found[n]
         height = 0.0
         for axis in range(3):
-            height += (place[axis] - samples[p, axis]) * (samples[p, 3 + axis] + foot[1 + axis])
-        foot[0] += 0.5 * weights[n] * height / total
+            height += (place[axis] - samples[p, axis]) * (samples[p, 3 + axis] + projection[1 + axis])
+        projection[0] += 0.5 * weights[n] * height / total
     return True
 
 
 @kernel("void(f8[:,::1], f8[:,::1], i4[::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8[:,::1], f8[:,::1], i8, i8)")
-def first_feet(
+def first_projections(
     places: Floats,
     normals: Floats,
     nearest: NDArray[np.int32],
@@ -144,14 +146,14 @@ def first_feet(
     blocks: Integers,
     start: NDArray[np.int32],
     frame: Floats,
-    feet: Floats,
+    projections: Floats,
     anchors: Floats,
     begin: int,
     end: int,
 ) -> None:
-    """Take the plane of the sample nearest to each place for its first foot.
+    """Take the plane of the sample nearest to each place for its first projection.
 
-    Where that sample faces elsewhere, as the other side of a thin part does, the foot is sought (see `find_foot`).
+    Where that sample faces elsewhere, as the other side of a thin part does, the projection is sought (see `project`).
 
     Parameters
     ----------
@@ -159,7 +161,7 @@ def first_feet(
     nearest : (n,) int32 array
         The sample nearest to each place, -1 where there is none.
     samples, blocks, start, frame : arrays
-    feet : (n, 4) float array
+    projections : (n, 4) float array
         Result: height over the surface at the anchor, and unit normal; zeros where there is no sample.
     anchors : (n, 3) float array
         Result: where the height was measured.
@@ -169,7 +171,7 @@ def first_feet(
     found, weights = np.empty(MOST, np.int64), np.empty(MOST)
     for v in range(begin, end):
         p = nearest[v]
-        feet[v], anchors[v] = 0.0, places[v]
+        projections[v], anchors[v] = 0.0, places[v]
         if p < 0:
             continue
         facing = squared = 0.0
@@ -177,15 +179,15 @@ def first_feet(
             facing += normals[v, axis] * samples[p, 3 + axis]
             squared += (places[v, axis] - samples[p, axis]) ** 2
         if facing >= FACING:
-            feet[v, 1:], anchors[v] = samples[p, 3:6], samples[p, :3]
+            projections[v, 1:], anchors[v] = samples[p, 3:6], samples[p, :3]
             continue
         reach = SIGHT * samples[p, 6] + np.sqrt(squared)
-        if not find_foot(samples, blocks, start, frame, places[v], normals[v], reach, feet[v], found, weights):
-            feet[v] = 0.0
+        if not project(samples, blocks, start, frame, places[v], normals[v], reach, projections[v], found, weights):
+            projections[v] = 0.0
 
 
 @kernel("void(f8[:,::1], i4[::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8, f8[:,::1], f8[:,::1], i8, i8)")
-def renew_feet(
+def renew_projections(
     places: Floats,
     nearest: NDArray[np.int32],
     samples: Floats,
@@ -193,12 +195,12 @@ def renew_feet(
     start: NDArray[np.int32],
     frame: Floats,
     stale: float,
-    feet: Floats,
+    projections: Floats,
     anchors: Floats,
     begin: int,
     end: int,
 ) -> None:
-    """Seek the feet of those places anew that have moved some way from where theirs were sought.
+    """Project those places anew that have moved some way from where they last were projected.
 
     Parameters
     ----------
@@ -208,24 +210,24 @@ def renew_feet(
     samples, blocks, start, frame : arrays
     stale : float
         The way.
-    feet, anchors : (n, 4) and (n, 3) float arrays
-        Changed in place; a place without a foot gets none.
+    projections, anchors : (n, 4) and (n, 3) float arrays
+        Changed in place; a place without a projection gets none.
     begin, end : int
         Places to work on.
     """
-    found, weights, foot = np.empty(MOST, np.int64), np.empty(MOST), np.empty(4)
+    found, weights, projection = np.empty(MOST, np.int64), np.empty(MOST), np.empty(4)
     for v in range(begin, end):
         moved = drawn = away = 0.0
         for axis in range(3):
             moved += (places[v, axis] - anchors[v, axis]) ** 2
-            drawn += feet[v, 1 + axis] ** 2
+            drawn += projections[v, 1 + axis] ** 2
         if moved <= stale * stale or drawn == 0.0 or nearest[v] < 0:
             continue
         for axis in range(3):
             away += (places[v, axis] - samples[nearest[v], axis]) ** 2
         reach = SIGHT * samples[nearest[v], 6]
         reach = min(max(1.01 * np.sqrt(away), reach), LONGER * reach)
-        if find_foot(samples, blocks, start, frame, places[v], feet[v, 1:], reach, foot, found, weights):
-            feet[v], anchors[v] = foot, places[v]
+        if project(samples, blocks, start, frame, places[v], projections[v, 1:], reach, projection, found, weights):
+            projections[v], anchors[v] = projection, places[v]
         else:
-            feet[v], anchors[v] = 0.0, places[v]
+            projections[v], anchors[v] = 0.0, places[v]

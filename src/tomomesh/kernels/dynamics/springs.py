@@ -1,4 +1,4 @@
-"""Loops along the sides of squares: means of neighbors, and the steps of a mesh that is drawn to feet."""
+"""Loops along the sides of squares: means of neighbors, and the steps of a mesh that is drawn to a surface."""
 
 from __future__ import annotations
 
@@ -41,30 +41,31 @@ def average(
     vertices: Floats,
     start: Integers,
     neighbors: NDArray[np.int32],
-    share: float,
+    own: float,
     result: Floats,
     begin: int,
     end: int,
 ) -> None:
-    """Move each vertex a share of the way to the mean of its neighbors.
+    """Move each vertex to a weighted mean of itself and its neighbors.
 
     Parameters
     ----------
     vertices : (n, 3) float array
     start, neighbors : arrays
-        From `list_neighbors`.
-    share : float
+        The neighbors of vertex v are ``neighbors[start[v]:start[v + 1]]``.
+    own : float
+        Weight of the vertex itself; its neighbors share the rest.
     result : (n, 3) float array
     begin, end : int
         Vertices to work on.
     """
     for v in range(begin, end):
-        count = start[v + 1] - start[v]
+        share = (1 - own) / (start[v + 1] - start[v])
         for axis in range(3):
             total = 0.0
             for n in range(start[v], start[v + 1]):
                 total += vertices[neighbors[n], axis]
-            result[v, axis] = vertices[v, axis] + share * (total / count - vertices[v, axis])
+            result[v, axis] = own * vertices[v, axis] + share * total
 
 
 @kernel(
@@ -74,7 +75,7 @@ def advance(
     places: Floats,
     velocities: Floats,
     origins: Floats,
-    feet: Floats,
+    projections: Floats,
     anchors: Floats,
     start: Integers,
     neighbors: NDArray[np.int32],
@@ -86,28 +87,28 @@ def advance(
 ) -> None:
     """Take one step of the dynamic mesh: x += h x', x' += h x'' (eq. 5-7, explicit Euler).
 
-    The attraction acts along the normal of the foot. The springs act within the surface there, so that they even
-    the mesh out and shrink nothing: those to the neighbors, and one to where the vertex came from, without which
-    the mesh would creep for ever. Where a vertex has no foot its springs act in all directions.
+    The attraction acts along the normal of the surface. The springs act within it, so that they even the mesh out and
+    shrink nothing: those to the neighbors, and one to where the vertex was held, without which the mesh would creep
+    for ever. Where a vertex has no projection its springs act in all directions.
 
     Parameters
     ----------
     places, velocities, origins : (n, 3) float arrays
-        Position and velocity of each vertex, and where it came from; the velocities are changed in place.
-    feet : (n, 4) float array
-        Height over the surface at the anchor, and its unit normal there; zeros where there is no foot.
+        Position and velocity of each vertex, and where it is held; the velocities are changed in place.
+    projections : (n, 4) float array
+        Height over the surface at the anchor, and its unit normal there; zeros where there is none.
     anchors : (n, 3) float array
-        Where each foot was sought.
+        Where each vertex was projected.
     start, neighbors : arrays
         From `list_neighbors`.
-    rates : (5,) float array
-        Time step, damping over critical damping, longest step that a vertex may take, stiffness of the spring to
-        where it came from over that of all others, and the speed from which a vertex counts as moving.
+    rates : (4,) float array
+        Time step, damping over critical damping, longest step that a vertex may take, and the share that the spring
+        to where the vertex is held has of the stiffness of all its springs.
     result : (n, 3) float array
         The positions after the step.
-    sums : (8,) float array
+    sums : (7,) float array
         Result over these vertices: largest speed, largest acceleration; the sums of kinetic energy, potential
-        energy and height; how many were slowed, have no foot, and still move.
+        energy and height; how many were slowed, and how many have no projection.
     begin, end : int
         Vertices to work on.
     """
@@ -116,24 +117,25 @@ def advance(
     sums[:] = 0.0
     for v in range(begin, end):
         count = start[v + 1] - start[v]
-        along = feet[v, 0]
+        along = projections[v, 0]
         tension = speed = change = drawn = 0.0
         total[:] = 0.0
-        for n in range(start[v], start[v + 1]):
+        for n in range(start[v], start[v + 1] if hold < 1.0 else start[v]):
             for axis in range(3):
                 total[axis] += places[neighbors[n], axis]
         for axis in range(3):
-            pull[axis] = (total[axis] / count + hold * origins[v, axis]) / (1 + hold) - places[v, axis]
-            along += feet[v, 1 + axis] * (places[v, axis] - anchors[v, axis])
-            tension += feet[v, 1 + axis] * pull[axis]
-            drawn += feet[v, 1 + axis] ** 2
-        for axis in range(3):
-            pull[axis] -= tension * feet[v, 1 + axis]
-            sums[3] += 0.5 * pull[axis] ** 2
-            pull[axis] -= along * feet[v, 1 + axis] + 2 * damping * velocities[v, axis]
             speed += velocities[v, axis] ** 2
-            change += pull[axis] ** 2
         slow = min(1.0, limit / max(h * np.sqrt(speed), 1e-300))
+        for axis in range(3):
+            pull[axis] = (1 - hold) * total[axis] / count + hold * origins[v, axis] - places[v, axis]
+            along += projections[v, 1 + axis] * (places[v, axis] - anchors[v, axis])
+            tension += projections[v, 1 + axis] * pull[axis]
+            drawn += projections[v, 1 + axis] ** 2
+        for axis in range(3):
+            pull[axis] -= tension * projections[v, 1 + axis]
+            sums[3] += 0.5 * pull[axis] ** 2
+            pull[axis] -= along * projections[v, 1 + axis] + 2 * damping * slow * velocities[v, axis]
+            change += pull[axis] ** 2
         sums[0] = max(sums[0], slow * np.sqrt(speed))
         sums[1] = max(sums[1], np.sqrt(change))
         sums[2] += 0.5 * slow * slow * speed
@@ -141,7 +143,6 @@ def advance(
         sums[4] += abs(along)
         sums[5] += slow < 1.0
         sums[6] += drawn == 0.0
-        sums[7] += max(speed, change) > rates[4] ** 2
         for axis in range(3):
             velocity = slow * velocities[v, axis]
             result[v, axis] = places[v, axis] + h * velocity

@@ -105,19 +105,19 @@ def bend(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     return float(1.0 - dot / np.sqrt(max(square * length, 1e-300)))
 
 
-@kernel("void(f8[:,::1], i4[:,::1], i4[:,::1], u1[::1], u1[::1], u1[::1], i8, i8, i8)")
+@kernel("void(f8[:,::1], i4[:,::1], i4[:,::1], u1[::1], u1[::1], b1[::1], u1[::1], i8, i8)")
 def choose_diagonals(
     placed: NDArray[np.float64],
     quads: NDArray[np.int32],
     fans: NDArray[np.int32],
     allowed: NDArray[np.uint8],
     choice: NDArray[np.uint8],
+    turns: NDArray[np.bool_],
     chosen: NDArray[np.uint8],
-    parity: int,
     start: int,
     stop: int,
 ) -> None:
-    """Choose the diagonal of every other square by which it bends least, in itself and towards its four neighbors.
+    """Choose the diagonal of some squares by which it bends least, in itself and towards its four neighbors.
 
     Parameters
     ----------
@@ -131,17 +131,17 @@ def choose_diagonals(
     choice : (q,) uint8 array
         How the squares are split: 0 or 1 for the diagonal from that corner, `NEITHER` or `OPEN`. Neighbors that are
         not split have no say.
+    turns : (q,) bool array
+        The squares that choose; the others keep what they have.
     chosen : (q,) uint8 array
         Result.
-    parity : int
-        0 or 1: the squares of even or odd number choose, the others keep what they have.
     start, stop : int
         Squares to work on.
     """
     own, other, bends = np.empty((2, 2, 3)), np.empty(3), np.empty(2)
     for f in range(start, stop):
         chosen[f] = choice[f]
-        if f & 1 != parity or allowed[f] == 0:
+        if not turns[f] or allowed[f] == 0:
             continue
         for turn in range(2):
             for half in range(2):

@@ -1,13 +1,14 @@
-"""Averages over neighbors: the springs of a net."""
+"""The springs of a net: averages over neighbors, and moves that stay within cells."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..compile import kernel
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 
@@ -43,3 +44,49 @@ def mean_of(
                 count += 1
         share = 1.0 / count
         means[m, 0], means[m, 1], means[m, 2] = x * share, y * share, z * share
+
+
+@kernel("void(f8[:,::1], f8[:,::1], f8[:,::1], f8, f8[:,::1], f8[::1], i8, i8)")
+def move_in_cells(
+    steps: NDArray[np.float64],
+    places: NDArray[np.float64],
+    low: NDArray[np.float64],
+    wall: float,
+    moves: NDArray[np.float64],
+    sums: NDArray[np.float64],
+    start: int,
+    stop: int,
+) -> None:
+    """Move vertices, but for what would take them out of their cells.
+
+    Parameters
+    ----------
+    steps : (n, 3) float array
+        Where each would go from where it is; afterwards, where it then is.
+    places : (n, 3) float array
+        Where the vertices are.
+    low : (n, 3) float array
+        Lowest corners of their cells, whose edge is 1.
+    wall : float
+        How far a vertex keeps from the walls of its cell.
+    moves : (n, 3) float array
+        How far each moved last; afterwards, how far it moves now.
+    sums : (3,) float array
+        Result over these vertices: longest move, its largest change since the last one, half the sum of squares.
+    start, stop : int
+        Vertices to work on.
+    """
+    sums[:] = 0.0
+    for v in range(start, stop):
+        speed = change = 0.0
+        for axis in range(3):
+            place = places[v, axis] + steps[v, axis]
+            place = min(max(place, low[v, axis] + wall), low[v, axis] + (1 - wall))
+            move = place - places[v, axis]
+            speed += move * move
+            change += (move - moves[v, axis]) ** 2
+            steps[v, axis], moves[v, axis] = place, move
+        sums[0] = max(sums[0], speed)
+        sums[1] = max(sums[1], change)
+        sums[2] += 0.5 * speed
+    sums[0], sums[1] = np.sqrt(sums[0]), np.sqrt(sums[1])
