@@ -19,7 +19,7 @@ SHOWN = 3
 
 def of_surface(report: dict[str, Any], output: str) -> list[str]:
     """Say what was reconstructed, and how good it is."""
-    quality, fit = report["quality"], report["fit"]
+    quality = report["quality"]
     unit = unit_in_words(report)
     shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
     shape = shape if quality["closed"] else "a manifold sheet"
@@ -27,7 +27,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
         *_of_stage_one(report),
         f"points    {_of_points(report)}",
         *way_of(report["way"]["name"]).of_body(report),
-        f"fit       {_of_fit(fit)}{_of_filled(report)}",
+        f"fit       {_of_fit(report)}{_of_filled(report)}",
         f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}, "
         f"{quality['self_intersections'] or 'no'} face(s) pass through others",
         f"          {quality['components']} component(s), genus {quality['genus']}, "
@@ -174,8 +174,11 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
     return [*lines, *way_of(report["way"]["name"]).of_networks(report)]
 
 
-def _of_fit(fit: dict[str, Any]) -> str:
-    """Say whether the mesh has come to rest."""
+def _of_fit(report: dict[str, Any]) -> str:
+    """Say whether the mesh has come to rest; around a mask it is evened out for a number of rounds, and never rests."""
+    fit = report["fit"]
+    if not report.get("voxels", {"interpolated": True})["interpolated"]:
+        return f"evened out in {fit['iterations']} rounds"
     if fit["converged"] is None:
         return "none"
     return f"{fit['iterations']} steps, {'at rest' if fit['converged'] else 'NOT at rest'}"

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..isosurface.voxels import Boundary, boundary, voxel_surface
 from ..model.points import PointSet
-from ..results import Segmentation, Surface, window_volume
+from ..results import Segmentation, Surface
 from ..segmentation.sample import Sampling
 from ..stage import Stage, folded, measured
 from .sections import body_of_voxels, boundary_found, points_found
@@ -37,14 +37,16 @@ def segment_by_voxels(kept: Selected, settings: Settings, progress: Progress) ->
 
 
 def surface_by_voxels(found: Segmentation[Boundary], settings: Settings, progress: Progress) -> Stage[Surface]:
-    """Let a net around the voxels come to rest where the gray levels cross the window's bounds."""
+    """Let a net around the voxels come to rest where the gray levels cross the window's bounds.
+
+    No volume is asked of it: no vertex leaves its cell, so the middle of every voxel that is kept lies inside.
+    """
     source = found.source
     threads = settings.run.threads
     meshed = measured("fit", voxel_surface, source, settings.fit, threads=threads, progress=progress)
     made = meshed.value
     surface = Surface(
         found.points, source.cuberille, made.smoothed, made.mesh, made.nearest, cavities=source.cavities,
-        encloses_mm3=window_volume(found),
     )  # fmt: skip
     return folded(surface, meshed, boundary_found(source, made))
 
@@ -57,7 +59,7 @@ def _pictures(found: Segmentation[Boundary]) -> dict[str, Any]:
 WAY = Way(
     applies=lambda settings, input: input not in POINTS and settings.network.network == "none",
     because=lambda settings, input: "with --network none",
-    reads=parameters("surface", "stiffness", "allow_leaks"),
+    reads=parameters("surface", "stiffness"),
     segment=segment_by_voxels,
     surface=surface_by_voxels,
     of_body=body_of_voxels,
