@@ -37,7 +37,11 @@ def main() -> None:
     _judge("--paper", paper)
     note("--paper: distance to the exact surface, mean and 95 %", _both(paper.report["truth"]))
     note("--paper: steps of the fit", str(paper.report["fit"]["iterations"]))
-    note("--paper: volume off the rings' volume", f"{_volume_error(paper):.1f} %")
+    note("--paper: volume off the rings' volume", f"{_volume_error(paper):.2g} %")
+    note("--paper: vertices", f"{len(paper.mesh.vertices):,}")
+    wide = _run(head, Settings.for_paper().replace(cell_from="adjacent"))
+    note("--paper --cell-from adjacent: distance, mean and 95 %", _both(wide.report["truth"]))
+    note("--paper --cell-from adjacent: vertices", f"{len(wide.mesh.vertices):,}")
 
 
 def _run(head: Phantom, settings: Settings) -> Surface:

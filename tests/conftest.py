@@ -17,7 +17,7 @@ from numba.core import config
 from tomomesh import kernels
 from tomomesh.cuberille.bitmasks import Blocks
 from tomomesh.cuberille.closing import Shell
-from tomomesh.cuberille.faces import Walls, walls
+from tomomesh.cuberille.faces import Faces, exposed_faces
 from tomomesh.model.cubes import keys_of
 from tomomesh.model.mesh import QuadMesh
 
@@ -100,18 +100,19 @@ def composed(solid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return solid
 
 
-def walls_of(solid: NDArray[np.bool_]) -> Walls:
-    """Return the walls of exactly the cubes in a grid (x, y, z), linings of cavities among them."""
+def faces_in(solid: NDArray[np.bool_], *, tracking: str = "scan") -> Faces:
+    """Return the faces of exactly the cubes in a grid (x, y, z), linings of cavities among them."""
     cells = np.argwhere(solid)
     blocks = Blocks.around(cells, 1)
-    board = blocks.board_of(cells)
-    return walls(Shell(blocks, board, board, board, cells[:0], closing=0, added=0))
+    bitmask = blocks.bitmask_of(cells)
+    shell = Shell(blocks, bitmask, bitmask, bitmask, cells[:0], closing=0, added=0)
+    return exposed_faces(shell, tracking=tracking)
 
 
 def cuberille_of(solid: NDArray[np.bool_]) -> QuadMesh:
     """Return the same as a mesh of unit squares."""
-    found = walls_of(solid)
-    return QuadMesh(found.corners.astype(float), found.quads.astype(np.int64), keys_of(found.cells))
+    found = faces_in(solid)
+    return QuadMesh(found.corners.astype(float), found.quads.astype(np.int64))
 
 
 def sphere(count: int, radius: float = 10.0) -> NDArray[np.float64]:

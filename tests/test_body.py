@@ -111,6 +111,18 @@ class TestAuto:
         found = segment(lungs(), lower=-950.0, upper=-500.0, network="none", keep="body")
         assert np.count_nonzero(found.mask) == 1
 
+    def test_where_none_is_in_a_body_it_is_said_that_all_is_kept(self) -> None:
+        study = lungs(bubble=False)
+        found = segment(study, lower=-950.0, upper=-500.0, network="none", keep="body")
+        assert np.array_equal(found.mask, study.voxels == LUNG)
+        assert found.report["window"]["dropped_components"] == 0
+        [warning] = [told for told in found.report["warnings"] if "body" in told]
+        assert "all of it was kept" in warning
+
+    def test_where_there_is_a_body_nothing_is_said(self) -> None:
+        said = segment(head(), preset="bone", network="none", keep="body").report["warnings"]
+        assert [told for told in said if "body" in told] == []
+
     def test_a_table_goes_from_a_window_that_begins_in_air(self) -> None:
         found = segment(head(), lower=-470.0, network="none")
         assert found.report["window"]["dropped_voxels"] == np.count_nonzero(head().voxels == TABLE)

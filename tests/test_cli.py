@@ -10,8 +10,9 @@ import subprocess
 import sys
 import time
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import nibabel
 import numpy as np
@@ -260,6 +261,32 @@ class TestFaults:
         said = fails(["inspect", str(study)], 9, capsys)
         assert "ZeroDivisionError" in said
         assert str(Path(__file__).parent) not in said
+
+    def test_the_handlers_of_whoever_calls_stay(
+        self, study: Path, tmp_path: Path, capsys: CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """As in a server or a notebook, whether it ends well, in an error, by a signal or beside the main thread."""
+        from tomomesh.cli import commands
+
+        heard: list[int] = []
+        handlers: dict[int, Any] = {
+            signal.SIGTERM: lambda number, frame: heard.append(number), signal.SIGINT: signal.SIG_IGN,
+        }  # fmt: skip
+        before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+        try:
+            codes = [main(["inspect", str(study)]), main(["inspect", str(tmp_path / "gone")])]
+            with ThreadPoolExecutor(1) as pool:
+                codes.append(pool.submit(main, ["inspect", str(study)]).result())
+            killed = {"inspect": lambda chosen: signal.raise_signal(signal.SIGTERM)}
+            monkeypatch.setattr(commands, "_COMMANDS", killed)
+            codes.append(main(["inspect", str(study)]))
+            assert codes == [0, 3, 0, 143]
+            assert {number: signal.getsignal(number) for number in handlers} == handlers
+            signal.raise_signal(signal.SIGTERM)
+            assert heard == [signal.SIGTERM]
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
     @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
     def test_signals_leave_nothing_behind(self, number: int, code: int, study: Path, tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ OTHER: dict[str, Any] = {
     "bridge": 1.1, "even": False, "trim": 1.5, "cell_mm": (1.5,), "cell_factor": 1.7, "caps": False, "closing": 3,
     "stacks": "none", "allow_leaks": True, "open": True, "smoothing": 0, "attraction": "surface", "stiffness": 0.9,
     "damping": 0.9, "step": 0.5, "springs": "triangles", "limit": "shorten", "units": "cm", "local_origin": True,
-    "largest": True, "surface": "outer", "seed": 99,
+    "largest": True, "surface": "outer", "seed": 99, "cell_from": "nearest", "tracking": "faces",
 }  # fmt: skip
 """Another value of each parameter that may be without effect."""
 SOMETIMES = {*MATTERS, *(name for way in TABLE for name in way_of(way).reads)}

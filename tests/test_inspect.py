@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import json
+import re
 import shlex
 import subprocess
 import sys
 import zipfile
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +18,11 @@ import numpy as np
 import pydicom
 import pytest
 
+import tomomesh
 from studies import AFFINES, affine_of, as_ct, sampled, save, setting, shared, slice_dataset, write_nifti, write_series
 from test_cli_dicom import PRIVATE, private
 from tomomesh.cli import main
+from tomomesh.cli.inspect.inspection import REFUSALS
 from tomomesh.io import list_series
 from tomomesh.settings import ReadSettings
 
@@ -38,6 +44,12 @@ def found(path: Path, capsys: CaptureFixture[str], *flags: str) -> dict[str, Any
 def told(path: Path, capsys: CaptureFixture[str], *flags: str) -> list[str]:
     assert main(["inspect", str(path), *flags]) == 0
     return capsys.readouterr().out.splitlines()
+
+
+def _manual_of(command: str) -> str:
+    with pytest.raises(SystemExit), redirect_stdout(StringIO()) as said:
+        main([command, "--help"])
+    return said.getvalue()
 
 
 def scanner(folder: Path) -> Path:
@@ -145,6 +157,30 @@ class TestRefusal:
         assert capsys.readouterr().err.splitlines()[-1] == f"error: {refused['error']}"
         words = " ".join(" ".join(told(folder, capsys)).split())
         assert f"refused exit 5: {refused['error']}" in words
+
+    def test_what_helps_is_known_without_reading_words(self) -> None:
+        """Every refusal of a DICOM study whose hint names an option of reading says so to programs too."""
+        options = {*re.findall(r"--[a-z][a-z-]+", _manual_of("inspect")), "--select"}
+        kinds = {kind.__name__ for kind in REFUSALS}
+        named = 0
+        for path in (Path(tomomesh.__file__).parent / "io/dicom").rglob("*.py"):
+            for call in ast.walk(ast.parse(path.read_text())):
+                if not isinstance(call, ast.Call) or ast.unparse(call.func) not in kinds:
+                    continue
+                given = {word.arg: ast.unparse(word.value) for word in call.keywords}
+                hinted = set(re.findall(r"--[a-z][a-z-]+", given.get("hint", ""))) & options
+                assert set(ast.literal_eval(given.get("flags", "()"))) == hinted, (path.name, given)
+                named += bool(hinted)
+        assert named >= 8
+
+    @pytest.mark.parametrize("name", ["a Try: --fill-gaps", "Try: --series --skip-bad"])
+    def test_a_name_of_a_study_puts_no_words_into_its_mouth(
+        self, name: str, tmp_path: Path, capsys: CaptureFixture[str]
+    ) -> None:
+        axes = ([1, 0, 0, 0, 1, 0],) * 4 + ([0, 1, 0, 0, 0, -1],)
+        said = found(write_series(tmp_path / name, STORED, AXIAL, setting(ImageOrientationPatient=axes)), capsys)
+        assert said["refused"]["exit_code"] == 5
+        assert said["next"] is None
 
     def test_no_flag_no_command(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
         axes = ([1, 0, 0, 0, 1, 0],) * 4 + ([0, 1, 0, 0, 0, -1],)

@@ -192,8 +192,15 @@ class TestDocuments:
         with pytest.raises(FormatError, match="no text"):
             read_settings(tmp_path / "s.toml")
 
+    @pytest.mark.parametrize("value", ["1" * 5000, "[" * 9000, "="])
+    def test_settings_that_toml_cannot_be(self, tmp_path: Path, value: str) -> None:
+        (tmp_path / "s.toml").write_text(f"[run]\nseed = {value}\n")
+        with pytest.raises(FormatError, match="settings cannot be read"):
+            read_settings(tmp_path / "s.toml")
+
     def test_importing_the_readers_loads_none_of_the_libraries(self) -> None:
         heavy = {"nibabel", "pydicom", "trimesh", "PIL", "scipy", "numba", "matplotlib"}
+        heavy |= {"laspy", "pye57", "pypcd4", "pydantic", "tifffile", "imagecodecs", "zarr"}
         script = f"import sys, tomomesh.io; print(sorted({heavy} & set(sys.modules)))"
         done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
         assert done.stdout.strip() == "[]"

@@ -13,7 +13,7 @@ from scipy.sparse import diags_array
 from scipy.sparse.linalg import spsolve
 
 from conftest import composed, cuberille_of, law, seeds, size, solids, sphere
-from tomomesh.cuberille.leak_test import CLOSINGS, hold
+from tomomesh.cuberille.leak_test import CLOSINGS, close_leaks
 from tomomesh.cuberille.partition import partition
 from tomomesh.dynamics.low_pass import adjacency, low_pass
 from tomomesh.dynamics.mass_spring import Fit, fit
@@ -35,17 +35,17 @@ LIMITS = ["clamp", "shorten"]
 
 def shell_of(
     points: Floats, cell_mm: float | tuple[float, ...], closings: Iterable[int] = CLOSINGS
-) -> tuple[CubeGrid, QuadMesh]:
-    """Return the cubes of a cloud, and their surface."""
+) -> tuple[CubeGrid, QuadMesh, NDArray[np.int64]]:
+    """Return the cubes of a cloud, their surface, and the cube that each of its vertices came from."""
     grid = partition(points, np.broadcast_to(cell_mm, 3).astype(np.float64))
-    return hold(grid.cells, closings).walls.over(grid)
+    return close_leaks(grid.cells, closings).faces.over(grid)
 
 
 def rested(points: Floats, cell_mm: float, settings: FitSettings, *, threads: int = 1) -> tuple[QuadMesh, Fit]:
     """Fit the smoothed surface of a cloud to it."""
-    cubes, mesh = shell_of(points, cell_mm)
+    cubes, mesh, origins = shell_of(points, cell_mm)
     start = low_pass(mesh.vertices, mesh.edges, 3)
-    return mesh, fit(start, mesh.edges, mesh.vertex_cubes, points, cubes, settings, threads=threads)
+    return mesh, fit(start, mesh.edges, origins, points, cubes, settings, threads=threads)
 
 
 def ball(count: int = size(1500, 300)) -> tuple[Floats, float]:
@@ -131,9 +131,9 @@ class TestForces:
         """A wide closing adds cubes with no point around; such a vertex has no k_d, and with no springs stays."""
         points, cell = ball()
         points = points[points[:, 2] < 7]
-        cubes, mesh = shell_of(points, cell, closings=[6])
+        cubes, mesh, origins = shell_of(points, cell, closings=[6])
         settings = FitSettings(stiffness=stiffness)
-        found = fit(mesh.vertices, mesh.edges, mesh.vertex_cubes, points, cubes, settings)
+        found = fit(mesh.vertices, mesh.edges, origins, points, cubes, settings)
         free = found.nearest < 0
         assert free.any()
         assert np.isfinite(found.vertices).all()
@@ -219,21 +219,21 @@ class TestLimit:
     def test_no_vertex_moves_more_than_a_cube_s_edge_in_a_step(self, limit: str, stiffness: float) -> None:
         """Steps are told apart by runs that end one step later each."""
         points, cell = ball(size(400, 100))
-        cubes, mesh = shell_of(points, cell)
+        cubes, mesh, origins = shell_of(points, cell)
         far = mesh.vertices * 3.0
         settings = FitSettings(stiffness=stiffness, limit=limit, step=1.0)
         before, clamped = far, 0
         for steps in range(1, 9):
-            now = fit(far, mesh.edges, mesh.vertex_cubes, points, cubes, replace(settings, max_steps=steps))
+            now = fit(far, mesh.edges, origins, points, cubes, replace(settings, max_steps=steps))
             assert np.linalg.norm(now.vertices - before, axis=1).max() <= cell * (1 + 1e-9)
             before, clamped = now.vertices, int(now.trace.clamped.sum())
         assert clamped > 0
 
     def test_uses_the_shortest_edge(self) -> None:
         points, _ = ball(size(1500, 500))
-        cubes, mesh = shell_of(points, (1.5, 2.5, 3.0))
+        cubes, mesh, origins = shell_of(points, (1.5, 2.5, 3.0))
         assert cubes.cells.max() > 2
         far = mesh.vertices * 3.0
         settings = FitSettings(step=1.0, max_steps=2)
-        moved = fit(far, mesh.edges, mesh.vertex_cubes, points, cubes, settings).vertices - far
+        moved = fit(far, mesh.edges, origins, points, cubes, settings).vertices - far
         assert np.linalg.norm(moved, axis=1).max() == pytest.approx(1.5)

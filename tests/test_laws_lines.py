@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from matplotlib.path import Path
 
 from conftest import law, seeds
+from tomomesh.measure.polygon import area, distance, inside, lattice_inside
 from tomomesh.model.lattice import lattice
 from tomomesh.model.networks import Networks
 from tomomesh.model.points import BRIDGE, CAP, NEURON
 from tomomesh.model.volume import Volume
-from tomomesh.segmentation.polygon import area, distance, inside, lattice_inside
 from tomomesh.segmentation.sample import Sampling, sample
 from tomomesh.som.even_spacing import bridged_edges, even_spacing
 

@@ -90,7 +90,7 @@ class TestPlace:
         points = dyadic(torus(COUNT))
         here, there = (reconstruct_points(points + place, attraction=attraction) for place in (0.0, far))
         assert here.mesh.faces.tobytes() == there.mesh.faces.tobytes()
-        assert here.cuberille.cubes.tobytes() == there.cuberille.cubes.tobytes()
+        assert here.cuberille.quads.tobytes() == there.cuberille.quads.tobytes()
         off = there.mesh.vertices - far - here.mesh.vertices
         assert np.abs(off).max() <= 4 * np.spacing(abs(far))
 

@@ -133,6 +133,7 @@ class TestForPaper:
         )
         assert (network.neuron_count, network.iterations) == (58, 10_000)
         assert (paper.fit.springs, paper.fit.limit, network.bridge) == ("triangles", "shorten", 0.0)
+        assert (paper.cubes.cell_from, paper.cubes.tracking, paper.fit.stiffness) == ("nearest", "faces", 0.5)
 
     def test_differs_from_the_defaults_only_where_the_table_says(self) -> None:
         paper, default = Settings.for_paper().to_dict(), Settings().to_dict()

@@ -52,7 +52,7 @@ def ball() -> TriMesh:
 def cube() -> QuadMesh:
     corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return QuadMesh(corners, np.array(quads), np.zeros(6, np.int64))
+    return QuadMesh(corners, np.array(quads))
 
 
 @pytest.fixture(scope="module")
@@ -194,18 +194,18 @@ class TestSpace:
         assert len(figure.axes) == sum(given)
         assert is_drawn(figure)
 
-    def test_points_come_in_kinds(self) -> None:
+    @pytest.mark.parametrize(
+        ("neuron", "names"),
+        [(4, ["neurons", "bridges", "caps"]), (-1, ["crossings", "beside added voxels", "on the border"])],
+    )
+    def test_points_come_in_kinds(self, neuron: int, names: list[str]) -> None:
         rng = np.random.default_rng(0)
-        cloud = PointSet.from_positions(rng.normal(size=(60, 3)))
         kinds = np.repeat([0, BRIDGE, CAP], 20).astype(np.uint8)
-        figure = draw_points(PointSet(cloud.positions, np.repeat([2, 3, 3], 20), cloud.neurons, kinds))
+        neurons = np.where(kinds == 0, neuron, -1).astype(np.int32)
+        figure = draw_points(PointSet(rng.normal(size=(60, 3)), np.repeat([2, 3, 3], 20), neurons, kinds))
         legend = figure.axes[0].get_legend()
         assert legend is not None
-        assert [entry.get_text() for entry in legend.get_texts()] == [
-            "neurons (20)",
-            "bridges (20)",
-            "caps (20)",
-        ]
+        assert [entry.get_text() for entry in legend.get_texts()] == [f"{name} (20)" for name in names]
         drawn = [c for c in figure.axes[0].collections if np.shape(c.get_offsets()) == (20, 2)]
         assert len(drawn) == 3
         assert is_drawn(figure)

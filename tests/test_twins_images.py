@@ -15,9 +15,9 @@ from skimage.segmentation import find_boundaries
 
 from conftest import law, seeds
 from tomomesh.errors import EmptyError, UsageError
+from tomomesh.measure.polygon import distance
 from tomomesh.model.volume import Volume
 from tomomesh.segmentation.otsu import histogram, otsu_levels, otsu_threshold
-from tomomesh.segmentation.polygon import distance
 from tomomesh.segmentation.signal import fills_most, outline
 from tomomesh.segmentation.window import choose_window, window
 from tomomesh.settings import WindowSettings

@@ -31,7 +31,7 @@ from tomomesh.measure.intersections import self_intersections
 from tomomesh.measure.report import compare
 from tomomesh.measure.topology import check_promise, topology
 from tomomesh.model.mesh import TriMesh
-from tomomesh.model.points import CAP, NEURON
+from tomomesh.model.points import BORDER, CROSSING
 from tomomesh.model.volume import Grid, Volume
 from tomomesh.pipeline import reconstruct, segment
 from tomomesh.segmentation.window import window
@@ -294,7 +294,7 @@ class TestSpecial:
 
     def test_what_touches_the_border_is_capped_half_a_voxel_further(self) -> None:
         found, made = surface_of(volume_of(np.ones((4, 5, 6))))
-        assert (found.points.kinds == CAP).all()
+        assert (found.points.kinds == BORDER).all()
         np.testing.assert_allclose(found.crossings.positions.min(axis=0), -0.5)
         np.testing.assert_allclose(found.crossings.positions.max(axis=0), [5.5, 4.5, 3.5])
         assert topology(made.mesh).euler_number == 2
@@ -381,7 +381,7 @@ class TestWay:
 
     def test_stage_one_alone_gives_the_crossings(self) -> None:
         found = segment(ball(8), lower=0.0, network="none")
-        assert (found.points.kinds == NEURON).all()
+        assert (found.points.kinds == CROSSING).all()
         assert np.abs(np.sqrt((found.points.positions**2).sum(axis=1)) - 1).max() < 0.01
 
     def test_of_a_ct_bone_is_where_marching_cubes_have_it(self) -> None:

@@ -56,7 +56,7 @@ def surface_toy(found, settings, progress):
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - places.mean(axis=0)) < 0
     faces[inward] = faces[inward][:, ::-1]
     mesh = TriMesh(places, faces.astype(np.int64))
-    rough = QuadMesh(mesh.vertices, np.empty((0, 4), np.int64), np.empty(0, np.int64))
+    rough = QuadMesh(mesh.vertices, np.empty((0, 4), np.int64))
     stats = {"toy": {"corners": len(places)}, "fit": {"iterations": 0, "converged": None}}
     return Stage(Surface(found.points, rough, mesh, mesh, np.empty(0, np.int32)), stats, ("the toy fills all bays",))
 

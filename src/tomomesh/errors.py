@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import errno
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Numbers of the system's errors where a disk, a quota or a limit of a file's size is full."""
@@ -23,6 +27,8 @@ class TomomeshError(Exception):
         The rule that was broken.
     hint : str, optional
         The flag or action that may help.
+    flags : sequence of str
+        The options among these that make the same command go on, as ``"--fill-gaps"``: for programs, in place of words.
 
     Examples
     --------
@@ -36,7 +42,11 @@ class TomomeshError(Exception):
 
     exit_code = 1
 
-    def __init__(self, what: str, *, file: str = "", found: str = "", expected: str = "", hint: str = "") -> None:
+    def __init__(
+        self, what: str, *, file: str = "", found: str = "", expected: str = "", hint: str = "",
+        flags: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        self.flags = tuple(flags)
         where = f" File: {printable(file)}" if file else ""
         where += (" " if where else " Found: ") + f"[{printable(found)}]" if found else ""
         parts = [

@@ -6,6 +6,8 @@ import io
 import os
 import signal
 import sys
+import threading
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from . import shell
@@ -13,7 +15,7 @@ from .faults import as_error, is_full
 from .options import TOLD, build_parser, joined
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from types import FrameType
     from typing import TextIO
 
@@ -25,14 +27,19 @@ class _Terminated(BaseException):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run ``tomomesh`` and return its exit code; every fault is one line on stderr."""
-    signal.signal(signal.SIGTERM, _terminate)
+    """Run ``tomomesh`` and return its exit code; every fault is one line on stderr, and no signal handler is left."""
+    with _terminated():
+        return _told(sys.argv[1:] if arguments is None else arguments)
+
+
+def _told(arguments: Sequence[str]) -> int:
+    """Run, and put every fault into one line."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
     try:
         try:
-            return _run(sys.argv[1:] if arguments is None else arguments)
+            return _run(arguments)
         finally:
             print(end="", flush=True)  # here, so that a pipe that was closed early, or a full disk, is noticed
     except BrokenPipeError:  # who reads it has left, as `head` does
@@ -61,6 +68,20 @@ def _run(arguments: Sequence[str]) -> int:
         return INTERRUPTED
     except _Terminated:
         return TERMINATED
+
+
+@contextmanager
+def _terminated() -> Iterator[None]:
+    """Raise SIGTERM as an exception, and put the handler back that was there; only a main thread can."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _terminate)
+    try:
+        yield
+    finally:
+        # None: a handler that was not set from Python, and cannot be named
+        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

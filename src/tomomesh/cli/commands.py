@@ -184,8 +184,8 @@ def _window_of_picture(path: str, settings: Settings) -> NDArray[np.float64]:
 
 
 def _inspect(chosen: Namespace) -> None:
-    from .findings import of_study
-    from .inspection import inspected
+    from .inspect.findings import of_study
+    from .inspect.inspection import inspected
 
     found = inspected(chosen.study, settings_of(chosen), typed=getattr(chosen, "typed", ""))
     _say(found, None if chosen.json else of_study(found))

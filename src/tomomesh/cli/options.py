@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import Field, fields
+from dataclasses import fields
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from .. import __version__
 from ..errors import UsageError
-from ..settings import LAYERS, MANY, Settings, asked_by, limits_of, option_of, parameters
+from ..settings import Settings, option_of, parameters
 from ..ways import WAYS
 from .formats import (
     CHECKED,
@@ -23,30 +23,18 @@ from .formats import (
     STUDY,
     STUDY_FORMATS,
 )
+from .parameter_options import LISTED, SEVERAL, add_parameter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 STAGE_ONE = ("read", "crop", "window", "network")
 STAGE_TWO = ("cubes", "fit", "printing")
-ALIASES = {"cell_mm": "--cell"}
-"""Second spellings: the numbers of a cloud need not be millimeters."""
 TOLD = ("completion", "man")
 """Commands that are made from this parser alone, and import nothing heavy either."""
 SHELLS = ("bash", "zsh", "fish", "tcsh")
 
 
-def spellings(name: str) -> list[str]:
-    """Return the options by which a parameter goes."""
-    return [option_of(name), *([ALIASES[name]] if name in ALIASES else [])]
-
-
-SEVERAL = tuple(
-    option for _, entry in parameters() if entry.metadata["length"] == (1, 3) for option in spellings(entry.name)
-)
-"""Options that take one number or three."""
-LISTED = tuple(option_of(entry.name) for _, entry in parameters() if entry.metadata["length"] == LAYERS)
-"""Options that take one number, or several with commas between."""
 CUTS = ("scale", "flat_base", "hollow", "drain")
 """Parameters that change a part."""
 MESH_ONLY = ("local_origin", "target_faces")
@@ -177,19 +165,6 @@ def _is_number(word: str) -> bool:
     return True
 
 
-def _whole_numbers(text: str) -> tuple[int, ...]:
-    return tuple(int(part) for part in text.split(","))
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    return tuple(float(part) for part in text.split(","))
-
-
-# argparse names them where they fail: "invalid whole numbers, joined by commas, value"
-_whole_numbers.__name__ = "whole numbers, joined by commas,"
-_numbers.__name__ = "numbers, joined by commas,"
-
-
 def _command(commands: Any, name: str, text: str, *, epilog: str | None = None) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = commands.add_parser(
         name, help=text, description=f"{text[0].upper()}{text[1:]}.", epilog=epilog,
@@ -270,7 +245,7 @@ def _add_settings(
     }
     for group, entry in parameters():
         if group in sections and entry.name not in without:
-            _add_parameter(sections[group], entry)
+            add_parameter(sections[group], entry)
     if "window" in sections:
         sections["window"].add_argument(
             "--auto", action="store_true", help="take Otsu's threshold, as is done where no window is given"
@@ -286,48 +261,3 @@ def _add_settings(
 def _title(section: str) -> str:
     """Return the first line of a group's docstring."""
     return (getattr(Settings(), section).__doc__ or section).splitlines()[0].rstrip(".")
-
-
-def _add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
-    meta, options, name = entry.metadata, spellings(entry.name), entry.name
-    if meta["kind"] is bool:
-        action = "store_false" if entry.default else "store_true"
-        text = (f"do not {meta['help']}" if entry.default else meta["help"]).replace("%", "%%")
-        group.add_argument(asked_by(entry), dest=name, action=action, default=argparse.SUPPRESS, help=text)
-        return
-    one_or_three, many = options[0] in SEVERAL, meta["length"] == MANY
-    listed = meta["length"] == LAYERS
-    several = meta["length"][0] if meta["length"] and not (one_or_three or many or listed) else None
-    group.add_argument(
-        *options,
-        dest=name,
-        type=_numbers if one_or_three or listed else _whole_numbers if many else meta["kind"],
-        nargs=several,
-        choices=meta["choices"] or None,
-        metavar=None if meta["choices"] else _metavar(name, meta),
-        default=argparse.SUPPRESS,
-        help=_help(entry),
-    )
-
-
-def _metavar(name: str, meta: Any) -> Any:
-    if meta["length"] in (MANY, LAYERS):
-        return "N[,N...]" if meta["length"] == MANY else "X[,X...]"
-    if meta["length"] in ((), (1, 3)):
-        return "X [Y Z]" if meta["length"] else {int: "N", float: "X", str: "NAME"}[meta["kind"]]
-    if meta["metavar"]:
-        return meta["metavar"]
-    return (
-        tuple(name[0].upper() + str(n) for n in range(meta["length"][0])) if meta["length"] == (2,) else ("X", "Y", "Z")
-    )
-
-
-def _help(entry: Field[Any]) -> str:
-    """Put a parameter's text, unit, limits and default into one line."""
-    meta, default = entry.metadata, entry.default
-    if isinstance(default, tuple):
-        default = " ".join(f"{value:g}" for value in default)
-    facts = [meta["unit"], "" if meta["choices"] else limits_of(entry)]
-    facts += [] if default is None else [f"default {default:g}" if isinstance(default, float) else f"default {default}"]
-    told = "; ".join(fact for fact in facts if fact)
-    return (f"{meta['help']} ({told})" if told else str(meta["help"])).replace("%", "%%")

@@ -10,6 +10,8 @@ from scipy import ndimage
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
+from ..measure.polygon import side_lengths
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -20,11 +22,14 @@ if TYPE_CHECKING:
 WEIGHTS = np.concatenate([[0.0], 10.0 ** np.arange(-3, 5.1, 0.25)])
 """Weights of the third differences among which generalized cross-validation chooses."""
 LONG = 1.5
-"""Medians over which a side of a ring is a gap, and gets points."""
+"""Medians over which a side of a ring is a gap, and gets points. Chosen: half of it changes the distance by +22.6 %,
+twice by -4.0 %."""
 DENSE = 0.25
-"""Distance of the points on a fine curve, in pixels."""
+"""Distance of the points on a fine curve, in pixels. Chosen: half of it changes the distance by +0.4 %, twice by -0.2
+%."""
 NEAR = 3.0
-"""Pixels from a curve within which distances are exact."""
+"""Pixels from a curve within which distances are exact. Chosen: half of it changes the distance by +2.5 %, twice by
++10.4 %."""
 
 
 def without_noise(ring: Floats) -> Floats:
@@ -69,8 +74,7 @@ def redrawn(ring: Floats, distance: float) -> Floats:
 
 def fine_curve(ring: Floats, distance: float) -> Floats:
     """Bridge the gaps of a ring (u, 2), take its noise off and draw it finely."""
-    chord = np.sqrt(((ring - np.roll(ring, -1, axis=0)) ** 2).sum(axis=1))
-    even = redrawn(ring, LONG * float(np.median(chord)))
+    even = redrawn(ring, LONG * float(np.median(side_lengths(ring))))
     smooth = without_noise(even)
     apart = (smooth != np.roll(smooth, -1, axis=0)).any(axis=1)
     return redrawn(smooth[apart], distance)
@@ -196,5 +200,5 @@ def _to_sides(places: Floats, points: Floats, sides: Floats) -> Floats:
     _, nearest = cKDTree(points).query(places)
     step, side = places - points[nearest], sides[:, nearest]
     share = (step * side).sum(axis=2) / np.maximum((side**2).sum(axis=2), 1e-300)
-    foot = np.clip(share, 0, 1)[..., None] * side
-    return np.asarray(np.sqrt(((step - foot) ** 2).sum(axis=2)).min(axis=0))
+    on_side = np.clip(share, 0, 1)[..., None] * side
+    return np.asarray(np.sqrt(((step - on_side) ** 2).sum(axis=2)).min(axis=0))

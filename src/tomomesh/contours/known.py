@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..measure.polygon import area, side_lengths
 from ..model.points import NEURON, RING, SIDE
-from .rings import holes, signed_area
+from .rings import holes
 from .slices import FEWEST, PARTED, Slices, axes_across, common_normal
 
 if TYPE_CHECKING:
@@ -51,8 +52,8 @@ def known_slices(points: PointSet) -> Slices | None:
     gaps = np.diff(heights)
     if gaps.min() <= 0 or np.abs(height - heights[labels[order]]).max() > PARTED * gaps.min():
         return None
-    sides = np.concatenate([np.roll(one, -1, axis=0) - one for one in rings])
-    spacing = min(float(np.median(np.sqrt((sides**2).sum(axis=1)))), float(np.median(gaps)))
+    sides = np.concatenate([side_lengths(one) for one in rings])
+    spacing = min(float(np.median(sides)), float(np.median(gaps)))
     found = Slices(origin, axes_across(normal), heights, labels, spacing)
     return replace(found, rings=_oriented(points, grouped, found))
 
@@ -76,5 +77,5 @@ def _turned(points: PointSet, plane: list[NDArray[np.int64]], found: Slices) -> 
     curves = [found.placed(points.positions[one])[:, :2] for one in plane]
     side = points.attributes.get(SIDE)
     around = holes(curves) if side is None else [bool(side[one[0]] % 2) for one in plane]
-    forward = [signed_area(curve) > 0 for curve in curves]
+    forward = [area(curve) > 0 for curve in curves]
     return [one if f != hole else one[::-1] for one, f, hole in zip(plane, forward, around, strict=True)]

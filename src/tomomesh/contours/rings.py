@@ -18,7 +18,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, cKDTree
 
-from ..kernels.som.polygons import inside_polygon
+from ..measure.polygon import area, inside
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,11 +26,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 REACHES = tuple(2.0 * 1.3**n for n in range(5))
-"""Lengths of walls that are tried, in local sampling distances: from twice to some six times."""
+"""Lengths of walls that are tried, in local sampling distances: from twice to some six times. Chosen: half of it
+changes nothing, with twice of it the stack is not found."""
 HOLDS, OPEN = 0.8, 0.5
-"""Shares of a contour's points with two sides: it need not be closed further; it counts as open where fewer have."""
+"""Shares of a contour's points with two sides: it need not be closed further; it counts as open where fewer have.
+Chosen: half and twice of them change no case of benchmarks/constants.py."""
 LEAST = 6
-"""Points that a contour has at least."""
+"""Points that a contour has at least. Chosen: half and twice of it change no case of benchmarks/constants.py."""
 STIRRED = 1e-3
 """Share of the mean distance by which points are moved before they are triangulated: thousands of points on one circle
 would take seconds."""
@@ -108,7 +110,7 @@ def nested(curves: Sequence[NDArray[np.float64]]) -> Outline:
         Its numbers are of the points of all curves, one after the other.
     """
     first = np.cumsum([0, *map(len, curves)])
-    areas = np.array([signed_area(curve) for curve in curves])
+    areas = np.array([area(curve) for curve in curves])
     turn = np.sign(areas).astype(np.int64)
     within = _within(curves, np.abs(areas))
     around = within @ turn
@@ -124,14 +126,8 @@ def nested(curves: Sequence[NDArray[np.float64]]) -> Outline:
 
 def holes(curves: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
     """Tell which closed curves (u, 2) are holes: those within an odd number of others."""
-    areas = np.array([abs(signed_area(curve)) for curve in curves])
+    areas = np.array([abs(area(curve)) for curve in curves])
     return np.asarray(_within(curves, areas).sum(axis=1) % 2 == 1)
-
-
-def signed_area(curve: NDArray[np.float64]) -> float:
-    """Return the area of a closed polygon (u, 2); below 0 where the inside is on its right."""
-    x, y = (curve - curve[0]).T
-    return float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)
 
 
 def _within(curves: Sequence[NDArray[np.float64]], areas: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -140,9 +136,7 @@ def _within(curves: Sequence[NDArray[np.float64]], areas: NDArray[np.float64]) -
     apart = (low[:, None] > high[None]).any(axis=2) | (high[:, None] < low[None]).any(axis=2)
     found = ~apart & (areas[:, None] < areas[None, :])
     for one, other in np.argwhere(found).tolist():
-        inside = np.empty(len(curves[one]), np.bool_)
-        inside_polygon(np.ascontiguousarray(curves[other]), np.ascontiguousarray(curves[one]), inside)
-        found[one, other] = inside.mean() > 0.5
+        found[one, other] = inside(curves[other], curves[one]).mean() > 0.5
     return np.asarray(found)
 
 

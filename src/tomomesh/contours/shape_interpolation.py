@@ -25,11 +25,13 @@ if TYPE_CHECKING:
 MARGIN = 3
 """Voxels of background around the shapes."""
 FAR = np.float32(1e4)
-"""Distance far outside, in voxels."""
+"""Distance far outside, in voxels. Farther than volumes are wide, and exact in 32 bits."""
 ENDS = 0.5
-"""Share of a slice distance that a part goes on beyond its last contour."""
+"""Share of a slice distance that a part goes on beyond its last contour. Chosen: half of it changes the distance by
++116.0 %, twice by -19.7 %."""
 LIMIT = 3.0
-"""Slopes are at most this many times the smaller change: then nothing overshoots (Fritsch & Carlson 1980)."""
+"""Slopes are at most this many times the smaller change: then nothing overshoots (Fritsch & Carlson 1980). Chosen: half
+of it changes the distance by +0.1 %, twice by -0.4 %."""
 
 
 @dataclass(frozen=True)

@@ -32,13 +32,16 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MOST_VOXELS = 60_000_000
-"""Voxels of the interpolated volume, over which they are made larger."""
+"""Voxels of the interpolated volume, over which they are made larger. 240 MB of 32-bit levels."""
 COARSER = 1.02
-"""Factor by which they are, as often as it takes."""
+"""Factor by which they are, as often as it takes. Three powers of it are 6 %: at most so much of the memory is given
+away."""
 SPRINGS = 0.4
-"""Share of the springs' stiffness: interpolated distances are smooth, and small parts should keep their width."""
+"""Share of the springs' stiffness: interpolated distances are smooth, and small parts should keep their width. Chosen:
+half of it changes the distance by +3.3 %, twice by -0.5 %."""
 MEASURED = 0.75
-"""Faces farther than this from every point, in slice distances, are filled rather than measured."""
+"""Faces farther than this from every point, in slice distances, are filled rather than measured. Chosen: half and twice
+of it change no case of benchmarks/constants.py."""
 
 
 @dataclass(frozen=True)

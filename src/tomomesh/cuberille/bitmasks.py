@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    Board = NDArray[np.uint64]
+    Bitmask = NDArray[np.uint64]
 
 EDGE = 8
 """Cubes along a block."""
@@ -34,7 +34,7 @@ MOST = 4_000_000
 class Blocks:
     """The blocks around objects, and what is done with sets of their cubes.
 
-    A set is a *board*, (b + s, 8) uint64, of which the last rows stand for space without blocks: all that is
+    A set is a *bitmask*, (b + s, 8) uint64, of which the last rows stand for space without blocks: all that is
     outside the objects, and what is inside each (see `tomomesh.kernels.cuberille.bitmasks`).
 
     Attributes
@@ -70,50 +70,50 @@ class Blocks:
     def __len__(self) -> int:
         return len(self.keys)
 
-    def empty(self) -> Board:
+    def empty(self) -> Bitmask:
         """Return a set without cubes."""
         return np.zeros((len(self) + self.spaces, EDGE), np.uint64)
 
-    def beyond(self) -> Board:
+    def beyond(self) -> Bitmask:
         """Return the set of the cubes outside the objects that have no blocks."""
-        board = self.empty()
-        board[len(self)] = ~board[len(self)]
-        return board
+        bitmask = self.empty()
+        bitmask[len(self)] = ~bitmask[len(self)]
+        return bitmask
 
-    def board_of(self, cells: NDArray[np.int64]) -> Board:
+    def bitmask_of(self, cells: NDArray[np.int64]) -> Bitmask:
         """Return the set of some cells (x, y, z), (c, 3), which all lie in the blocks."""
-        board = self.empty()
+        bitmask = self.empty()
         word = EDGE * np.searchsorted(self.keys, keys_of(cells // EDGE)) + cells[:, 2] % EDGE
         bit = np.uint64(1) << (EDGE * (cells[:, 1] % EDGE) + cells[:, 0] % EDGE).astype(np.uint64)
-        np.bitwise_or.at(board.reshape(-1), word, bit)
-        return board
+        np.bitwise_or.at(bitmask.reshape(-1), word, bit)
+        return bitmask
 
-    def grown(self, board: Board, steps: int = 1) -> Board:
+    def grown(self, bitmask: Bitmask, steps: int = 1) -> Bitmask:
         """Add every cube within some steps of a cube, corners included: one axis after the other."""
         for axis in (0, 1, 2) * steps:
-            before, board = board, board.copy()
-            self.each(partial(grow_along, before, self.table, axis, board))
-        return board
+            before, bitmask = bitmask, bitmask.copy()
+            self.each(partial(grow_along, before, self.table, axis, bitmask))
+        return bitmask
 
-    def spread(self, board: Board, within: Board, steps: int) -> Board:
+    def spread(self, bitmask: Bitmask, within: Bitmask, steps: int) -> Bitmask:
         """Walk some steps from a set through another, corners included; the start is part of the result."""
         for _ in range(steps):
-            board = board | (self.grown(board) & within)
-        return board
+            bitmask = bitmask | (self.grown(bitmask) & within)
+        return bitmask
 
     def each(self, work: Callable[[int, int], None]) -> None:
         """Share the blocks among threads."""
         in_blocks(work, len(self), block=SHARE, threads=self.threads)
 
-    def count(self, board: Board) -> NDArray[np.int64]:
+    def count(self, bitmask: Bitmask) -> NDArray[np.int64]:
         """Return how many cubes each word holds, (b, 8)."""
-        return np.bitwise_count(board[: len(self)]).astype(np.int64)
+        return np.bitwise_count(bitmask[: len(self)]).astype(np.int64)
 
-    def cells(self, board: Board) -> NDArray[np.int64]:
+    def cells(self, bitmask: Bitmask) -> NDArray[np.int64]:
         """Return the positions (x, y, z) of the cubes of a set, block by block, (c, 3)."""
-        count = self.count(board)
+        count = self.count(bitmask)
         cells = np.empty((int(count.sum()), 3), np.int64)
-        list_cubes(board, cells_of(self.keys), before(count), cells)
+        list_cubes(bitmask, cells_of(self.keys), before(count), cells)
         return cells
 
 

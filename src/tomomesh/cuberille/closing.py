@@ -20,13 +20,14 @@ from .neighbors import FACE_COLUMNS, neighbor_table
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .bitmasks import Board
+    from .bitmasks import Bitmask
 
 NEAR = 2
 """Steps, beyond twice the dilation, from enclosed space within which an occupied cube counts as near it: noise may
 make a shell two cubes thick, and a dilation leaves little of what is enclosed."""
 ROOM = 0.005
-"""Cubes of a piece of enclosed space, over the occupied ones, under which it is a pocket."""
+"""Cubes of a piece of enclosed space, over the occupied ones, under which it is a pocket: a sphere of radius 2 encloses
+8 % of its own cubes, a wider one more."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +37,11 @@ class Shell:
     Attributes
     ----------
     blocks : Blocks
-    occupied : board
+    occupied : bitmask
         Cubes that hold points.
-    solid : board
+    solid : bitmask
         The objects, filled: all that the outside does not reach.
-    witnesses : board
+    witnesses : bitmask
         Occupied cubes that tell of an inside: near space that the dilation left empty and the outside does not
         reach.
     within : (c, 3) int64 array
@@ -52,9 +53,9 @@ class Shell:
     """
 
     blocks: Blocks
-    occupied: Board
-    solid: Board
-    witnesses: Board
+    occupied: Bitmask
+    solid: Bitmask
+    witnesses: Bitmask
     within: NDArray[np.int64]
     closing: int
     added: int
@@ -82,7 +83,7 @@ def close_shell(cells: NDArray[np.int64], closing: int, *, threads: int = 0) -> 
     The outside takes back no cube that lines enclosed space, or the erosion would open what the dilation closed.
     """
     blocks = Blocks.around(cells, closing + NEAR, threads=threads)
-    occupied = blocks.board_of(cells)
+    occupied = blocks.bitmask_of(cells)
     dilated = blocks.grown(occupied, closing)
     outside = blocks.beyond()
     flood(~dilated, blocks.table, outside)
@@ -97,7 +98,7 @@ def close_shell(cells: NDArray[np.int64], closing: int, *, threads: int = 0) -> 
     return Shell(blocks, occupied, solid, occupied & near, within, closing, added)
 
 
-def _roomy(blocks: Blocks, enclosed: Board, least: float) -> Board:
+def _roomy(blocks: Blocks, enclosed: Bitmask, least: float) -> Bitmask:
     """Leave out the small pieces of enclosed space: pockets in a thick wall tell of no inside."""
     large = blocks.empty()
     large[len(blocks) :] = enclosed[len(blocks) :]
@@ -111,10 +112,10 @@ def _roomy(blocks: Blocks, enclosed: Board, least: float) -> Board:
     table = np.ascontiguousarray(neighbor_table(keys[order])[:, FACE_COLUMNS])
     label_components(table, np.ones(len(keys), np.bool_), labels)
     kept = (np.bincount(labels) >= least)[labels]
-    return large | blocks.board_of(cells[order][kept])
+    return large | blocks.bitmask_of(cells[order][kept])
 
 
-def _well_composed(blocks: Blocks, solid: Board) -> tuple[Board, int]:
+def _well_composed(blocks: Blocks, solid: Bitmask) -> tuple[Bitmask, int]:
     """Fill contacts along edges and at corners until there are none; return how many cubes that took.
 
     What is filled may shut a pocket off from the outside, which then belongs to the solid.

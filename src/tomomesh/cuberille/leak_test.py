@@ -1,4 +1,4 @@
-"""Find the smallest closing at which a shell of cubes keeps the outside out."""
+"""The leak test: find the smallest closing at which a shell of cubes keeps the outside out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ..progress import Progress, silent
 from .closing import close_shell
-from .faces import HELD, Walls, walls
+from .faces import TIGHT, Faces, exposed_faces
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -19,53 +19,56 @@ if TYPE_CHECKING:
     from .closing import Shell
 
 CLOSINGS = tuple(range(9))
-"""Closings that are tried by themselves, cubes."""
+"""Closings that are tried by themselves, cubes: the widest closes holes of 16; a ring of 58 cubes is 18 wide."""
 LEAKING = 1
-"""Closing of a shell that none makes hold, as of a sheet or a thin slab: it fills single holes."""
+"""Closing of a shell that none makes tight, as of a sheet or a thin slab: it fills single holes."""
 SURE = 0.8
-"""Share of occupied cubes that tell of an inside from which no wider closing is tried."""
+"""Share of occupied cubes that tell of an inside from which no wider closing is tried: what is tight and has an inside
+lies above (measured, see `TIGHT`)."""
 HOPELESS = 0.1
-"""Share of the occupied cubes that must tell of an inside for the surfaces to be looked at one by one."""
+"""Share of the occupied cubes that must tell of an inside for the surfaces to be looked at one by one: what leaks lies
+below (measured, see `TIGHT`)."""
 
 
 @dataclass(frozen=True)
-class Held:
-    """A shell, its walls, and whether they keep the outside out.
+class LeakTest:
+    """A shell, its faces, and whether the outside leaks in.
 
     Attributes
     ----------
     shell : Shell
-    walls : Walls
+    faces : Faces
     two_sided : float
-        Least share, over the surfaces, of occupied cubes that tell of an inside: near 1 where the shell holds, near
-        0 where the outside leaks in and the surface would be two-walled.
+        Least share, over the surfaces, of occupied cubes that tell of an inside: near 1 where the shell is tight, near
+        0 where the outside leaks in, and the surface would run along both sides of the shell.
     """
 
     shell: Shell
-    walls: Walls
+    faces: Faces
     two_sided: float
 
     @property
-    def holds(self) -> bool:
+    def tight(self) -> bool:
         """Whether the outside stays out."""
-        return self.two_sided >= HELD
+        return self.two_sided >= TIGHT
 
-    def is_better_than(self, other: Held) -> bool:
-        """Tell which is nearer to the object: where both hold, the one of fewer handles, for noise makes handles."""
-        if self.holds and other.holds and self.walls.handles != other.walls.handles:
-            return self.walls.handles < other.walls.handles
+    def is_better_than(self, other: LeakTest) -> bool:
+        """Tell which is nearer to the object: where both are tight, the one of fewer handles: noise makes handles."""
+        if self.tight and other.tight and self.faces.handles != other.faces.handles:
+            return self.faces.handles < other.faces.handles
         return self.two_sided > other.two_sided
 
 
-def hold(
+def close_leaks(
     cells: NDArray[np.int64],
     closings: Iterable[int] = CLOSINGS,
     *,
     cavities: bool = False,
+    tracking: str = "scan",
     threads: int = 0,
     progress: Progress = silent,
-) -> Held:
-    """Close a shell by the fewest cubes that make it hold.
+) -> LeakTest:
+    """Close a shell by the fewest cubes that make it tight.
 
     Parameters
     ----------
@@ -74,46 +77,48 @@ def hold(
     closings : iterable of int
         What to try, cubes.
     cavities : bool
-        Also take the objects inside of objects: their walls face inward, those inside of these outward again.
+        Also take the objects inside of objects: their faces look inward, those inside of these outward again.
+    tracking : str
+        How faces are found (see `exposed_faces`).
     threads : int
     progress : callable
 
     Returns
     -------
-    Held
-        The first that surely holds, else the best that holds; closed by `LEAKING` where none holds at all.
+    LeakTest
+        The first that is surely tight, else the best that is tight; closed by `LEAKING` where none is at all.
     """
     tried = list(closings)
-    best: Held | None = None
+    best: LeakTest | None = None
     for count, steps in enumerate(tried):
         progress("closing", count, len(tried))
         shell = close_shell(cells, steps, threads=threads)
         if len(tried) > 1 and _share(shell) < HOPELESS:
             continue
-        found = walls(shell)
-        held = Held(shell, found, found.least_two_sided)
-        best = held if best is None or held.two_sided >= SURE or held.is_better_than(best) else best
-        if held.two_sided >= SURE:
+        found = exposed_faces(shell, tracking=tracking)
+        tested = LeakTest(shell, found, found.least_two_sided)
+        best = tested if best is None or tested.two_sided >= SURE or tested.is_better_than(best) else best
+        if tested.two_sided >= SURE:
             break
     progress("closing", len(tried), len(tried))
     if best is None:
         shell = close_shell(cells, LEAKING, threads=threads)
-        best = Held(shell, walls(shell), 0.0)
-    return replace(best, walls=_with_cavities(best.shell, best.walls)) if cavities else best
+        best = LeakTest(shell, exposed_faces(shell, tracking=tracking), 0.0)
+    return replace(best, faces=_with_cavities(best.shell, best.faces, tracking)) if cavities else best
 
 
 def _share(shell: Shell) -> float:
     """Return the share of occupied cubes that tell of an inside."""
     rows = len(shell.blocks)
-    there, told = (int(np.bitwise_count(board[:rows]).sum()) for board in (shell.occupied, shell.witnesses))
+    there, told = (int(np.bitwise_count(bitmask[:rows]).sum()) for bitmask in (shell.occupied, shell.witnesses))
     return told / max(there, 1)
 
 
-def _with_cavities(shell: Shell, found: Walls) -> Walls:
-    """Append the walls of what lies in the cavities, as far as they hold themselves."""
+def _with_cavities(shell: Shell, found: Faces, tracking: str) -> Faces:
+    """Append the faces of what lies in the cavities, as far as that is tight itself."""
     if len(shell.within) == 0:
         return found
     inner = close_shell(shell.within, shell.closing, threads=shell.blocks.threads)
-    within = walls(inner)
-    within = within.only(within.two_sided >= HELD)
-    return found.joined(_with_cavities(inner, within).turned())
+    within = exposed_faces(inner, tracking=tracking)
+    within = within.only(within.two_sided >= TIGHT)
+    return found.joined(_with_cavities(inner, within, tracking).turned())

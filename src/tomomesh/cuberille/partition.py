@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import EmptyError, ResourceError
 from ..kernels.pointcloud.sweep import neighbor_distances
 from ..kernels.threads import in_blocks
-from ..model.columns import box
+from ..model.columns import box, cells_at
 from ..model.cubes import MARGIN, SIDE, CubeGrid, keys_of
 
 if TYPE_CHECKING:
@@ -17,12 +17,14 @@ if TYPE_CHECKING:
 
 
 ASKED = 5_000
-"""Points whose neighbors are sought to find the sampling distance of all."""
+"""Points whose neighbors are sought to find the sampling distance of all: where distances vary by a fifth, the
+median of so many is that of all within .4 %."""
 BLOCK = 250
-"""Of them, those worked on in one call."""
+"""Of them, those worked on in one call: far below 100 ms."""
 
 FLAT = 1e-6
-"""Thickness of points, over a length that is given, under which they count as flat."""
+"""Thickness of points, over a length that is given, under which they count as flat: more than what
+rounding leaves of a plane, and no cube is as thin."""
 
 
 def partition(positions: NDArray[np.float64], cell_mm: NDArray[np.float64]) -> CubeGrid:
@@ -80,7 +82,7 @@ def cubes_over(
             hint="a larger --cell-mm",
         )
     origin = low - 0.5 * cell_mm
-    return origin, keys_of(np.floor((positions - origin) / cell_mm).astype(np.int64))
+    return origin, keys_of(cells_at(positions, origin, cell_mm))
 
 
 def is_flat(positions: NDArray[np.float64], length: float) -> bool:

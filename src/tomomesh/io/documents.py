@@ -99,7 +99,7 @@ def read_settings(path: str | Path, *, base: Settings | None = None) -> Settings
         sections = tomllib.loads(whole(path).decode("utf-8"))
     except UnicodeDecodeError:
         raise FormatError("the settings are no text", file=str(path), expected="TOML") from None
-    except tomllib.TOMLDecodeError as fault:
+    except (ValueError, RecursionError) as fault:  # so does tomllib call numbers too long, and lists too deep
         raise FormatError("the settings cannot be read", file=str(path), found=str(fault), expected="TOML") from None
     return Settings.from_dict(sections, base=base, file=str(path))
 

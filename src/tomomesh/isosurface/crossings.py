@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..model.points import BRIDGE, CAP, NEURON
+from ..model.points import ADDED, BORDER, CROSSING
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -106,7 +106,7 @@ class Crossings:
     positions : (q, 3) float array
         As voxel indices (x, y, z).
     kinds : (q,) uint8 array
-        ``NEURON`` where gray levels were interpolated, ``CAP`` on the border of the volume, ``BRIDGE`` around a
+        ``CROSSING`` where gray levels were interpolated, ``BORDER`` on the border of the volume, ``ADDED`` beside a
         voxel that is not in the window.
     stepped : bool
         Whether the gray levels are those of a mask: then all crossings are half way.
@@ -139,5 +139,5 @@ def crossings(
     outer, stepped = inner + steps, levels.stepped(inner, steps)
     share = np.full(len(inner), 0.5) if stepped else np.where(added, BARELY, levels.crossed(inner, outer))
     beyond = (levels.nearest(outer) != outer).any(axis=1)
-    kinds = np.where(added, BRIDGE, np.where(beyond, CAP, NEURON)).astype(np.uint8)
+    kinds = np.where(added, ADDED, np.where(beyond, BORDER, CROSSING)).astype(np.uint8)
     return Crossings(inner + share[:, None] * steps, kinds, stepped)

@@ -53,12 +53,11 @@ class Boundary:
 
     @cached_property
     def cuberille(self) -> QuadMesh:
-        """The faces themselves; ``cubes`` are the numbers of the voxels (K, J, I) behind them."""
-        net, (_, rows, columns) = self.net, self.volume.shape
+        """The faces themselves."""
+        net = self.net
         outward = slice(None, None, 1 if right_handed(self.volume.affine) else -1)
-        x, y, z = net.inner.T.astype(np.int64)
         corners = placed(net.low + 0.5, self.volume.affine)
-        return QuadMesh(corners, net.quads[:, outward].astype(np.int64), (z * rows + y) * columns + x)
+        return QuadMesh(corners, net.quads[:, outward].astype(np.int64))
 
     @cached_property
     def volumes(self) -> NDArray[np.int64]:

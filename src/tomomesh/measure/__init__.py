@@ -1,1 +1,1 @@
-"""TriMesh -> Report: topology, distances, triangle shapes."""
+"""TriMesh -> Report: topology, distances, triangle shapes; contours, and how they match."""

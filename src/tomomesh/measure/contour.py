@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .polygon import area, side_lengths
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -16,7 +18,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 ROUNDING = 1e-9
-"""What a place may lie off a line, over the product of the lengths, and still count as on it."""
+"""What a place may lie off a line, over the product of the lengths, and still count as on it. A computed turn errs by
+some 4e-16 of that for each length between the line and the origin: lines up to a million lengths away are told right.
+"""
 
 
 @dataclass(frozen=True)
@@ -65,21 +69,14 @@ def measure_contour(line: Floats, *, closed: bool = True, bridged: NDArray[np.bo
     """
     lengths = side_lengths(line, closed=closed)
     usual = lengths if bridged is None or bridged.all() else lengths[~bridged]
-    x, y = (line - line[0]).T
     return ContourMeasures(
         closure_gap=float(np.hypot(*(line[0] - line[-1]))),
         self_crossings=crossings(line, closed=closed),
         perimeter=float(lengths.sum()),
-        area=abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)) if closed else 0.0,
+        area=abs(area(line)) if closed else 0.0,
         longest_over_median=float(lengths.max() / max(np.median(lengths), 1e-300)),
         evenness=float(usual.std() / max(usual.mean(), 1e-300)),
     )
-
-
-def side_lengths(line: Floats, *, closed: bool = True) -> Floats:
-    """Return the lengths of the sides of a contour (u, 2), the first from neuron 0 to neuron 1."""
-    onward = np.roll(line, -1, axis=0) if closed else line[1:]
-    return np.asarray(np.sqrt(((onward - line[: len(onward)]) ** 2).sum(axis=1)))
 
 
 def crossings(line: Floats, *, closed: bool = True) -> int:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SAMPLES = 20_000
-"""Samples a surface for its distance to another."""
+"""Samples a surface for its distance to another. The standard error of their mean is 0.7 % of the spread."""
 HUNDRED = 100
 """Parts of the progress that is told."""
 

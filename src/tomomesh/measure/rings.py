@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.contours import BIRTH, BRANCH, DEATH, MERGE, SIDES
-from .contour import ContourMeasures, crossings_between, measure_contour, side_lengths
+from .contour import ContourMeasures, crossings_between, measure_contour
+from .polygon import side_lengths
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -20,13 +20,14 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SAMPLES = 20_000
-"""Samples that a surface has at least; a face has one in its middle, and a large one more."""
+"""Samples that a surface has at least; a face has one in its middle, and a large one more. The thinnest 1 % is then
+told by 200 of them."""
 STEP = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of an even sequence in the square, the inverse of the plastic number and its square (Roberts 2018)."""
 SHARE = 1.0
 """Percent of a surface that tells what is common on it."""
 BLOCK = 1_000
-"""Samples handled at once: some milliseconds."""
+"""Samples handled at once: some milliseconds. No result depends on it."""
 
 
 @dataclass(frozen=True)

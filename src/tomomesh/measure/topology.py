@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InternalCheckError
-from ..kernels.measure.positions import first_alike
+from ..kernels.measure.positions import first_equal
 from ..model.mesh import TriMesh
 from .links import Links
 from .shape import areas_and_volumes
@@ -117,7 +117,7 @@ def welded(mesh: TriMesh, dtype: type[np.floating[Any]] = np.float32) -> TriMesh
     Faces that lose a corner are dropped.
     """
     rounded = np.array(mesh.vertices.astype(dtype, copy=False), np.float64, order="C")
-    first = _first_alike(rounded)
+    first = _first_equal(rounded)
     kept = first == np.arange(len(first))
     faces = (np.cumsum(kept) - 1)[first][mesh.faces]
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
@@ -160,17 +160,17 @@ def check_promise(mesh: TriMesh, *, cavities: int = 0, open_: bool = False) -> N
 
 def distinct_positions(mesh: TriMesh, dtype: type[np.floating[Any]]) -> int:
     """Count the positions that stay apart at a precision."""
-    first = _first_alike(np.array(mesh.vertices.astype(dtype, copy=False), np.float64, order="C"))
+    first = _first_equal(np.array(mesh.vertices.astype(dtype, copy=False), np.float64, order="C"))
     return int((first == np.arange(len(first))).sum())
 
 
-def _first_alike(positions: NDArray[np.float64]) -> NDArray[np.int32]:
+def _first_equal(positions: NDArray[np.float64]) -> NDArray[np.int32]:
     """Return the first vertex at the position of each, (n,). -0 becomes 0, which is the same position."""
     positions += 0.0
     rows = positions.view(np.int64)
     bits = len(rows).bit_length() + 1
     first = np.empty(len(rows), np.int32)
-    first_alike(rows, _stirred(rows.view(np.uint64), bits), np.full(1 << bits, -1, np.int32), first)
+    first_equal(rows, _stirred(rows.view(np.uint64), bits), np.full(1 << bits, -1, np.int32), first)
     return first
 
 

@@ -21,11 +21,12 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int32]
 
 LEAF = 4
-"""Fewest simplices in a leaf, where there are so many; fewer than twice as many are the most."""
+"""Fewest simplices in a leaf, where there are so many; fewer than twice as many are the most. Only speed depends on it.
+"""
 SOME = 2_000
-"""Simplices that tell the usual place and extent."""
+"""Simplices that tell the usual place and extent. Only speed depends on it."""
 BLOCK = 20_000
-"""Simplices handled at once, and five times the points: some milliseconds."""
+"""Simplices handled at once, and five times the points: some milliseconds. No result depends on it."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,13 @@ def box(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.fl
     return np.array([column.min() for column in points.T]), np.array([column.max() for column in points.T])
 
 
+def cells_at(
+    points: NDArray[np.float64], origin: NDArray[np.float64], edge: NDArray[np.float64] | float
+) -> NDArray[np.int64]:
+    """Return the cell of each point (n, k) in a lattice of an edge, (n, k); cell 0 begins at the origin."""
+    return np.floor((points - origin) / edge).astype(np.int64)
+
+
 def any_of(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Tell which rows (n, k) have any true column, (n,)."""
     return reduce(np.logical_or, rows.T)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["TOPOLOGIES", "Lattice", "lattice"]
 
 LEAST = 3
-"""Fewest neurons."""
+"""Fewest neurons. A ring of two has no inside."""
 TUBE = 0.4
 """Radius of a torus' tube over the radius of its ring, at rest."""
 

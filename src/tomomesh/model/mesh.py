@@ -95,24 +95,15 @@ class QuadMesh:
         Positions (x, y, z).
     quads : (q, 4) int64 array
         Vertex numbers, counter-clockwise seen from outside.
-    cubes : (q,) int64 array
-        The occupied cube behind each face.
     """
 
     vertices: NDArray[np.float64]
     quads: NDArray[np.int64]
-    cubes: NDArray[np.int64]
 
     @cached_property
     def edges(self) -> NDArray[np.int64]:
         """Undirected sides of the squares, each once, (e, 2)."""
         return _once_each(self.quads[:, [0, 1, 1, 2, 2, 3, 3, 0]].reshape(-1, 2), len(self.vertices))
-
-    @cached_property
-    def vertex_cubes(self) -> NDArray[np.int64]:
-        """The cube that each vertex came from: the first of its faces' cubes, (n,)."""
-        _, first = np.unique(self.quads, return_index=True)
-        return self.cubes[first // 4]
 
     def triangulated(self) -> TriMesh:
         """Split each square by its diagonal 0-2 (the paper's systematic triangulation, Fig. 8b)."""

@@ -15,7 +15,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 NEURON, BRIDGE, CAP = 0, 1, 2
-"""What a point is: a trained neuron, a sample of a bridged gap, a sample of a closing cap."""
+"""What a point is: a trained neuron or a measured point, a sample of a bridged gap, a sample of a closing cap."""
+
+CROSSING, ADDED, BORDER = NEURON, BRIDGE, CAP
+"""The same numbers on the boundary of a window, which has no networks: where gray levels cross a bound, beside a voxel
+that was added so that the boundary touches itself nowhere, on the border of the volume. In both, 0 is measured."""
 
 KINDS = (NEURON, BRIDGE, CAP)
 
@@ -40,7 +44,8 @@ class PointSet:
     neurons : (n,) int32 array
         Its number within the network of that slice, -1 where it is not a neuron.
     kinds : (n,) uint8 array
-        ``NEURON``, ``BRIDGE`` or ``CAP``; measured points of a cloud count as ``NEURON``.
+        ``NEURON``, ``BRIDGE`` or ``CAP``; measured points of a cloud count as ``NEURON``. Of a window's boundary:
+        ``CROSSING``, ``ADDED`` or ``BORDER``.
     attributes : mapping of str to (n,) or (n, c) array
         What else is known of each point, by name: `COLORS`, ``intensity`` and the like.
     frame : str

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..cuberille.closing import close_shell
-from ..cuberille.faces import walls
-from ..cuberille.leak_test import Held
+from ..cuberille.faces import exposed_faces
+from ..cuberille.leak_test import LeakTest
 from ..cuberille.neighbors import dilate
 from ..cuberille.partition import cubes_over
 from ..dynamics.moving_least_squares import Draped, Ring, drape
@@ -41,22 +41,29 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
 
 CLOSINGS = (0, 1, 2)
-"""Closings that are tried until the two walls come apart, cubes."""
+"""Closings that are tried until the two walls come apart, cubes. Chosen: half of it changes the distance by +0.1 %,
+twice by +0.1 %."""
 APRON = 0.7
-"""How far a sheet is carried on beyond its borders, in the radius of the disks there."""
+"""How far a sheet is carried on beyond its borders, in the radius of the disks there. Chosen: half of it changes the
+distance by -6.6 %, twice by -0.3 %."""
 TIP = 0.8
-"""Share of the apron from which the walls are cut away."""
+"""Share of the apron from which the walls are cut away. Chosen: half of it changes the distance by -12.2 %, twice leads
+to a refusal."""
 DENSE = 0.5
-"""Distance of the places on the apron, cube edges."""
+"""Distance of the places on the apron, cube edges. Chosen: half of it changes the distance by -1.2 %, twice by -1.9 %.
+"""
 OVER = 0.4
-"""How far a sheet reaches beyond its outermost samples, cube edges: half of that is where points thrown at random
-end before their surface does."""
+"""How far a sheet reaches beyond its outermost samples, cube edges: half of that is where points thrown at random end
+before their surface does. Chosen: half of it changes the distance by -8.5 %, twice by +23.8 %."""
 EVEN = 3
-"""Passes of the low-pass filter over the heights along whose zero the sheet is cut."""
+"""Passes of the low-pass filter over the heights along whose zero the sheet is cut. Chosen: half of it changes the
+distance by -0.3 %, twice by -1.5 %."""
 SHIFT = 0.9
-"""Share of a height by which that filter may change it: none changes its sign, or narrow strips would be cut."""
+"""Share of a height by which that filter may change it: none changes its sign, or narrow strips would be cut. Chosen:
+half of it changes the distance by +0.1 %, twice area -0.0 %."""
 SNAP = (0.3, 0.1, 0.02)
-"""Share of an edge over which a vertex moves to the cut; the first that lets no face pass through another."""
+"""Share of an edge over which a vertex moves to the cut; the first that lets no face pass through another. Chosen: half
+of it changes the distance by +5.3 %, twice by +3.4 %."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +72,7 @@ class OpenSheet:
 
     Attributes
     ----------
-    held : Held
+    held : LeakTest
         The shell and both its walls.
     cubes : int
         Cubes of the shell before it was closed.
@@ -73,8 +80,6 @@ class OpenSheet:
         Vertices of the wall that is kept.
     quads : (q, 4) int64 array
         Its squares.
-    cells : (q, 3) int64 array
-        The cube behind each square.
     smoothed : TriMesh
         The wall after the low-pass filter.
     mesh : TriMesh
@@ -88,11 +93,10 @@ class OpenSheet:
         Vertices that do not lie where the fit had them.
     """
 
-    held: Held
+    held: LeakTest
     cubes: int
     lattice: Floats
     quads: Integers
-    cells: Integers
     smoothed: TriMesh
     mesh: TriMesh
     filled: NDArray[np.bool_]
@@ -152,21 +156,20 @@ def open_sheet(
     filled = any_of(draped.filled[mesh.faces])[source]
     quads, smoothed = ring.quads.astype(np.int64), TriMesh(wall.smoothed, mesh.faces)
     return OpenSheet(
-        wall.held, wall.cubes, wall.lattice, quads, wall.cells, smoothed, sheet, filled, crossing,
+        wall.held, wall.cubes, wall.lattice, quads, smoothed, sheet, filled, crossing,
         draped, taken_back,
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _Wall:
-    """One wall of a shell: vertices (n, 3) on the lattice, smoothed, and where the fit starts; cubes of squares."""
+    """One wall of a shell: vertices (n, 3) on the lattice, smoothed, and where the fit starts."""
 
-    held: Held
+    held: LeakTest
     cubes: int
     lattice: Floats
     smoothed: Floats
     start: Floats
-    cells: Integers
     side: Side
 
 
@@ -178,15 +181,15 @@ def _wall(samples: Samples, spanned: Bridges, found: Borders, cell: Floats, sett
     cells = cells_of(dilate(np.unique(keys), 1))
     for closing in CLOSINGS:
         shell = close_shell(cells, closing, threads=settings.run.threads)
-        both = walls(shell)
+        both = exposed_faces(shell)
         ring = Ring(both.quads, len(both.corners), settings.run.threads)
         lattice = lowest + both.corners * cell
         smoothed = ring.smoothed(lattice, settings.cubes.smoothing)
         start = smoothed - edge * ring.normals(smoothed)
         side = one_side(start, ring, samples, apron, share >= TIP, edge, largest=settings.cubes.largest)
         if side is not None:
-            kept, held = side.vertices, Held(shell, both, both.least_two_sided)
-            return _Wall(held, len(cells), lattice[kept], smoothed[kept], start[kept], both.cells[side.quads], side)
+            kept, held = side.vertices, LeakTest(shell, both, both.least_two_sided)
+            return _Wall(held, len(cells), lattice[kept], smoothed[kept], start[kept], side)
     raise GeometryError(
         "the two sides of the surface do not come apart: it has one side only, as a Moebius strip, or its borders "
         "are lost in the noise",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..model.points import PointSet
 
 NEAREST = 3
-"""Points whose values are mixed at a vertex."""
+"""Points whose values are mixed at a vertex. The corners of a triangle of points."""
 
 MIXED = (*COLORS, "alpha")
 """Integers that may be mixed as if they were floats; all others are labels or counts."""

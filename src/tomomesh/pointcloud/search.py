@@ -10,13 +10,13 @@ import numpy as np
 from ..errors import ResourceError
 from ..kernels.measure.bvh import order_keys
 from ..kernels.pointcloud.samples import BITS
-from ..model.columns import box
+from ..model.columns import box, cells_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 EDGE = 8
-"""Cubes along a block."""
+"""Cubes along a block. 512 cubes a block: three coordinates of 18 bits and 9 bits in the block are the 63 of a key."""
 
 
 @dataclass(frozen=True)
@@ -44,15 +44,24 @@ class Index:
     frame: NDArray[np.float64]
 
     @classmethod
-    def of(cls, positions: NDArray[np.float64], edge: float) -> Index:
+    def of(cls, positions: NDArray[np.float64], edge: float, origin: NDArray[np.float64] | None = None) -> Index:
         """Sort points (p, 3) into cubes of an edge.
+
+        Parameters
+        ----------
+        positions : (p, 3) float array
+        edge : float
+        origin : (3,) float array, optional
+            Lowest corner of cell (0, 0, 0), not over any point; the lowest corner of their box where not given. Of a
+            part of a cloud, that of the whole: then the part's cubes, and their order, are the whole's.
 
         Raises
         ------
         ResourceError
             Where the points reach farther than cubes can be numbered.
         """
-        origin, highest = box(positions)
+        lowest, highest = box(positions)
+        origin = lowest if origin is None else origin
         widest = float((highest - origin).max())
         most = EDGE << BITS
         if widest / edge >= most:
@@ -62,7 +71,7 @@ class Index:
                 expected=f"at most {most * edge:g}",
                 hint="leaving far points out",
             )
-        x, y, z = ((positions - origin) / edge).astype(np.int64).T
+        x, y, z = cells_at(positions, origin, edge).T
         local = ((z % EDGE) * EDGE + y % EDGE) * EDGE + x % EDGE
         keys = ((((z // EDGE << BITS) | y // EDGE) << BITS) | x // EDGE) * EDGE**3 + local
         order = np.empty(len(keys), np.int32)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 FIT = FitSettings()
 """At the default stiffness the inner side is even; with less of it, its vertices swing about the distance asked for."""
-FLAT = 0.005
+SIMPLER = 0.005
 """Distance over the thickness of the wall by which the inner side may move where it is made coarser."""
 
 
@@ -91,4 +91,4 @@ def _inner_side(depth: Depth, deep: NDArray[np.bool_], wall: float, threads: int
 
 def _coarser(inner: TriMesh, wall: float) -> TriMesh:
     """Collapse edges of an inner side where that moves it by next to nothing."""
-    return mesh_of(solid_of(inner).simplify(FLAT * wall))
+    return mesh_of(solid_of(inner).simplify(SIMPLER * wall))

@@ -17,11 +17,12 @@ if TYPE_CHECKING:
     from ..model.mesh import TriMesh
 
 SIDES = 48
-"""Sides of a hole."""
+"""Sides of a hole. Its area is (2 pi / 48)^2 / 6 = 0.3 % under the circle's, its narrowest width 0.2 %."""
 WIDEST = 0.5
 """Most of the part's width that a hole may take: a wider one would take the shape away."""
 INSIDE = 1e-6
-"""Height over the size of the part from which the wall below a cavity is looked for."""
+"""Height over the size of the part from which the wall below a cavity is looked for. What 32-bit coordinates keep,
+6e-8, with room for one turn."""
 
 
 def drained(mesh: TriMesh, diameter: float, down: str) -> TriMesh:

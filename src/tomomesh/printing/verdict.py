@@ -19,11 +19,13 @@ if TYPE_CHECKING:
     from ..settings import PrintSettings
 
 STEEP = float(np.sqrt(0.5))
-"""Cosine of the angle to the way down over which a face hangs over: 45 degrees."""
+"""Cosine of the angle to the way down over which a face hangs over: 45 degrees. The usual limit of printers without
+supports."""
 NEAR = 10
 """Widest gap that is looked for, over the thinnest wall that the printer makes."""
 ON_PLATE = 1e-6
-"""Height over the size of the part up to which it lies on the plate."""
+"""Height over the size of the part up to which it lies on the plate. What 32-bit coordinates keep, 6e-8, with room for
+one turn."""
 
 
 def verdict(mesh: TriMesh, settings: PrintSettings, *, threads: int = 0, progress: Progress = silent) -> dict[str, Any]:

@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from ..model.volume import Volume
 
 NAMED = 24
-"""Labels that are named where one is missing, at most."""
+"""Labels that are named where one is missing, at most. So that an error stays a line."""
 MOST = 4096
 """Labels over which a label map is doubted."""
 HIGHEST_LABEL = 2**16
-"""A volume with higher levels is no label map."""
-FLAT = 0.8
+"""A volume with higher levels is no label map. Label maps have 8 or 16 bits."""
+EVEN = 0.8
 """Share of equal neighbors, among those that are both over 0, from which levels are labels."""
 
 
@@ -88,7 +88,7 @@ def labels_in(voxels: NDArray[Any]) -> dict[str, int]:
     left, right = voxels[..., :-1], voxels[..., 1:]
     inside = (left > 0) & (right > 0)
     pairs = int(np.count_nonzero(inside))
-    if np.count_nonzero((left == right) & inside) < FLAT * pairs:
+    if np.count_nonzero((left == right) & inside) < EVEN * pairs:
         return {}
     counts = np.bincount(voxels.ravel().astype(np.int64))
     return {str(label): int(counts[label]) for label in np.flatnonzero(counts) if label > 0}

@@ -10,7 +10,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 PILED, SPAN = 0.999, (0.01, 99.99)
-"""Share of the levels in one bin over which a histogram tells nothing, and the percentiles that it then spans."""
+"""Share of the levels in one bin over which a histogram tells nothing, and the percentiles that it then spans. In 256
+bins no two classes are then told apart: under one level in a thousand lies beyond the bin. The percentiles leave out
+one level in 10,000 on each side, ten times fewer."""
 
 
 def otsu_threshold(levels: NDArray[Any], *, bins: int = 256) -> float:

@@ -7,10 +7,11 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from ..measure.polygon import area, distance, inside, lattice_inside, side_lengths
 from ..model.points import BRIDGE, CAP, NEURON, RING, SIDE, TRACK, PointSet
-from .polygon import area, distance, inside, lattice_inside
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,7 +34,8 @@ class Sampling:
     ----------
     points : PointSet
     spacing_mm : float
-        r: the widest gap between neighbors in a network, and between slices.
+        r, the edge of the cubes: the widest gap between neighbors in a network and between slices, or from a neuron
+        to the one nearest to it.
     bridged : int
         Edges of the networks that were sampled along their line.
     ring_area_mm2 : (s,) float array
@@ -56,7 +58,9 @@ class Sampling:
         return float(np.trapezoid(self.ring_area_mm2, self.distance_mm))
 
 
-def sample(networks: Networks, volume: Volume, *, caps: bool = True, bridge: float = 2.0) -> Sampling:
+def sample(
+    networks: Networks, volume: Volume, *, caps: bool = True, bridge: float = 2.0, cell_from: str = "adjacent"
+) -> Sampling:
     """Place the neurons of all slices in space, sample bridged gaps, and close the ends of rings.
 
     Parameters
@@ -68,6 +72,9 @@ def sample(networks: Networks, volume: Volume, *, caps: bool = True, bridge: flo
         Whether to close the inside of rings that have nothing above or below.
     bridge : float
         Gaps between slices over this many medians do not widen r; 0 takes the widest.
+    cell_from : str
+        What r is: the widest distance of neurons that are ``"adjacent"`` along a network or from slice to slice, or
+        of a neuron to the ``"nearest"``.
 
     Returns
     -------
@@ -77,10 +84,12 @@ def sample(networks: Networks, volume: Volume, *, caps: bool = True, bridge: flo
     bridges, in_ring = _bridges(networks, volume)
     points = neurons.joined(bridges)
     is_ring = networks.lattice.name == "ring"
-    spacing = max(in_ring, _slice_step(networks, volume))
+    adjacent = max(in_ring, _slice_step(networks, volume))
+    spacing = adjacent if cell_from == "adjacent" else _to_nearest(points) or adjacent
     if is_ring and caps:
         points = points.joined(_caps(networks, volume, spacing))
-    spacing = max(spacing, _across(points, bridge))
+    if cell_from == "adjacent":
+        spacing = max(spacing, _across(points, bridge))
     pixel = volume.pixel_area_mm2
     areas = np.array([abs(area(ring)) for ring in networks.codebooks]) * pixel if is_ring else np.empty(0)
     return Sampling(
@@ -122,15 +131,13 @@ def sample_contours(contours: Contours, volume: Volume) -> Sampling:
     for one in contours.contours:
         sign = -1 if one.side % 2 else 1
         areas[np.searchsorted(contours.slices, one.slice)] += sign * abs(area(one.codebook))
-    lengths = np.concatenate([_sides(one.codebook * volume.spacing_mm[:2])[~one.bridged] for one in contours.contours])
+    lengths = np.concatenate(
+        [side_lengths(one.codebook * volume.spacing_mm[:2])[~one.bridged] for one in contours.contours]
+    )
     spacing = float(lengths.max(initial=0.0))
     bridged = sum(int(one.bridged.sum()) for one in contours.contours)
     distance = contours.slices * np.float64(volume.slice_distance_mm)
     return Sampling(points, spacing, bridged, areas * volume.pixel_area_mm2, distance)
-
-
-def _sides(ring: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.sqrt(((np.roll(ring, -1, axis=0) - ring) ** 2).sum(axis=1)))
 
 
 def _neurons(networks: Networks, volume: Volume) -> PointSet:
@@ -178,6 +185,14 @@ def _slice_step(networks: Networks, volume: Volume) -> float:
     return float(steps.max(initial=1) * volume.spacing_mm[2])
 
 
+def _to_nearest(points: PointSet) -> float:
+    """Return the widest distance of a point to the one nearest to it; 0 where each lies on another, or is alone."""
+    if len(points) < 2:
+        return 0.0
+    distance = np.asarray(cKDTree(points.positions).query(points.positions, k=[2])[0])
+    return float(distance.max())
+
+
 def _across(points: PointSet, limit: float) -> float:
     """Return the widest gap from a ring to the next slice, or to a cap on its own slice where there is no next.
 
@@ -205,7 +220,11 @@ def _to_slice(points: PointSet, own: NDArray[np.int64], other: NDArray[np.int64]
 
 
 def _caps(networks: Networks, volume: Volume, spacing: float) -> PointSet:
-    """Fill what lies inside a ring but not inside the next ring above, or below, at the given spacing."""
+    """Fill what lies inside a ring but not inside the next ring above, or below, at the given spacing.
+
+    A ring is trusted to half a spacing, and a lattice meets it at half a spacing on average: so no point is set that
+    is outside of the next ring by less than a half, or nearer to its own than a quarter.
+    """
     pixel = np.array(volume.spacing_mm[:2])
     rings = networks.codebooks * pixel
     found = []

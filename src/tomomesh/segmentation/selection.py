@@ -35,7 +35,7 @@ class Chosen:
         Components of the window, and those that were left out; 0 where all were to be kept.
     dropped_voxels : int
     spared_voxels : int
-        Voxels that lie in no body, and were kept for being most of the window.
+        Voxels that lie in no body, and were kept for all that: for being all of the window, or on a guess most of it.
     """
 
     volume: Volume
@@ -108,10 +108,8 @@ def _some(chosen: Chosen, kept: Components | None, *, guessed: bool) -> Chosen:
         return chosen
     voxels = int(np.count_nonzero(chosen.mask))
     dropped_voxels = voxels - int(np.count_nonzero(kept.mask))
-    if guessed and 2 * dropped_voxels > voxels:
+    if dropped_voxels == voxels or (guessed and 2 * dropped_voxels > voxels):
         return replace(chosen, found=kept.found, spared_voxels=dropped_voxels)
-    if dropped_voxels == voxels:
-        return replace(chosen, found=kept.found)
     return replace(
         chosen, mask=kept.mask, found=kept.found, dropped=kept.dropped, dropped_voxels=dropped_voxels
     )  # fmt: skip

@@ -20,7 +20,8 @@ heads 0.7 to 1.
 """
 
 NARROW = 0.06
-"""Width of the openings that the outside does not pass, over the square root of the window's area."""
+"""Width of the openings that the outside does not pass, over the square root of the window's area. Chosen: half of it
+changes the distance by +62.7 %, twice nothing."""
 
 
 def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:

@@ -172,7 +172,9 @@ def _edges(mask: NDArray[np.bool_]) -> list[np.bool_]:
 def _doubts(chosen: Chosen, settings: Settings) -> list[str]:
     """Say what about a window may not be as it was meant."""
     warnings = []
-    if chosen.spared_voxels:
+    if 0 < chosen.spared_voxels == int(chosen.mask.sum()):
+        warnings.append("nothing of the window lies in a body, 12 mm thick and denser than air: all of it was kept")
+    elif chosen.spared_voxels:
         warnings.append(
             f"most of the window ({chosen.spared_voxels} of {int(chosen.mask.sum())} voxels) lies in nothing that is "
             "12 mm thick, and was kept for all that: --keep body leaves it out"

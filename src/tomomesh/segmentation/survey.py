@@ -19,16 +19,17 @@ if TYPE_CHECKING:
     from ..model.volume import Volume
 
 BARS = 32
-"""Bars of the printed histogram."""
+"""Bars of the printed histogram. A line of the terminal."""
 LETTERS = (("R", "L"), ("A", "P"), ("I", "S"))
 """Ends of the patient axes, the negative first."""
 
 CUT_OFF = 0.01
-"""A window that takes more than this share of the study's first or last plane goes on beyond it."""
+"""A window that takes more than this share of the study's first or last plane goes on beyond it. Only a remark depends
+on it."""
 OBLONG = 0.01
-"""Part by which the sides of a pixel may differ without a remark."""
+"""Part by which the sides of a pixel may differ without a remark. Only a remark depends on it."""
 THICK = 5
-"""Pixels that slices may be apart without a remark."""
+"""Pixels that slices may be apart without a remark. Only a remark depends on it: steps are then seen in a mesh."""
 
 
 def survey(volume: Volume) -> dict[str, Any]:

@@ -18,6 +18,13 @@ class CubeSettings(Group):
         None, "edge of the cubes, one or one an axis (x y z), in a cloud's unit; by default what the points ask for",
         unit="mm", above=0, length=(1, 3),
     )  # fmt: skip
+    cell_from: str = param(
+        "adjacent",
+        "what r, the edge of the cubes, is: the widest distance of neurons that are neighbors along a network or from "
+        "slice to slice (adjacent), or of a neuron from the one nearest to it (nearest)",
+        choices=("adjacent", "nearest"),
+        paper="nearest",
+    )
     cell_factor: float = param(1.0, "dilation factor on the edge of the cubes, for coarser models", above=0)
     caps: bool = param(True, "close the inside of rings that have nothing above or below")
     closing: int | None = param(
@@ -28,6 +35,12 @@ class CubeSettings(Group):
         "auto",
         "take points on parallel slices as contours, and close what lies between their insides; none never does",
         choices=("auto", "none"),
+    )
+    tracking: str = param(
+        "scan",
+        "how the faces of the cubes are found, which are the same: by a scan, or followed from face to face (faces)",
+        choices=("scan", "faces"),
+        paper="faces",
     )
     largest: bool = param(False, "keep the largest surface alone, where cubes make it; elsewhere --keep largest does")
     allow_leaks: bool = param(

@@ -25,7 +25,7 @@ class FitSettings(Group):
         choices=("auto", "nearest", "surface"),
         paper="nearest",
     )
-    stiffness: float = param(0.25, "sum of the structural stiffness at a vertex over k_d", low=0)
+    stiffness: float = param(0.25, "sum of the structural stiffness at a vertex over k_d", low=0, paper=0.5)
     damping: float = param(1.0, "damping over critical damping", above=0)
     step: float = param(0.8, "time step, in units of 1/omega; at most the damping and its inverse", above=0, high=1)
     tolerance: float = param(1e-3, "speed and acceleration at which the mesh rests", unit="cube edges", above=0)

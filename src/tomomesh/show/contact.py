@@ -11,7 +11,7 @@ import numpy as np
 from ..measure.rings import assess_contours
 from ..model.networks import Networks
 from .marks import lines, small_print
-from .plane import Plane
+from .plane import PIXELS, Plane
 from .render import nice_length
 from .style import ACCENT, INK, MUTED, NETWORK, TRACKS, canvas, styled
 
@@ -32,7 +32,6 @@ EDGE = 0.03
 """Share of a slice's width between its border and the scale bar."""
 MOST_LINES = 3
 """Contours of a slice whose measures are written."""
-FLAT = Plane()
 PALE, PAPER = (217, 224, 230), (255, 255, 255)
 
 
@@ -47,7 +46,7 @@ class Net:
     words: str
 
 
-def draw_slices(mask: NDArray[np.bool_], found: Networks | Contours, plane: Plane = FLAT) -> Iterator[Figure]:
+def draw_slices(mask: NDArray[np.bool_], found: Networks | Contours, plane: Plane = PIXELS) -> Iterator[Figure]:
     """Draw all slices with their networks, page by page.
 
     Chains and rings are told by their perimeter, their area and their longest edge over the median one; other
@@ -205,6 +204,6 @@ def scale_bar(ax: Axes, bounds: Floats, plane: Plane, color: str = INK) -> None:
     (left, low), (right, high) = bounds
     length = nice_length(float(right - left))
     margin = EDGE * float(right - left)
-    foot = np.array([left + margin, low + margin if plane.upward else high - margin])
-    lines(ax, np.array([[foot, foot + np.array([length, 0.0])]]), color=color, width=1.6)
-    small_print(ax, f"{length:g} {plane.unit}".strip(), foot, (0, 6), color=color, align="left")
+    corner = np.array([left + margin, low + margin if plane.upward else high - margin])
+    lines(ax, np.array([[corner, corner + np.array([length, 0.0])]]), color=color, width=1.6)
+    small_print(ax, f"{length:g} {plane.unit}".strip(), corner, (0, 6), color=color, align="left")

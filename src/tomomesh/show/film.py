@@ -11,7 +11,7 @@ from PIL import Image
 
 from .camera import Camera
 from .marks import dots
-from .plane import Plane
+from .plane import PIXELS, Plane
 from .style import NETWORK, canvas, heading, styled
 from .topologies import flat, frame
 
@@ -35,7 +35,6 @@ SIDE = 4.0
 DPI = 100
 COLORS = 32
 FRONT = Camera()
-FLAT = Plane()
 PALE = (0.80, 0.84, 0.87)
 
 
@@ -87,7 +86,7 @@ def film_slice(
     mask: NDArray[np.bool_],
     codebooks: Floats | Sequence[Floats],
     network: Lattice,
-    plane: Plane = FLAT,
+    plane: Plane = PIXELS,
     *,
     notes: Sequence[str] | None = None,
     title: str = "A network over its slice",

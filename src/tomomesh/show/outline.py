@@ -9,7 +9,7 @@ import numpy as np
 from ..measure.section import section
 from .contact import COLUMNS, pages, scale_bar, write_beside
 from .marks import lines
-from .plane import Plane, contrast, gray
+from .plane import PIXELS, Plane, contrast, gray
 from .style import INK, MUTED, canvas, styled
 
 if TYPE_CHECKING:
@@ -25,10 +25,9 @@ if TYPE_CHECKING:
 OUTLINE = "#ff7a1a"
 INSIDE = 0.5
 """Slices by which a cut keeps from the ends of the mesh: in the plane of a cap there is no outline to see."""
-FLAT = Plane()
 
 
-def draw_outlines(images: NDArray[Any], mesh: TriMesh, plane: Plane = FLAT) -> Iterator[Figure]:
+def draw_outlines(images: NDArray[Any], mesh: TriMesh, plane: Plane = PIXELS) -> Iterator[Figure]:
     """Draw all slices that a mesh cuts with its outline, page by page, at one scale and one contrast.
 
     Parameters

@@ -79,6 +79,10 @@ class Plane:
         axes[0].set_ylabel(f"along a column ({self.unit})")
 
 
+PIXELS = Plane()
+"""A slice whose pixels are squares of 1 mm."""
+
+
 def gray(image: Pixels) -> Floats:
     """Return one level a pixel, the mean over the layers of a (J, I, L) image."""
     return np.asarray(image if image.ndim == 2 else image.mean(axis=2), np.float64)

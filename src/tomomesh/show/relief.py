@@ -8,7 +8,7 @@ import numpy as np
 
 from .camera import Camera, brightness, normals, painted
 from .marks import fill, lines, small_print
-from .plane import Plane, gray
+from .plane import PIXELS, Plane, gray
 from .style import MUTED, RELIEF, canvas, heading, styled
 
 if TYPE_CHECKING:
@@ -20,12 +20,11 @@ SIDE = 128
 """Most facets along a side; larger images are averaged down to it."""
 HEIGHT = 0.34
 """Height of the relief over the longer side of the slice."""
-FLAT = Plane()
 TABLE = Camera(azimuth=24.0, elevation=38.0)
 
 
 @styled
-def draw_relief(image: NDArray[Any], plane: Plane = FLAT, camera: Camera = TABLE) -> Figure:
+def draw_relief(image: NDArray[Any], plane: Plane = PIXELS, camera: Camera = TABLE) -> Figure:
     """Draw the gray levels of a slice as a landscape (Fig. 3)."""
     levels = gray(image)
     block = -(-max(levels.shape) // SIDE)

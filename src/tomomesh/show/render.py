@@ -66,8 +66,8 @@ def frame(ax: Axes, points: NDArray[np.float64], view: View) -> None:
     ax.set_aspect("equal")
     ax.set_xlim(low[0] - 0.04 * size, high[0] + 0.04 * size)
     ax.set_ylim(low[1] - 0.20 * size, high[1] + 0.04 * size)
-    foot = np.array([low[0], low[1] - 0.13 * size])
-    _scale_bar(ax, foot, size, view.unit)
+    corner = np.array([low[0], low[1] - 0.13 * size])
+    _scale_bar(ax, corner, size, view.unit)
     _directions(ax, np.array([high[0] - 0.09 * size, low[1] - 0.13 * size]), 0.085 * size, view)
 
 
@@ -77,10 +77,10 @@ def nice_length(size: float) -> float:
     return float(max(step * power for step in (1, 2, 5) if step * power <= size / 3 * (1 + 1e-9)))
 
 
-def _scale_bar(ax: Axes, foot: NDArray[np.float64], size: float, unit: str) -> None:
+def _scale_bar(ax: Axes, corner: NDArray[np.float64], size: float, unit: str) -> None:
     length = nice_length(size)
-    lines(ax, np.array([[foot, foot + np.array([length, 0.0])]]), color=INK, width=2)
-    small_print(ax, f"{length:g} {unit}".strip(), foot, (0, 9), align="left")
+    lines(ax, np.array([[corner, corner + np.array([length, 0.0])]]), color=INK, width=2)
+    small_print(ax, f"{length:g} {unit}".strip(), corner, (0, 9), align="left")
 
 
 def _directions(ax: Axes, origin: NDArray[np.float64], length: float, view: View) -> None:

@@ -10,7 +10,7 @@ from matplotlib.colors import hsv_to_rgb
 from matplotlib.patches import ConnectionPatch
 
 from .marks import arrow, dots, lines
-from .plane import Plane, contrast, gray, panels
+from .plane import PIXELS, Plane, contrast, gray, panels
 from .style import ACCENT, NETWORK, heading, styled
 
 if TYPE_CHECKING:
@@ -21,13 +21,12 @@ if TYPE_CHECKING:
     Pixels = NDArray[Any]
     Floats = NDArray[np.float64]
 
-FLAT = Plane()
 ON_DARK = "#ff9a4d"
 PALE = (0.76, 0.80, 0.83)
 
 
 @styled
-def draw_window(image: Pixels, mask: Pixels, plane: Plane = FLAT, *, note: str = "") -> Figure:
+def draw_window(image: Pixels, mask: Pixels, plane: Plane = PIXELS, *, note: str = "") -> Figure:
     """Draw a slice and what the window keeps of it (Fig. 4)."""
     levels = gray(image)
     figure, axes = panels(8.6, 2, plane.place(np.array(levels.shape[::-1])), 0.45)
@@ -56,7 +55,7 @@ class Joined(Protocol):
 
 @styled
 def draw_regions(
-    image: Pixels, mask: Pixels, codebook: Floats, network: Joined, labels: Pixels, plane: Plane = FLAT
+    image: Pixels, mask: Pixels, codebook: Floats, network: Joined, labels: Pixels, plane: Plane = PIXELS
 ) -> Figure:
     """Draw the way of a slice: image, window, network, regions (Fig. 5).
 
@@ -112,7 +111,7 @@ def _colored(labels: Pixels, neurons: int) -> Floats:
 
 @styled
 def draw_contour(
-    mask: Pixels, codebook: Floats, network: Joined, plane: Plane = FLAT, *, bridged: NDArray[np.bool_]
+    mask: Pixels, codebook: Floats, network: Joined, plane: Plane = PIXELS, *, bridged: NDArray[np.bool_]
 ) -> Figure:
     """Draw the network over the window, and alone with its bridged gaps (Fig. 6).
 

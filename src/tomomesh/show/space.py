@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from ..model.points import PointSet
 
 MOST_POINTS = 60_000
-KINDS = {NEURON: ("neurons", "o", NETWORK), BRIDGE: ("bridges", "D", ACCENT), CAP: ("caps", "s", INK)}
+KINDS = {NEURON: ("o", NETWORK), BRIDGE: ("D", ACCENT), CAP: ("s", INK)}
+OF_NETWORKS, OF_VOXELS = ("neurons", "bridges", "caps"), ("crossings", "beside added voxels", "on the border")
+"""What points of each kind are called, where there are networks and where there are none."""
 FRONT = View()
 
 
@@ -32,7 +34,8 @@ def draw_points(points: PointSet, view: View = FRONT) -> Figure:
     figure, (ax,) = canvas(6.4, 6.2)
     every = -(-len(points) // MOST_POINTS)
     positions, kinds = points.positions[::every], points.kinds[::every]
-    bar = figure.colorbar(_scatter(ax, positions, kinds, view), ax=ax, shrink=0.45, aspect=22, pad=0.01)
+    names = OF_NETWORKS if (points.neurons >= 0).any() else OF_VOXELS
+    bar = figure.colorbar(_scatter(ax, positions, kinds, names, view), ax=ax, shrink=0.45, aspect=22, pad=0.01)
     bar.outline.set_visible(False)
     bar.set_label(f"height z ({view.unit})")
     if (kinds != NEURON).any():
@@ -47,14 +50,16 @@ def _slices(points: PointSet) -> int:
     return len(np.unique(points.slices[points.slices >= 0]))
 
 
-def _scatter(ax: Axes, positions: NDArray[np.float64], kinds: NDArray[np.uint8], view: View) -> ScalarMappable:
+def _scatter(
+    ax: Axes, positions: NDArray[np.float64], kinds: NDArray[np.uint8], names: tuple[str, ...], view: View
+) -> ScalarMappable:
     """Draw the points from far to near, and return the scale of their heights."""
     seen = view.camera.project(positions)
     order = np.argsort(seen[:, 2], kind="stable")
     nearness = (seen[:, 2] - seen[:, 2].min()) / (np.ptp(seen[:, 2]) or 1.0)
     scale = ScalarMappable(Normalize(positions[:, 2].min(), positions[:, 2].max()), HEIGHT)
     size = 26 * min(1.0, (3000 / len(seen)) ** 0.5)
-    for kind, (name, marker, color) in KINDS.items():
+    for name, (kind, (marker, color)) in zip(names, KINDS.items(), strict=True):
         chosen = order[kinds[order] == kind]
         if not len(chosen):
             continue

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..cuberille.leak_test import SURE, hold
+from ..cuberille.leak_test import SURE, close_leaks
 from ..cuberille.neighbors import once_each
 from ..cuberille.partition import cubes_over, is_flat
 from ..dynamics.moving_least_squares import Draped, Ring, drape
@@ -16,13 +16,13 @@ from ..dynamics.untangle import untangle
 from ..errors import GeometryError
 from ..measure.intersections import Crossings
 from ..model.columns import any_of
-from ..model.cubes import cells_of, keys_of
+from ..model.cubes import cells_of
 from ..model.mesh import QuadMesh, TriMesh
 from ..opensurface.gaps import gaps
 from ..pointcloud.bridges import bridges
 from ..pointcloud.forecast import require_room
 from ..results import Surface
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured, timed
 from .points import place_found
 from .samples import cell_edges, lowest_corner, settle
 from .sections import FLAT_SHELL, LEAKY_SHELL, body_of_cubes, fit_found, shell_found, walls_found
@@ -31,8 +31,8 @@ from .way import CUBES, POINTS, Way, on_input, parameters
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..cuberille.faces import Walls
-    from ..cuberille.leak_test import Held
+    from ..cuberille.faces import Faces
+    from ..cuberille.leak_test import LeakTest
     from ..pointcloud.bridges import Bridges
     from ..pointcloud.samples import Samples
     from ..progress import Progress
@@ -57,18 +57,18 @@ class Shell:
     lowest: Floats
     cubes: int
     spanned: Bridges
-    held: Held
+    held: LeakTest
 
     def taken(self, settings: Settings) -> NDArray[np.bool_]:
         """Tell of each surface whether it is kept."""
-        return self.held.walls.worth_keeping(largest=settings.cubes.largest)
+        return self.held.faces.worth_keeping(largest=settings.cubes.largest)
 
 
 @dataclass(frozen=True)
 class Rough:
-    """The walls that are kept, their corners (n, 3) on the lattice, and where these lie after the low-pass filter."""
+    """The faces that are kept, their corners (n, 3) on the lattice, and where these lie after the low-pass filter."""
 
-    walls: Walls
+    faces: Faces
     lattice: Floats
     ring: Ring
     mesh: TriMesh
@@ -83,34 +83,28 @@ class Rest:
     draped: Draped | None
 
 
-@dataclass(frozen=True)
-class Untangled:
-    """A mesh, its faces (m,) that pass through others, and how many vertices do not lie where the fit had them."""
-
-    mesh: TriMesh
-    crossing: NDArray[np.bool_]
-    taken_back: int
-
-
 def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
     """Turn a cloud into a closed surface."""
     settled = settle(points, settings, progress)
     samples, origin = settled.value, lowest_corner(points)
     shell = _hold(points, samples, settings, progress)
     walls = _walls(shell.value, samples, origin, settings)
-    rough = _smooth(shell.value, settings)
-    rest = _drape(shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
-    apart = _untangle(rest.value.mesh, rough.value, settings)
-    found, kept, smoothed = apart.value, rough.value.walls, rough.value.mesh
-    cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64), keys_of(kept.cells))
+    rough = measured("smooth", _smoothed, shell.value, settings)
+    kept, smoothed, ring = rough.value.faces, rough.value.mesh, rough.value.ring
+    rest = measured("fit", _fitted, shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
+    apart = measured(
+        "untangle", untangle, rest.value.mesh, smoothed.vertices, ring, Crossings(settings.run.threads)
+    )  # fmt: skip
+    mesh, taken_back, crossing = apart.value
+    cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64))
     trace = None if rest.value.draped is None else rest.value.draped.trace
     surface = Surface(
         points.cloud, cuberille, smoothed.moved(smoothed.vertices + origin),
-        found.mesh.moved(found.mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=rest.value.filled,
-        cavities=int(kept.inward.sum()), crossing=found.crossing,
+        mesh.moved(mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=rest.value.filled,
+        cavities=int(kept.inward.sum()), crossing=crossing,
         encloses_mm3=_hollow(shell.value, settings) if walls.value == 1 else 0.0,
     )  # fmt: skip
-    fitted = fit_found(trace, len(smoothed.vertices), taken_back=found.taken_back, filled=rest.value.filled)
+    fitted = fit_found(trace, len(smoothed.vertices), taken_back=taken_back, filled=rest.value.filled)
     return folded(surface, settled, shell, walls, rough, rest, apart, fitted, place_found(points))
 
 
@@ -133,7 +127,7 @@ def _holding(count: int, samples: Samples, settings: Settings, progress: Progres
         lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
         cells = cells_of(once_each(keys))
         steps = [k for k in tried if cubes.closing is not None or k * cell.min() <= reach]
-        held = hold(
+        held = close_leaks(
             cells, steps, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
         )  # fmt: skip
         if best is None or held.two_sided >= SURE or held.is_better_than(best.held):
@@ -146,7 +140,7 @@ def _holding(count: int, samples: Samples, settings: Settings, progress: Progres
 
 def _hollow(shell: Shell, settings: Settings) -> float:
     """Return the volume inside a shell without that of its cubes, which may be two walls with nothing between them."""
-    enclosed = int(shell.held.walls.volumes[shell.taken(settings)].sum())
+    enclosed = int(shell.held.faces.volumes[shell.taken(settings)].sum())
     return float(max(0, enclosed - shell.cubes) * shell.cell.prod())
 
 
@@ -155,7 +149,7 @@ def _walls(shell: Shell, samples: Samples, origin: Floats, settings: Settings) -
 
     One of two is not fitted: both walls would rest on the same samples, and the mesh would fall flat.
     """
-    if shell.held.holds:
+    if shell.held.tight:
         return walls_found(1)
     if is_flat(samples.positions, float(np.median(samples.spacing))):
         return walls_found(2, FLAT_SHELL)
@@ -177,13 +171,12 @@ def _place(place: Floats) -> str:
     return "(" + ", ".join(f"{c:.6g}" for c in place) + ")"
 
 
-@timed("smooth")
-def _smooth(shell: Shell, settings: Settings) -> Stage[Rough]:
-    walls = shell.held.walls.only(shell.taken(settings))
-    ring = Ring(walls.quads, len(walls.corners), settings.run.threads)
-    lattice = shell.lowest + walls.corners * shell.cell
+def _smoothed(shell: Shell, settings: Settings) -> Rough:
+    faces = shell.held.faces.only(shell.taken(settings))
+    ring = Ring(faces.quads, len(faces.corners), settings.run.threads)
+    lattice = shell.lowest + faces.corners * shell.cell
     vertices = ring.smoothed(lattice, settings.cubes.smoothing)
-    return Stage(Rough(walls, lattice, ring, TriMesh(vertices, _halves(walls.quads))))
+    return Rough(faces, lattice, ring, TriMesh(vertices, _halves(faces.quads)))
 
 
 def _halves(quads: NDArray[np.int32]) -> NDArray[np.int64]:
@@ -191,22 +184,15 @@ def _halves(quads: NDArray[np.int32]) -> NDArray[np.int64]:
     return quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int64)
 
 
-@timed("fit")
-def _drape(
+def _fitted(
     shell: Shell, rough: Rough, samples: Samples, settings: Settings, progress: Progress, *, still: bool
-) -> Stage[Rest]:
+) -> Rest:
     """Draw the mesh to the surface under its samples, unless it is to stay as it is."""
     if still:
-        return Stage(Rest(rough.mesh, np.zeros(len(rough.mesh.faces), np.bool_), None))
+        return Rest(rough.mesh, np.zeros(len(rough.mesh.faces), np.bool_), None)
     edge, threads = float(shell.cell.min()), settings.run.threads
     draped = drape(rough.mesh.vertices, rough.ring, samples, edge, settings.fit, threads=threads, progress=progress)
-    return Stage(Rest(TriMesh(draped.vertices, draped.faces), any_of(draped.filled[draped.faces]), draped))
-
-
-@timed("untangle")
-def _untangle(mesh: TriMesh, rough: Rough, settings: Settings) -> Stage[Untangled]:
-    apart, taken_back, crossing = untangle(mesh, rough.mesh.vertices, rough.ring, Crossings(settings.run.threads))
-    return Stage(Untangled(apart, crossing, taken_back))
+    return Rest(TriMesh(draped.vertices, draped.faces), any_of(draped.filled[draped.faces]), draped)
 
 
 WAY = Way(

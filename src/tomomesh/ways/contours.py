@@ -13,14 +13,12 @@ from ..results import Segmentation
 from ..segmentation.contours.train import train_contours
 from ..segmentation.sample import Sampling, sample_contours
 from ..segmentation.training import regions
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured, timed
 from .sections import missed, points_found
 from .stack import body_of_stack, surface_of_slices
 from .way import POINTS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from ..contours.slices import Slices
     from ..model.contours import Contours
     from ..model.points import PointSet
@@ -32,13 +30,16 @@ if TYPE_CHECKING:
 
 def segment_by_contours(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Contours]]:
     """Train a ring on every contour of each slice, and place their neurons in space."""
-    trained = _train(kept, settings, progress)
-    labels = _label(kept, trained.value, settings)
+    study, mask, run = kept.study, kept.mask, settings.run
+    pixel_mm = study.spacing_mm[:2]
+    trained = measured(
+        "networks", train_contours, mask, settings.network, pixel_mm=pixel_mm, seed=run.seed, threads=run.threads,
+        progress=progress,
+    )  # fmt: skip
+    labels = measured("regions", regions, mask, trained.value, pixel_mm=pixel_mm, threads=run.threads)
     placed = _place(kept, trained.value)
     sampling = placed.value
-    found = Segmentation(
-        kept.study, kept.plane, kept.mask, labels.value, sampling.points, sampling, trained.value
-    )  # fmt: skip
+    found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value)
     return folded(found, trained, labels, _contours_found(trained.value, kept, settings), placed)
 
 
@@ -64,25 +65,6 @@ def slices_of_rings(points: PointSet) -> Slices:
         found = f"{len(np.unique(points.slices))} slice"
         raise EmptyError("contours on one slice enclose no volume", found=found, expected="at least two slices")
     return slices
-
-
-@timed("networks")
-def _train(kept: Selected, settings: Settings, progress: Progress) -> Stage[Contours]:
-    run = settings.run
-    found = train_contours(
-        kept.mask,
-        settings.network,
-        pixel_mm=kept.study.spacing_mm[:2],
-        seed=run.seed,
-        threads=run.threads,
-        progress=progress,
-    )
-    return Stage(found)
-
-
-@timed("regions")
-def _label(kept: Selected, contours: Contours, settings: Settings) -> Stage[NDArray[np.uint16]]:
-    return Stage(regions(kept.mask, contours, pixel_mm=kept.study.spacing_mm[:2], threads=settings.run.threads))
 
 
 @timed("points")

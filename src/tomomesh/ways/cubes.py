@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..cuberille.leak_test import CLOSINGS, hold
+from ..cuberille.leak_test import CLOSINGS, close_leaks
 from ..cuberille.partition import is_flat, partition
 from ..dynamics.collapse import without_collapse
 from ..dynamics.low_pass import low_pass
@@ -17,13 +17,13 @@ from ..dynamics.untangle import untangle
 from ..errors import GeometryError
 from ..measure.intersections import Crossings
 from ..results import LEAST, Surface
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured, timed
 from .sections import FLAT_SHELL, LEAKY_SHELL, fit_found, shell_found, walls_found
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..cuberille.leak_test import Held
+    from ..cuberille.leak_test import LeakTest
     from ..model.cubes import CubeGrid
     from ..model.mesh import QuadMesh, TriMesh
     from ..model.points import PointSet
@@ -31,20 +31,21 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
     Floats = NDArray[np.float64]
+    Tracked = tuple[CubeGrid, QuadMesh, NDArray[np.int64]]
 
 
 @dataclass(frozen=True)
 class Shell:
-    """Cubes that hold the points, and the walls around them; `taken` tells of each surface whether it is kept."""
+    """Cubes that hold the points, and the faces around them; `taken` tells of each surface whether it is kept."""
 
     grid: CubeGrid
-    held: Held
+    held: LeakTest
     taken: NDArray[np.bool_]
 
     @property
     def volume(self) -> float:
         """Volume inside the surfaces that are kept."""
-        return float(self.held.walls.volumes[self.taken].sum() * self.grid.cell_mm.prod())
+        return float(self.held.faces.volumes[self.taken].sum() * self.grid.cell_mm.prod())
 
     @property
     def hollow(self) -> float:
@@ -82,19 +83,19 @@ def surface_on_cubes(
         Where the outside leaks in.
     """
     shell = _close(points.positions, spacing, settings, progress)
-    tracked = _track(shell.value)
+    tracked = measured("cuberille", _track, shell.value)
     walls = _walls(shell.value, points.positions, settings, encloses)
-    smoothed = _smooth(tracked.value[1], settings)
+    cubes, cuberille, _ = tracked.value
+    smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.smoothing)
     still = settings.replace(max_steps=0)
     rest = _fit(tracked.value, smoothed.value, points.positions, settings if walls.value == 1 else still, progress)
     told = encloses or shell.value.hollow
     if settings.cubes.allow_leaks and walls.value == 1 and rest.value.mesh.face_volumes.sum() < LEAST * told:
         walls = walls_found(2, LEAKY_SHELL)
         rest = _fit(tracked.value, smoothed.value, points.positions, still, progress)
-    cubes, cuberille = tracked.value
     made = Surface(
         points, cuberille, smoothed.value, rest.value.mesh, rest.value.fit.nearest, cubes, rest.value.fit.trace,
-        cavities=int((shell.value.held.walls.inward & shell.value.taken).sum()), crossing=rest.value.crossing,
+        cavities=int((shell.value.held.faces.inward & shell.value.taken).sum()), crossing=rest.value.crossing,
         encloses_mm3=told if walls.value == 1 else 0.0,
     )  # fmt: skip
     return folded(made, shell, tracked, walls, smoothed, rest)
@@ -105,8 +106,11 @@ def _close(positions: Floats, spacing: float, settings: Settings, progress: Prog
     asked, threads = settings.cubes, settings.run.threads
     grid = partition(positions, _cell(spacing, settings))
     closings = CLOSINGS if asked.closing is None else (asked.closing,)
-    held = hold(grid.cells, closings, cavities=asked.surface == "all", threads=threads, progress=progress)
-    taken = held.walls.worth_keeping(largest=asked.largest)
+    held = close_leaks(
+        grid.cells, closings, cavities=asked.surface == "all", tracking=asked.tracking, threads=threads,
+        progress=progress,
+    )  # fmt: skip
+    taken = held.faces.worth_keeping(largest=asked.largest)
     return folded(Shell(grid, held, taken), shell_found(held, taken, grid.cell_mm, len(grid.keys)))
 
 
@@ -116,9 +120,8 @@ def _cell(spacing: float, settings: Settings) -> Floats:
     return np.broadcast_to(np.array(asked, np.float64) * settings.cubes.cell_factor, 3).copy()
 
 
-@timed("cuberille")
-def _track(shell: Shell) -> Stage[tuple[CubeGrid, QuadMesh]]:
-    return Stage(shell.held.walls.only(shell.taken).over(shell.grid))
+def _track(shell: Shell) -> Tracked:
+    return shell.held.faces.only(shell.taken).over(shell.grid)
 
 
 def _walls(shell: Shell, positions: Floats, settings: Settings, encloses: float) -> Stage[int]:
@@ -127,7 +130,7 @@ def _walls(shell: Shell, positions: Floats, settings: Settings, encloses: float)
     One of two is not fitted: both walls would rest on the same points, and the mesh would fall flat.
     """
     cell = float(shell.grid.cell_mm.min())
-    if shell.volume >= LEAST * encloses if encloses else shell.held.holds:
+    if shell.volume >= LEAST * encloses if encloses else shell.held.tight:
         return walls_found(1)
     if is_flat(positions, cell):
         return walls_found(2, FLAT_SHELL)
@@ -141,20 +144,17 @@ def _walls(shell: Shell, positions: Floats, settings: Settings, encloses: float)
     )
 
 
-@timed("smooth")
-def _smooth(cuberille: QuadMesh, settings: Settings) -> Stage[TriMesh]:
+def _smoothed(cuberille: QuadMesh, passes: int) -> TriMesh:
     rough = cuberille.triangulated()
-    return Stage(rough.moved(low_pass(cuberille.vertices, cuberille.edges, settings.cubes.smoothing)))
+    return rough.moved(low_pass(cuberille.vertices, cuberille.edges, passes))
 
 
 @timed("fit")
-def _fit(
-    tracked: tuple[CubeGrid, QuadMesh], smoothed: TriMesh, positions: Floats, settings: Settings, progress: Progress
-) -> Stage[Rest]:
-    (cubes, cuberille), threads = tracked, settings.run.threads
+def _fit(tracked: Tracked, smoothed: TriMesh, positions: Floats, settings: Settings, progress: Progress) -> Stage[Rest]:
+    (cubes, cuberille, origins), threads = tracked, settings.run.threads
     springs = cuberille.edges if settings.fit.springs == "quads" else smoothed.edges
     rest = fit(
-        smoothed.vertices, springs, cuberille.vertex_cubes, positions, cubes, settings.fit,
+        smoothed.vertices, springs, origins, positions, cubes, settings.fit,
         threads=threads, progress=progress,
     )  # fmt: skip
     mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..cuberille.partition import sampling_distance
 from ..pointcloud.samples import distinct
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured
 from .cubes import surface_on_cubes
 from .points import place_found
 from .sections import body_of_cubes, points_found
@@ -21,21 +21,16 @@ if TYPE_CHECKING:
 
 def surface_near_points(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
     """Turn a cloud into a closed surface, each of whose vertices is drawn to the point nearest to it."""
-    spaced = _space(points, settings)
+    spaced = measured("points", sampling_distance, distinct(points.cloud.positions))
+    told = points_found(points.cloud, spaced.value, unit=settings.run.units)
     made = surface_on_cubes(points.cloud, spaced.value, settings, progress)
-    return folded(made.value, spaced, made, place_found(points))
-
-
-@timed("points")
-def _space(points: Points, settings: Settings) -> Stage[float]:
-    spacing = sampling_distance(distinct(points.cloud.positions))
-    return folded(spacing, points_found(points.cloud, spacing, unit=settings.run.units))
+    return folded(made.value, spaced, told, made, place_found(points))
 
 
 WAY = Way(
     applies=lambda settings, input: input in POINTS and settings.fit.attraction == "nearest",
     because=lambda settings, input: "on a cloud with --attraction nearest",
-    reads=CUBES | SPRINGS | parameters("attraction"),
+    reads=CUBES | SPRINGS | parameters("attraction", "tracking"),
     surface=surface_near_points,
     of_body=body_of_cubes,
 )

@@ -11,7 +11,7 @@ from ..segmentation.sample import Sampling, sample
 from ..segmentation.training import regions, train_study
 from ..segmentation.window import by_layer
 from ..som.schedules import schedule_warning
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured, timed
 from .cubes import surface_on_cubes
 from .sections import body_of_cubes, missed, points_found
 from .way import CUBES, POINTS, SPRINGS, TRAINING, Way, parameters
@@ -34,13 +34,15 @@ HOLES = 0.15
 
 def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Networks]]:
     """Train a network on every slice, and place its neurons in space."""
-    trained = _train(kept, settings, progress)
-    labels = _label(kept, trained.value, settings)
+    study, mask, run = kept.study, kept.mask, settings.run
+    trained = measured(
+        "networks", train_study, mask, settings.network, layers=_layers(kept, settings),
+        pixel_mm=study.spacing_mm[:2], seed=run.seed, threads=run.threads, progress=progress,
+    )  # fmt: skip
+    labels = measured("regions", regions, mask, trained.value, pixel_mm=study.spacing_mm[:2], threads=run.threads)
     placed = _place(kept, trained.value, settings)
     sampling = placed.value
-    found = Segmentation(
-        kept.study, kept.plane, kept.mask, labels.value, sampling.points, sampling, trained.value
-    )  # fmt: skip
+    found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value)
     return folded(found, trained, labels, _networks_found(trained.value, kept, settings), placed)
 
 
@@ -52,21 +54,6 @@ def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress
     )  # fmt: skip
 
 
-@timed("networks")
-def _train(kept: Selected, settings: Settings, progress: Progress) -> Stage[Networks]:
-    run = settings.run
-    found = train_study(
-        kept.mask,
-        settings.network,
-        layers=_layers(kept, settings),
-        pixel_mm=kept.study.spacing_mm[:2],
-        seed=run.seed,
-        threads=run.threads,
-        progress=progress,
-    )
-    return Stage(found)
-
-
 def _layers(kept: Selected, settings: Settings) -> NDArray[np.bool_] | None:
     """Return the window of each layer (K, J, I, L), where networks are shown layers."""
     chosen = kept.chosen
@@ -75,14 +62,12 @@ def _layers(kept: Selected, settings: Settings) -> NDArray[np.bool_] | None:
     return by_layer(chosen.volume, lower=chosen.lower, upper=chosen.upper) & chosen.mask[..., None]
 
 
-@timed("regions")
-def _label(kept: Selected, networks: Networks, settings: Settings) -> Stage[NDArray[np.uint16]]:
-    return Stage(regions(kept.mask, networks, pixel_mm=kept.study.spacing_mm[:2], threads=settings.run.threads))
-
-
 @timed("points")
 def _place(kept: Selected, networks: Networks, settings: Settings) -> Stage[Sampling]:
-    sampling = sample(networks, kept.study, caps=settings.cubes.caps, bridge=settings.network.bridge)
+    cubes = settings.cubes
+    sampling = sample(
+        networks, kept.study, caps=cubes.caps, bridge=settings.network.bridge, cell_from=cubes.cell_from
+    )  # fmt: skip
     return folded(sampling, points_found(sampling.points, sampling.spacing_mm, bridged=sampling.bridged))
 
 
@@ -136,7 +121,7 @@ def _pictures(found: Segmentation[Networks]) -> dict[str, Any]:
 WAY = Way(
     applies=lambda settings, input: input not in POINTS,
     because=lambda settings, input: "on networks of slices",
-    reads=TRAINING | CUBES | SPRINGS | parameters("bridge", "even", "caps"),
+    reads=TRAINING | CUBES | SPRINGS | parameters("bridge", "even", "caps", "cell_from", "tracking"),
     segment=segment_by_rings,
     surface=surface_by_rings,
     of_networks=_of_networks,

@@ -12,7 +12,7 @@ from ..stage import Stage
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..cuberille.leak_test import Held
+    from ..cuberille.leak_test import LeakTest
     from ..isosurface.voxels import Boundary, VoxelSurface
     from ..model.points import PointSet
     from ..model.trace import Trace
@@ -55,10 +55,10 @@ def missed(slices: NDArray[np.int32], mask: NDArray[np.bool_]) -> tuple[list[int
 
 
 def shell_found(
-    held: Held, taken: NDArray[np.bool_], cell: NDArray[np.float64], cubes: int, bridged: int = 0
+    held: LeakTest, taken: NDArray[np.bool_], cell: NDArray[np.float64], cubes: int, bridged: int = 0
 ) -> Stage[None]:
-    """Tell of the cubes, the closing that made them hold, and which surfaces were taken."""
-    shell, walls = held.shell, held.walls
+    """Tell of the cubes, the closing that made them tight, and which surfaces were taken."""
+    shell, faces = held.shell, held.faces
     stats: dict[str, dict[str, Any]] = {
         "cubes": {
             "cell_mm": cell.tolist(),
@@ -67,19 +67,19 @@ def shell_found(
             "closing": shell.closing,
             "added_for_composition": shell.added,
             "two_sided": held.two_sided,
-            "holds": held.holds,
+            "holds": held.tight,
         },
         "surface": {
-            "found": walls.count,
-            "cavities": int((walls.inward & taken).sum()),
+            "found": faces.count,
+            "cavities": int((faces.inward & taken).sum()),
             "taken": int(taken.sum()),
-            "debris": int(walls.debris.sum()),
-            "square_faces": int(walls.sizes[taken].sum()),
-            "enclosed_cubes": int(walls.volumes[taken].sum()),
+            "debris": int(faces.debris.sum()),
+            "square_faces": int(faces.sizes[taken].sum()),
+            "enclosed_cubes": int(faces.volumes[taken].sum()),
         },
     }
     made_up = f"gaps up to {2 * shell.closing} cubes wide were closed: the surface is made up there"
-    return Stage(None, stats, (made_up,) if held.holds and shell.closing > WIDE else ())
+    return Stage(None, stats, (made_up,) if held.tight and shell.closing > WIDE else ())
 
 
 def walls_found(count: int, *warnings: str) -> Stage[int]:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..measure.intersections import Crossings
-from ..model.cubes import keys_of
 from ..model.mesh import QuadMesh
 from ..opensurface.sheet import OpenSheet, open_sheet
 from ..pointcloud.bridges import bridges
@@ -31,10 +30,10 @@ def surface_of_sheet(points: Points, settings: Settings, progress: Progress) -> 
     laid = _lay(settled.value, settings, progress)
     made, origin = laid.value, lowest_corner(points)
     surface = Surface(
-        points.cloud, QuadMesh(made.lattice + origin, made.quads, keys_of(made.cells)),
+        points.cloud, QuadMesh(made.lattice + origin, made.quads),
         made.smoothed.moved(made.smoothed.vertices + origin), made.mesh.moved(made.mesh.vertices + origin),
         np.empty(0, np.int32), trace=made.draped.trace, filled=made.filled, borders=True, crossing=made.crossing,
-        cavities=int(made.held.walls.inward.sum()),
+        cavities=int(made.held.faces.inward.sum()),
     )  # fmt: skip
     fitted = fit_found(
         made.draped.trace, len(made.draped.vertices), taken_back=made.taken_back, filled=made.filled
@@ -47,7 +46,7 @@ def _lay(samples: Samples, settings: Settings, progress: Progress) -> Stage[Open
     cell, threads = cell_edges(samples, settings)[0], settings.run.threads
     spanned = bridges(samples, float(cell.min()), threads=threads, progress=progress)
     made = open_sheet(samples, spanned, cell, settings, Crossings(threads), progress)
-    every = np.ones(made.held.walls.count, bool)
+    every = np.ones(made.held.faces.count, bool)
     return folded(made, shell_found(made.held, every, cell, made.cubes, len(spanned.places)), walls_found(1))
 
 

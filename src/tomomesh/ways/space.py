@@ -25,7 +25,7 @@ from ..results import Segmentation, Surface, window_volume
 from ..segmentation.sample import Sampling
 from ..segmentation.space import is_wall, pieces_of, regions_in_space, train_space
 from ..settings import SURFACES
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured, timed
 from .sections import fit_found, points_found
 from .way import POINTS, TRAINING, Way, parameters
 
@@ -63,14 +63,6 @@ class SpaceFound:
 
 
 @dataclass(frozen=True)
-class Pieces:
-    """The voxels (K, J, I) that a network is to stand for, and in how many pieces they are."""
-
-    mask: NDArray[np.bool_]
-    count: int
-
-
-@dataclass(frozen=True)
 class Shown:
     """What a network is shown: voxels (n, 3) in patient millimeters, or the boundary around them."""
 
@@ -97,58 +89,41 @@ def require_surface(settings: Settings) -> None:
 
 def segment_in_space(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[SpaceFound]]:
     """Train one network on the whole window."""
-    pieces = _join(kept)
-    shown = _show(kept, pieces.value.mask, settings)
-    trained = _train(shown.value, settings, progress)
-    labels = _label(pieces.value.mask, shown.value, trained.value, settings)
+    run = settings.run
+    pieces = measured("window", pieces_of, kept.mask)
+    mask, count = pieces.value
+    shown = measured("points", _shown, kept, mask, settings)
+    voxels, places, outlined = shown.value.voxels, shown.value.places, shown.value.outlined
+    progress("networks", 0, 1)
+    trained = measured("networks", train_space, places, settings.network, outlined=outlined, seed=run.seed)
+    progress("networks", 1, 1)
+    labels = measured("regions", regions_in_space, mask, voxels, trained.value, run.threads)
     network, sampling = trained.value, _sampled(trained.value)
-    source = SpaceFound(network, shown.value.places)
+    source = SpaceFound(network, places)
     found = Segmentation(kept.study, kept.plane, kept.mask, labels.value, sampling.points, sampling, source)
-    told = _network_found(network, kept.mask, pieces.value, _inside_of_a_solid(shown.value, pieces.value, settings))
+    inside = not outlined and settings.network.network in SURFACES and not is_wall(mask)
+    dropped = int(np.count_nonzero(kept.mask) - np.count_nonzero(mask))
+    told = _network_found(network, kept.mask, count, dropped, inside=inside)
     return folded(found, pieces, shown, trained, labels, told, points_found(sampling.points, sampling.spacing_mm))
 
 
-@timed("window")
-def _join(kept: Selected) -> Stage[Pieces]:
-    return Stage(Pieces(*pieces_of(kept.mask)))
-
-
-@timed("points")
-def _show(kept: Selected, mask: NDArray[np.bool_], settings: Settings) -> Stage[Shown]:
+def _shown(kept: Selected, mask: NDArray[np.bool_], settings: Settings) -> Shown:
     voxels = kept.study.to_mm(np.argwhere(mask)[:, ::-1].astype(np.float64))
     if not _outlined(mask, settings):
-        return Stage(Shown(voxels, voxels, outlined=False))
+        return Shown(voxels, voxels, outlined=False)
     chosen = kept.chosen
     found = boundary(
         chosen.volume, mask, lower=chosen.lower, upper=chosen.upper, layers=settings.window.layers, surface="outer",
         threads=settings.run.threads,
     )  # fmt: skip
-    return Stage(Shown(voxels, found.points.positions, outlined=True))
+    return Shown(voxels, found.points.positions, outlined=True)
 
 
-@timed("networks")
-def _train(shown: Shown, settings: Settings, progress: Progress) -> Stage[SpaceNetwork]:
-    progress("networks", 0, 1)
-    network = train_space(shown.places, settings.network, outlined=shown.outlined, seed=settings.run.seed)
-    progress("networks", 1, 1)
-    return Stage(network)
-
-
-@timed("regions")
-def _label(
-    mask: NDArray[np.bool_], shown: Shown, network: SpaceNetwork, settings: Settings
-) -> Stage[NDArray[np.uint16]]:
-    return Stage(regions_in_space(mask, shown.voxels, network, settings.run.threads))
-
-
-def _inside_of_a_solid(shown: Shown, pieces: Pieces, settings: Settings) -> bool:
-    return not shown.outlined and settings.network.network in SURFACES and not is_wall(pieces.mask)
-
-
-def _network_found(network: SpaceNetwork, mask: NDArray[np.bool_], pieces: Pieces, inside: bool) -> Stage[None]:
+def _network_found(
+    network: SpaceNetwork, mask: NDArray[np.bool_], pieces: int, dropped: int, *, inside: bool
+) -> Stage[None]:
     """Tell of the one network in space, and what of the window it does not stand for."""
     voxels = int(np.count_nonzero(mask))
-    dropped = voxels - int(np.count_nonzero(pieces.mask))
     stats: dict[str, dict[str, Any]] = {
         "networks": {
             "topology": network.lattice.name,
@@ -159,13 +134,13 @@ def _network_found(network: SpaceNetwork, mask: NDArray[np.bool_], pieces: Piece
             "strays": network.strays,
             "slices_without": [],
         },
-        "space": {"pieces": pieces.count, "dropped_voxels": dropped},
+        "space": {"pieces": pieces, "dropped_voxels": dropped},
     }
     warnings = []
     if inside:
         warnings.append("the window is a solid, and the surface lies inside of it: --signal boundary lays it around")
-    if pieces.count > 1:
-        warnings.append(f"the window is in {pieces.count} pieces, and one network spans them all")
+    if pieces > 1:
+        warnings.append(f"the window is in {pieces} pieces, and one network spans them all")
     if dropped > LEFT_OUT * voxels:
         warnings.append(f"{dropped} of {voxels} voxels of the window lie in small pieces, and were left out")
     return Stage(None, stats, tuple(warnings))
@@ -208,24 +183,15 @@ class _Rest:
     trace: Trace | None
 
 
-@dataclass(frozen=True)
-class _Faces:
-    """A network's own faces, how many neurons were moved to part them, and the finer squares that they become."""
-
-    network: TriMesh
-    moved: int
-    quads: NDArray[np.int32]
-    rough: QuadMesh
-
-
 def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Make a network's own faces a closed surface that rests on the boundary of the window."""
-    apart = _untangle_network(found.source.network, settings)
+    threads = settings.run.threads
+    apart = measured("untangle", _untangled, found.source.network, threads)
     faces = _divide(*apart.value)
-    rough = faces.value.rough
-    ring = Ring(faces.value.quads, len(rough.vertices), settings.run.threads)
-    rest = _fit(rough, ring, found.source, settings, progress)
-    mesh = _untangle(rest.value.mesh, rough, ring, settings)
+    rough = faces.value
+    ring = Ring(rough.quads.astype(np.int32), len(rough.vertices), threads)
+    rest = measured("fit", _fitted, rough, ring, found.source, settings, progress)
+    mesh = measured("untangle", untangle, rest.value.mesh, rough.vertices, ring, Crossings(threads))
     made, taken_back, crossing = mesh.value
     surface = Surface(
         found.points, rough, rough.triangulated(), made, np.empty(0, np.int32), trace=rest.value.trace,
@@ -236,34 +202,18 @@ def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progre
     return folded(surface, apart, faces, rest, mesh, fitted, filled)
 
 
-@timed("untangle")
-def _untangle_network(network: SpaceNetwork, settings: Settings) -> Stage[tuple[TriMesh, int]]:
-    return Stage(_untangled(network, settings.run.threads))
-
-
 @timed("smooth")
-def _divide(network: TriMesh, moved: int) -> Stage[_Faces]:
+def _divide(network: TriMesh, moved: int) -> Stage[QuadMesh]:
+    """Divide a network's own faces into finer squares."""
     vertices, quads = squares_of(network)
-    rough = QuadMesh(vertices, quads.astype(np.int64), np.zeros(len(quads), np.int64))
+    rough = QuadMesh(vertices, quads.astype(np.int64))
     stats: dict[str, dict[str, Any]] = {
         "space": {"faces": len(network.faces), "untangled": moved},
         "surface": {
             "found": 1, "cavities": 0, "taken": 1, "debris": 0, "square_faces": len(quads), "enclosed_cubes": 0,
         },
     }  # fmt: skip
-    return Stage(_Faces(network, moved, quads, rough), stats)
-
-
-@timed("fit")
-def _fit(rough: QuadMesh, ring: Ring, found: SpaceFound, settings: Settings, progress: Progress) -> Stage[_Rest]:
-    return Stage(_fitted(rough, ring, found, settings, progress))
-
-
-@timed("untangle")
-def _untangle(
-    mesh: TriMesh, rough: QuadMesh, ring: Ring, settings: Settings
-) -> Stage[tuple[TriMesh, int, NDArray[np.bool_]]]:
-    return Stage(untangle(mesh, rough.vertices, ring, Crossings(settings.run.threads)))
+    return Stage(rough, stats)
 
 
 def _untangled(network: SpaceNetwork, threads: int) -> tuple[TriMesh, int]:

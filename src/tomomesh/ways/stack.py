@@ -8,7 +8,7 @@ import numpy as np
 
 from ..contours.stack import ContourSurface, contour_surface
 from ..results import Surface
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured
 from .points import place_found
 from .sections import body_of_voxels, boundary_found, points_found
 from .way import Way, on_input, parameters
@@ -53,7 +53,12 @@ def surface_of_slices(
     told : bool
         Whether to warn of slices that lie far apart.
     """
-    closed = _close(cloud, slices, settings, progress, finest)
+    asked = settings.cubes
+    edge = finest if asked.cell_mm is None else float(np.min(asked.cell_mm))
+    closed = measured(
+        "contours", contour_surface, cloud.positions, slices, edge=None if edge is None else edge * asked.cell_factor,
+        allow_leaks=asked.allow_leaks, fit=settings.fit, threads=settings.run.threads, progress=progress,
+    )  # fmt: skip
     made = closed.value
     surface = Surface(
         cloud, made.boundary.cuberille, made.rest.smoothed, made.mesh, made.rest.nearest, filled=made.filled,
@@ -61,24 +66,6 @@ def surface_of_slices(
     )  # fmt: skip
     spaced = points_found(cloud, slices.spacing, unit=unit, bridged=bridged)
     return folded(surface, closed, spaced, boundary_found(made.boundary, made.rest), _stack_found(made, slices, told))
-
-
-@timed("contours")
-def _close(
-    cloud: PointSet, slices: Slices, settings: Settings, progress: Progress, finest: float | None
-) -> Stage[ContourSurface]:
-    asked = settings.cubes
-    edge = finest if asked.cell_mm is None else float(np.min(asked.cell_mm))
-    found = contour_surface(
-        cloud.positions,
-        slices,
-        edge=None if edge is None else edge * asked.cell_factor,
-        allow_leaks=asked.allow_leaks,
-        fit=settings.fit,
-        threads=settings.run.threads,
-        progress=progress,
-    )
-    return Stage(found)
 
 
 def _stack_found(made: ContourSurface, slices: Slices, told: bool) -> Stage[None]:

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..isosurface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
+from ..isosurface.voxels import Boundary, boundary, voxel_surface
 from ..model.points import PointSet
 from ..results import Segmentation, Surface, window_volume
 from ..segmentation.sample import Sampling
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured
 from .sections import body_of_voxels, boundary_found, points_found
 from .way import POINTS, Way, parameters
 
@@ -24,7 +24,11 @@ NOTHING = np.empty(0)
 
 def segment_by_voxels(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Boundary]]:
     """Take the boundary of the window in place of networks."""
-    bounded = _bound(kept, settings)
+    chosen, surface = kept.chosen, "outer" if settings.cubes.surface == "outer" else "all"
+    bounded = measured(
+        "points", boundary, chosen.volume, chosen.mask, lower=chosen.lower, upper=chosen.upper,
+        layers=settings.window.layers, surface=surface, threads=settings.run.threads,
+    )  # fmt: skip
     found, spacing = bounded.value, max(kept.study.spacing_mm)
     sampling = Sampling(found.points, spacing, found.added, NOTHING, NOTHING)
     labels = kept.mask.astype(np.uint16)
@@ -35,33 +39,14 @@ def segment_by_voxels(kept: Selected, settings: Settings, progress: Progress) ->
 def surface_by_voxels(found: Segmentation[Boundary], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Let a net around the voxels come to rest where the gray levels cross the window's bounds."""
     source = found.source
-    meshed = _mesh(source, settings, progress)
+    threads = settings.run.threads
+    meshed = measured("fit", voxel_surface, source, settings.fit, threads=threads, progress=progress)
     made = meshed.value
     surface = Surface(
         found.points, source.cuberille, made.smoothed, made.mesh, made.nearest, cavities=source.cavities,
         encloses_mm3=window_volume(found),
     )  # fmt: skip
     return folded(surface, meshed, boundary_found(source, made))
-
-
-@timed("points")
-def _bound(kept: Selected, settings: Settings) -> Stage[Boundary]:
-    chosen, surface = kept.chosen, "outer" if settings.cubes.surface == "outer" else "all"
-    found = boundary(
-        chosen.volume,
-        chosen.mask,
-        lower=chosen.lower,
-        upper=chosen.upper,
-        layers=settings.window.layers,
-        surface=surface,
-        threads=settings.run.threads,
-    )
-    return Stage(found)
-
-
-@timed("fit")
-def _mesh(found: Boundary, settings: Settings, progress: Progress) -> Stage[VoxelSurface]:
-    return Stage(voxel_surface(found, settings.fit, threads=settings.run.threads, progress=progress))
 
 
 def _pictures(found: Segmentation[Boundary]) -> dict[str, Any]:

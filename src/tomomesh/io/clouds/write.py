@@ -10,9 +10,9 @@ from ..fields import AXES, IDS, flat_columns
 from ..files.atomic import check_output
 from ..files.signature import signature
 from ..files.source import suffix_of
+from ..meshes.attributes import MeshAttributes
 from ..meshes.ply import write_ply
 from ..meshes.vtp import write_vtp_points
-from ..meshes.written import Written
 from .arrays import write_npy
 from .delimited import write_csv, write_xyz
 
@@ -56,7 +56,7 @@ def _write_ply(points: PointSet, path: str | Path, unit: str, frame: str) -> Non
 
 
 def _write_vtp(points: PointSet, path: str | Path, unit: str, frame: str) -> None:
-    write_vtp_points(points, path, Written(unit, frame, {}, {}))
+    write_vtp_points(points, path, MeshAttributes(unit, frame, {}, {}))
 
 
 POINT_WRITERS: dict[str, Callable[[PointSet, str | Path, str, str], None]] = {

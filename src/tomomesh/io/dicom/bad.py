@@ -44,6 +44,7 @@ def leave_out(bad: Mapping[Path, TomomeshError], good: int, *, skip: bool, study
         raise first
     if len(bad) == 1:  # its own error says more than a list
         first.args = (f"{first} {'Or' if 'Try: ' in str(first) else 'Try'}: --skip-bad to go on without it.",)
+        first.flags += ("--skip-bad",)
         raise first
     raise FormatError(
         f"{len(bad)} of {len(bad) + good} files cannot be read",
@@ -51,6 +52,7 @@ def leave_out(bad: Mapping[Path, TomomeshError], good: int, *, skip: bool, study
         found=listed(bad),
         expected="whole and valid files",
         hint="fresh copies of them, or --skip-bad to go on without them",
+        flags=["--skip-bad"],
     )
 
 

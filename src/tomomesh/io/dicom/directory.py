@@ -59,6 +59,7 @@ def read_index(index: Path, settings: ReadSettings, *, study: str) -> Volume:
             found=listed(gone),
             expected="all files beside it",
             hint="the whole disc, or --skip-bad to go on without them",
+            flags=["--skip-bad"],
         )
     return read_dicom(files, settings, study=study, others=Counter({GONE: len(gone)} if gone else {}))
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..colors import named_colors
 from ..files.atomic import replacing
 from ..volumes.nifti import FLIP
-from .written import single
+from .attributes import single_precision
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from ...model.mesh import TriMesh
     from ..fields import Fields
-    from .written import Written
+    from .attributes import MeshAttributes
 
 MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 """Millimeters in a unit; GIFTI has no other unit."""
@@ -26,7 +26,7 @@ MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 SCANNER, UNKNOWN = "NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_UNKNOWN"
 
 
-def write_gifti(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write 32-bit coordinates in millimeters, RAS where the mesh has a patient frame, and the fields at vertices.
 
     The array of positions says which: ``NIFTI_XFORM_SCANNER_ANAT``, else ``NIFTI_XFORM_UNKNOWN``.
@@ -41,7 +41,7 @@ def write_gifti(mesh: TriMesh, path: str | Path, beside: Written) -> None:
     placed, patient = _ras(mesh.vertices, beside)
     space = SCANNER if patient else UNKNOWN
     points = GiftiDataArray(
-        single(placed, path, kind="GIFTI"),
+        single_precision(placed, path, kind="GIFTI"),
         intent="NIFTI_INTENT_POINTSET",
         datatype="NIFTI_TYPE_FLOAT32",
         coordsys=GiftiCoordSystem(space, space, np.eye(4)),
@@ -57,7 +57,7 @@ def write_gifti(mesh: TriMesh, path: str | Path, beside: Written) -> None:
         file.write(image.to_xml())
 
 
-def _ras(vertices: NDArray[np.float64], beside: Written) -> tuple[NDArray[np.float64], bool]:
+def _ras(vertices: NDArray[np.float64], beside: MeshAttributes) -> tuple[NDArray[np.float64], bool]:
     """Return the positions in millimeters, RAS, and whether the frame is a patient's."""
     placed = vertices * MM.get(beside.unit, 1.0)
     if beside.frame == "LPS":

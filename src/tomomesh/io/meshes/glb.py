@@ -12,14 +12,14 @@ import numpy as np
 
 from ..colors import named_colors
 from ..files.atomic import replacing
-from .written import single
+from .attributes import single_precision
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from ...model.mesh import TriMesh
     from ..fields import Fields
-    from .written import Written
+    from .attributes import MeshAttributes
 
 METERS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
 """Meters in a unit; an unknown one stays as it is."""
@@ -28,7 +28,7 @@ TURNS = {"LPS": ((1, 0, 0), (0, 0, 1), (0, -1, 0)), "RAS": ((-1, 0, 0), (0, 0, 1
 """Frame to the rows of its rotation to +x left, +y superior, +z anterior; others stay as they are."""
 
 
-def write_glb(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+def write_glb(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write 32-bit coordinates, colors, and other fields at vertices as 32-bit attributes ``_NAME``.
 
     Raises
@@ -41,7 +41,7 @@ def write_glb(mesh: TriMesh, path: str | Path, beside: Written) -> None:
 
     colors, attributes = _at_vertices(beside.vertex_fields)
     body = trimesh.Trimesh(
-        single(mesh.vertices, path, kind="GLB"),
+        single_precision(mesh.vertices, path, kind="GLB"),
         mesh.faces,
         vertex_colors=colors,
         vertex_attributes=attributes,
@@ -61,13 +61,13 @@ def _at_vertices(fields: Fields) -> tuple[Any, Fields]:
     return colors, {f"_{name.upper()}": values.astype("<f4") for name, values in fields.items() if name not in names}
 
 
-def _to_gltf(beside: Written) -> Any:
+def _to_gltf(beside: MeshAttributes) -> Any:
     matrix = np.eye(4)
     matrix[:3, :3] = METERS.get(beside.unit, 1.0) * np.array(TURNS.get(beside.frame, np.eye(3)))
     return matrix
 
 
-def _finish(tree: dict[str, Any], beside: Written) -> None:
+def _finish(tree: dict[str, Any], beside: MeshAttributes) -> None:
     """Name the program, and drop the bounds of attributes, which glTF does not need: JSON has no word for NaN."""
     tree["asset"]["generator"] = beside.head
     attributes = tree["meshes"][0]["primitives"][0]["attributes"]

@@ -11,10 +11,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ...model.mesh import TriMesh
-    from .written import Written
+    from .attributes import MeshAttributes
 
 
-def write_obj(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+def write_obj(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write 64-bit coordinates, and colors as fractions behind them."""
     colors = named_colors(beside.vertex_fields)
     behind = [""] * len(mesh.vertices)

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ...model.mesh import TriMesh
-    from .written import Written
+    from .attributes import MeshAttributes
 
 
-def write_off(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+def write_off(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write 64-bit coordinates; colors, where there are any, behind them as red, green, blue and alpha, 0 to 255."""
     colors = named_colors(beside.vertex_fields)
     behind = [f" {r} {g} {b} 255" for r, g, b in colors[1].tolist()] if colors else [""] * len(mesh.vertices)

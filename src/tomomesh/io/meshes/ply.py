@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from ...model.mesh import TriMesh
     from ..fields import Fields
+    from .attributes import MeshAttributes
     from .through_trimesh import Arrays
-    from .written import Written
 
 TYPE_NAMES = {
     "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
@@ -145,7 +145,7 @@ def read_ply_mesh(data: bytes, file: str) -> Arrays:
     return loaded("ply", data, file)
 
 
-def write_ply_mesh(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+def write_ply_mesh(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write 64-bit coordinates with all fields, of vertices and of faces."""
     positions = dict(zip(AXES, np.asarray(mesh.vertices, np.float64).T, strict=True))
     write_ply(path, beside.head, {**positions, **beside.vertex_fields}, mesh.faces, beside.face_fields)

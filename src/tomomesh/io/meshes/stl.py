@@ -8,16 +8,16 @@ import numpy as np
 
 from ..files.atomic import replacing
 from ..files.limits import require_bytes
+from .attributes import single_precision
 from .through_trimesh import loaded
 from .weld import weld
-from .written import single
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from ...model.mesh import TriMesh
+    from .attributes import MeshAttributes
     from .through_trimesh import Arrays
-    from .written import Written
 
 FACE = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
 """One face of a binary STL file."""
@@ -40,7 +40,7 @@ def read_stl(data: bytes, file: str) -> Arrays:
     return unique, numbers[faces]
 
 
-def write_stl(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+def write_stl(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write a binary file of 32-bit coordinates, each face with its normal, behind a header that names the frame.
 
     Raises
@@ -49,7 +49,7 @@ def write_stl(mesh: TriMesh, path: str | Path, beside: Written) -> None:
         Where 32 bits cannot keep the vertices apart.
     """
     rows = np.zeros(len(mesh.faces), FACE)
-    rows["corners"] = single(mesh.vertices, path, kind="STL")[mesh.faces]
+    rows["corners"] = single_precision(mesh.vertices, path, kind="STL")[mesh.faces]
     length = np.linalg.norm(mesh.face_vectors, axis=1, keepdims=True)
     rows["normal"] = mesh.face_vectors / np.where(length > 0, length, 1.0)
     with replacing(path) as file:

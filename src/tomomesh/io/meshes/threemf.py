@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ...model.mesh import TriMesh
-    from .written import Written
+    from .attributes import MeshAttributes
 
 UNITS = {"um": "micron", "mm": "millimeter", "cm": "centimeter", "m": "meter"}
 """Units to the names that 3MF has for them."""
@@ -50,7 +50,7 @@ COLORS_ID, MESH_ID = 1, 2
 """Numbers of the two resources of a file; any will do."""
 
 
-def write_3mf(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+def write_3mf(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write one object of 64-bit coordinates, with colors at its corners where there are any.
 
     Raises
@@ -74,7 +74,7 @@ def write_3mf(mesh: TriMesh, path: str | Path, beside: Written) -> None:
             archive.writestr(entry, text, zipfile.ZIP_DEFLATED)
 
 
-def _model(mesh: TriMesh, beside: Written) -> Iterator[str]:
+def _model(mesh: TriMesh, beside: MeshAttributes) -> Iterator[str]:
     colors = named_colors(beside.vertex_fields)
     palette, numbers = np.unique(colors[1], axis=0, return_inverse=True) if colors else (None, np.zeros(0, np.int64))
     yield f'{DECLARATION}<model unit="{UNITS[beside.unit]}" xml:lang="en-US" xmlns="{CORE}" xmlns:m="{MATERIAL}">\n'

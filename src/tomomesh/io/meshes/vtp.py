@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ...model.mesh import TriMesh
     from ...model.points import PointSet
     from ..fields import Fields
-    from .written import Written
+    from .attributes import MeshAttributes
 
 VTK_TYPES = {
     "i1": "Int8", "u1": "UInt8", "i2": "Int16", "u2": "UInt16", "i4": "Int32", "u4": "UInt32",
@@ -35,13 +35,13 @@ PARTS = ("Verts", "Lines", "Strips", "Polys")
 """The kinds of cells, in the order of the file."""
 
 
-def write_vtp_mesh(mesh: TriMesh, path: str | Path, beside: Written) -> None:
+def write_vtp_mesh(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write a mesh of 64-bit coordinates with all its fields; colors are one array named ``RGB``."""
     point_data, cell_data = _arrays(beside.vertex_fields), _arrays(beside.face_fields)
     _write(path, beside, mesh.vertices, "Polys", mesh.faces, point_data, cell_data)
 
 
-def write_vtp_points(points: PointSet, path: str | Path, beside: Written) -> None:
+def write_vtp_points(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
     """Write points, each a vertex cell, with slice, neuron, kind and all attributes."""
     ids: Fields = dict(zip(IDS, (points.slices, points.neurons, points.kinds), strict=True))
     fields = _arrays({**ids, **flat_columns(points.attributes, len(points), ids)})
@@ -59,7 +59,7 @@ def _arrays(fields: Fields) -> Fields:
 
 def _write(
     path: str | Path,
-    beside: Written,
+    beside: MeshAttributes,
     positions: NDArray[np.float64],
     part: str,
     cells: NDArray[np.int64],

@@ -8,6 +8,7 @@ from ...model.points import COLORS
 from ..fields import AXES, flat_columns
 from ..files.atomic import check_output
 from ..files.source import suffix_of
+from .attributes import MeshAttributes
 from .gifti import write_gifti
 from .glb import write_glb
 from .obj import write_obj
@@ -16,7 +17,6 @@ from .ply import write_ply_mesh
 from .stl import write_stl
 from .threemf import write_3mf
 from .vtp import write_vtp_mesh
-from .written import Written
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -73,7 +73,7 @@ def write_mesh(
     check_output(path, MESH_WRITERS)
     at_vertices = flat_columns(vertex_fields or {}, len(mesh.vertices), AXES)
     on_faces = flat_columns(face_fields or {}, len(mesh.faces), ["count", "corners", "vertex_indices"])
-    MESH_WRITERS[suffix_of(path)](mesh, path, Written(unit, frame, at_vertices, on_faces))
+    MESH_WRITERS[suffix_of(path)](mesh, path, MeshAttributes(unit, frame, at_vertices, on_faces))
 
 
 KEEP_ALL = (".ply", ".vtp")
@@ -90,7 +90,7 @@ def keeps(path: str | Path, field: str, *, on_faces: bool = False) -> bool:
     return suffix in KEEP_AT_VERTICES or (suffix in KEEP_COLORS and field in COLORS)
 
 
-MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, Written], None]] = {
+MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, MeshAttributes], None]] = {
     ".stl": write_stl,
     ".ply": write_ply_mesh,
     ".obj": write_obj,

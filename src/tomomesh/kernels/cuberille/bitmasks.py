@@ -1,6 +1,6 @@
 """Loops over sparse sets of cubes, 8 x 8 x 8 to a block and one bit to a cube.
 
-A *board* is a (b + s, 8) uint64 array: one word for each plane of a block, bit 8 y + x of word z for its cube
+A *bitmask* is a (b + s, 8) uint64 array: one word for each plane of a block, bit 8 y + x of word z for its cube
 (x, y, z). The last s rows stand for the pieces of space that have no blocks: the first is all that lies outside the
 objects, and each of the others is inside one. A table (b, 27) of rows tells the neighbors of each block, in the
 order of `tomomesh.cuberille.neighbors.OFFSETS`.
@@ -17,7 +17,7 @@ from ..compile import kernel
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Board = NDArray[np.uint64]
+    Bitmask = NDArray[np.uint64]
     Table = NDArray[np.int32]
 
 ONE, EIGHT, SEVEN, LONG = np.uint64(1), np.uint64(8), np.uint64(7), np.uint64(56)
@@ -60,25 +60,27 @@ def along_y(word: np.uint64, beyond: np.uint64, step: int) -> np.uint64:
 
 
 @kernel("u8(u8[:,::1], i4[:,::1], i8, i8, i8, i8, i8)")
-def neighbor(board: Board, table: Table, block: int, z: int, dx: int, dy: int, dz: int) -> np.uint64:
+def neighbor(bitmask: Bitmask, table: Table, block: int, z: int, dx: int, dy: int, dz: int) -> np.uint64:
     """Return for the cubes of one word their neighbors at (x + dx, y + dy, z + dz), steps of -1, 0 or 1."""
     plane = z + dz
     column = 13 + 9 * (plane >> 3)
     plane &= 7
-    here = along_y(board[table[block, column], plane], board[table[block, column + 3 * dy], plane], dy)
+    here = along_y(bitmask[table[block, column], plane], bitmask[table[block, column + 3 * dy], plane], dy)
     if dx == 0:
         return here
     side = column + dx
-    return along_x(here, along_y(board[table[block, side], plane], board[table[block, side + 3 * dy], plane], dy), dx)
+    return along_x(
+        here, along_y(bitmask[table[block, side], plane], bitmask[table[block, side + 3 * dy], plane], dy), dx
+    )
 
 
 @kernel("void(u8[:,::1], i4[:,::1], i8, u8[:,::1], i8, i8)")
-def grow_along(board: Board, table: Table, axis: int, grown: Board, begin: int, end: int) -> None:
+def grow_along(bitmask: Bitmask, table: Table, axis: int, grown: Bitmask, begin: int, end: int) -> None:
     """Add the two neighbors of every cube along one axis; three axes make a box.
 
     Parameters
     ----------
-    board : (b + s, 8) uint64 array
+    bitmask : (b + s, 8) uint64 array
     table : (b, 27) int32 array
     axis : int
         0, 1, 2 for x, y, z.
@@ -90,12 +92,12 @@ def grow_along(board: Board, table: Table, axis: int, grown: Board, begin: int, 
     dx, dy, dz = int(axis == 0), int(axis == 1), int(axis == 2)
     for b in range(begin, end):
         for z in range(8):
-            both = neighbor(board, table, b, z, dx, dy, dz) | neighbor(board, table, b, z, -dx, -dy, -dz)
-            grown[b, z] = board[b, z] | both
+            both = neighbor(bitmask, table, b, z, dx, dy, dz) | neighbor(bitmask, table, b, z, -dx, -dy, -dz)
+            grown[b, z] = bitmask[b, z] | both
 
 
 @kernel("b1(u8[:,::1], i4[:,::1], u8[:,::1], i8)")
-def flood_block(open_: Board, table: Table, reached: Board, b: int) -> bool:
+def flood_block(open_: Bitmask, table: Table, reached: Bitmask, b: int) -> bool:
     """Flood one block to its end; tell whether anything in it changed."""
     changed, again = False, True
     while again:
@@ -113,7 +115,7 @@ def flood_block(open_: Board, table: Table, reached: Board, b: int) -> bool:
 
 
 @kernel("b1(u8[:,::1], i8, i8)")
-def touches(reached: Board, b: int, column: int) -> bool:
+def touches(reached: Bitmask, b: int, column: int) -> bool:
     """Tell whether a block is reached along the side that a column of its table stands for."""
     if column == 4 or column == 22:
         return bool(reached[b, 7 * (column > 13)] != ZERO)
@@ -127,7 +129,7 @@ def touches(reached: Board, b: int, column: int) -> bool:
 
 
 @kernel("void(u8[:,::1], i4[:,::1], u8[:,::1])")
-def flood(open_: Board, table: Table, reached: Board) -> None:
+def flood(open_: Bitmask, table: Table, reached: Bitmask) -> None:
     """Walk over faces from the cubes that are reached to all open ones.
 
     Parameters
@@ -169,7 +171,7 @@ def flood(open_: Board, table: Table, reached: Board) -> None:
 
 
 @kernel("i8(u8[:,::1], i4[:,::1], u8[:,::1], u8[:,::1], i8, i8)")
-def compose(solid: Board, table: Table, near: Board, filled: Board, begin: int, end: int) -> int:
+def compose(solid: Bitmask, table: Table, near: Bitmask, filled: Bitmask, begin: int, end: int) -> int:
     """Fill every contact along an edge only or at a corner only, once (Latecki 1997).
 
     Parameters
@@ -223,12 +225,14 @@ def compose(solid: Board, table: Table, near: Board, filled: Board, begin: int, 
 
 
 @kernel("void(u8[:,::1], i8[:,::1], i8[:,::1], i8[:,::1])")
-def list_cubes(board: Board, blocks: NDArray[np.int64], before: NDArray[np.int64], cells: NDArray[np.int64]) -> None:
-    """List the cubes of a board, block by block.
+def list_cubes(
+    bitmask: Bitmask, blocks: NDArray[np.int64], before: NDArray[np.int64], cells: NDArray[np.int64]
+) -> None:
+    """List the cubes of a bitmask, block by block.
 
     Parameters
     ----------
-    board : (b + s, 8) uint64 array
+    bitmask : (b + s, 8) uint64 array
     blocks : (b, 3) int64 array
         Positions (x, y, z) of the blocks, in blocks.
     before : (b, 8) int64 array
@@ -238,7 +242,7 @@ def list_cubes(board: Board, blocks: NDArray[np.int64], before: NDArray[np.int64
     """
     for b in range(len(blocks)):
         for z in range(8):
-            word, n = board[b, z], before[b, z]
+            word, n = bitmask[b, z], before[b, z]
             while word != ZERO:
                 bit = popcount((word & (~word + ONE)) - ONE)
                 cells[n, 0] = 8 * blocks[b, 0] + (bit & 7)

@@ -1,4 +1,7 @@
-"""Loops that list the square faces between the cubes of a board and empty ones (see `boards`)."""
+"""Loops that find the square faces between the cubes of a bitmask and empty ones, and list them (see `bitmasks`).
+
+The faces of a set are six bitmasks, (6, b + s, 8): the cubes that have a face toward -x, +x, -y, +y, -z and +z.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,11 @@ from .bitmasks import ALL, ONE, ZERO, neighbor, popcount
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .bitmasks import Board, Table
+    from .bitmasks import Bitmask, Table
 
 
 @kernel("u8(u8[:,::1], i4[:,::1], i8, i8)")
-def mixed_corners(solid: Board, table: Table, b: int, z: int) -> np.uint64:
+def mixed_corners(solid: Bitmask, table: Table, b: int, z: int) -> np.uint64:
     """Return which cubes of a word have solid and empty ones around their lowest corner."""
     some, every = ZERO, ALL
     for dz in (-1, 0):
@@ -28,57 +31,55 @@ def mixed_corners(solid: Board, table: Table, b: int, z: int) -> np.uint64:
     return some & ~every
 
 
-@kernel("void(u8[:,::1], i4[:,::1], u8[:,::1], i8[:,::1])")
-def mark_surface(solid: Board, table: Table, corners: Board, faces: NDArray[np.int64]) -> None:
-    """Find the vertices and count the faces of the surface between solid cubes and empty ones.
+@kernel("void(u8[:,::1], i4[:,::1], u8[:,:,::1], u8[:,::1])")
+def scan_faces(solid: Bitmask, table: Table, exposed: NDArray[np.uint64], corners: Bitmask) -> None:
+    """Find every face between solid cubes and empty ones, looking at all cubes.
 
     Parameters
     ----------
     solid : (b + s, 8) uint64 array
     table : (b, 27) int32 array
+    exposed : (6, b + s, 8) uint64 array
+        Result: the faces.
     corners : (b + s, 8) uint64 array
         Result: the cubes whose lowest corner is a vertex.
-    faces : (b, 8) int64 array
-        Result: faces of the solid cubes of each word.
     """
     for b in range(len(table)):
         for z in range(8):
             corners[b, z] = mixed_corners(solid, table, b, z)
-            count = 0
-            for axis in range(3):
-                for step in (-1, 1):
-                    dx, dy, dz = step * (axis == 0), step * (axis == 1), step * (axis == 2)
-                    count += popcount(solid[b, z] & ~neighbor(solid, table, b, z, dx, dy, dz))
-            faces[b, z] = count
+            for direction in range(6):
+                axis, step = direction >> 1, 2 * (direction & 1) - 1
+                dx, dy, dz = step * (axis == 0), step * (axis == 1), step * (axis == 2)
+                exposed[direction, b, z] = solid[b, z] & ~neighbor(solid, table, b, z, dx, dy, dz)
 
 
 @kernel("i8(u8[:,::1], i4[:,::1], i8[:,::1], i8, i8, i8, i8)")
-def corner_number(corners: Board, table: Table, before: NDArray[np.int64], b: int, x: int, y: int, z: int) -> int:
+def corner_number(corners: Bitmask, table: Table, before: NDArray[np.int64], b: int, x: int, y: int, z: int) -> int:
     """Return the number of the vertex at a corner (x, y, z), 0 to 8, of a block."""
     there = table[b, 13 + (x >> 3) + 3 * (y >> 3) + 9 * (z >> 3)]
     mask = (ONE << np.uint64(8 * (y & 7) + (x & 7))) - ONE
     return int(before[there, z & 7]) + popcount(corners[there, z & 7] & mask)
 
 
-@kernel("void(u8[:,::1], i4[:,::1], u8[:,::1], i8[:,::1], i8[:,::1], i8[:,:,::1], i4[:,::1], i4[:,::1])")
+@kernel("void(u8[:,:,::1], i4[:,::1], u8[:,::1], i8[:,::1], i8[:,:,::1], i4[:,::1], i4[:,::1])")
 def list_faces(
-    solid: Board,
+    exposed: NDArray[np.uint64],
     table: Table,
-    corners: Board,
+    corners: Bitmask,
     before: NDArray[np.int64],
-    faces_before: NDArray[np.int64],
     squares: NDArray[np.int64],
     quads: NDArray[np.int32],
     cubes: NDArray[np.int32],
 ) -> None:
-    """List the square faces of the surface, counter-clockwise seen from the empty side.
+    """List the square faces of the surface, counter-clockwise seen from the empty side, block by block.
 
     Parameters
     ----------
-    solid : (b + s, 8) uint64 array
+    exposed, corners : arrays
+        From `scan_faces` or `tracker.track_faces`.
     table : (b, 27) int32 array
-    corners, before, faces_before : arrays
-        From `mark_surface`, with the vertices and faces before each word.
+    before : (b, 8) int64 array
+        Vertices before each word of `corners`.
     squares : (6, 4, 3) int64 array
         Corners of the unit cube's faces, for the directions -x, +x, -y, +y, -z, +z.
     quads : (q, 4) int32 array
@@ -86,13 +87,11 @@ def list_faces(
     cubes : (q, 2) int32 array
         Result: block, and place within the block, of the cube behind each face.
     """
+    n = 0
     for b in range(len(table)):
         for z in range(8):
-            n = faces_before[b, z]
             for direction in range(6):
-                axis, step = direction >> 1, 2 * (direction & 1) - 1
-                dx, dy, dz = step * (axis == 0), step * (axis == 1), step * (axis == 2)
-                word = solid[b, z] & ~neighbor(solid, table, b, z, dx, dy, dz)
+                word = exposed[direction, b, z]
                 while word != ZERO:
                     bit = popcount((word & (~word + ONE)) - ONE)
                     for corner in range(4):

@@ -1,1 +1,1 @@
-"""Triangles: distances, edges, shapes, intersections."""
+"""Triangles: distances, edges, shapes, intersections; and polygons."""

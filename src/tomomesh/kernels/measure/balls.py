@@ -31,13 +31,13 @@ def take_nearest(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int32],
     m: int,
-    foot: NDArray[np.float64],
+    nearest: NDArray[np.float64],
 ) -> float:
-    """Put the place of face m that is nearest to another place into `foot`; return their squared distance.
+    """Put the place of face m that is nearest to another place into `nearest`; return their squared distance.
 
     Notes
     -----
-    On the plane where the foot lies in the triangle, else the nearest on its three sides.
+    On the plane where that lies in the triangle, else the nearest on its three sides.
     """
     bb = bc = cc = bp = cp = 0.0
     for axis in range(3):
@@ -68,8 +68,8 @@ def take_nearest(
     squared = 0.0
     for axis in range(3):
         a = vertices[faces[m, 0], axis]
-        foot[axis] = a + s * (vertices[faces[m, 1], axis] - a) + t * (vertices[faces[m, 2], axis] - a)
-        squared += (place[axis] - foot[axis]) ** 2
+        nearest[axis] = a + s * (vertices[faces[m, 1], axis] - a) + t * (vertices[faces[m, 2], axis] - a)
+        squared += (place[axis] - nearest[axis]) ** 2
     return squared
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Rows = NDArray[np.float64]
 
 BOX, PLANE, ROWS = 3, 5, 7
-APART, FLAT, THROUGH = 0, 1, 2
+APART, COPLANAR, THROUGH = 0, 1, 2
 ROUNDING = 8e-16
 """Largest error of a computed 3 x 3 determinant of differences, over the sum of its terms' sizes (Shewchuk 1997)."""
 
@@ -38,11 +38,11 @@ def take_plane(rows: Rows, i: int, j: int, k: int, plane: int) -> None:
 
 
 @kernel("i8(f8[:,::1], i8, i8, i8)")
-def side_of(rows: Rows, plane: int, foot: int, corner: int) -> int:
-    """Return on which side of the plane through corner `foot` a corner is: 1, -1, or 0 within rounding."""
+def side_of(rows: Rows, plane: int, apex: int, corner: int) -> int:
+    """Return on which side of the plane through corner `apex` a corner is: 1, -1, or 0 within rounding."""
     volume = size = 0.0
     for axis in range(3):
-        height = rows[corner, axis] - rows[foot, axis]
+        height = rows[corner, axis] - rows[apex, axis]
         volume += height * rows[plane, axis]
         size += abs(height) * rows[plane + 1, axis]
     return int(volume > ROUNDING * size) - int(volume < -ROUNDING * size)
@@ -84,7 +84,7 @@ def meeting_of(rows: Rows, one: int, other: int, sides: NDArray[np.int64]) -> in
     """Find on which side of the other's plane the corners of two triangles are, and tell how they may meet.
 
     The sides go into (6,): first those of the one. The result is `APART` where one lies on one side of the other's
-    plane or both stop at it, `FLAT` where one lies in the other's plane, and `THROUGH` else.
+    plane or both stop at it, `COPLANAR` where one lies in the other's plane, and `THROUGH` else.
     """
     for k in range(3):
         sides[k] = side_of(rows, other + PLANE, other, one + k)
@@ -94,7 +94,7 @@ def meeting_of(rows: Rows, one: int, other: int, sides: NDArray[np.int64]) -> in
     reach = (low <= 0) & (high >= 0) & (below <= 0) & (above >= 0)
     flat = (low == high) | (below == above)
     through = ((low < 0) & (high > 0)) | ((below < 0) & (above > 0))
-    return FLAT if reach & flat else THROUGH if reach & through else APART
+    return COPLANAR if reach & flat else THROUGH if reach & through else APART
 
 
 @kernel("i8(i8[::1], i8)")

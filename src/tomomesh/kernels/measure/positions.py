@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @kernel("void(i8[:,::1], i8[::1], i4[::1], i4[::1])")
-def first_alike(
+def first_equal(
     rows: NDArray[np.int64], places: NDArray[np.int64], table: NDArray[np.int32], first: NDArray[np.int32]
 ) -> None:
     """Find the first row that is equal to each.

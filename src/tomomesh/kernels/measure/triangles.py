@@ -23,8 +23,8 @@ def squared_distance(
 
     Notes
     -----
-    Minimizes |p - a - s (b - a) - t (c - a)|^2: at the foot on the plane where that lies in the triangle, and on
-    one of the three sides otherwise. A side of no length counts by its end.
+    Minimizes |p - a - s (b - a) - t (c - a)|^2: at the projection onto the plane where that lies in the triangle, and
+    on one of the three sides otherwise. A side of no length counts by its end.
     """
     bb = bc = cc = bp = cp = 0.0
     for axis in range(3):
@@ -41,15 +41,15 @@ def squared_distance(
     s, t = (s / area, t / area) if inside else (0.0, 0.0)
     u, v = min(max(bp / max(bb, TINY), 0.0), 1.0), min(max(cp / max(cc, TINY), 0.0), 1.0)
     w = min(max((cp - bp + bb - bc) / max(bb - 2.0 * bc + cc, TINY), 0.0), 1.0)
-    foot = one = two = far = 0.0
+    inner = one = two = far = 0.0
     for axis in range(3):
         a = vertices[faces[m, 0], axis]
         b, c, d = vertices[faces[m, 1], axis] - a, vertices[faces[m, 2], axis] - a, points[p, axis] - a
-        foot += (d - s * b - t * c) ** 2
+        inner += (d - s * b - t * c) ** 2
         one += (d - u * b) ** 2
         two += (d - v * c) ** 2
         far += (d - (1.0 - w) * b - w * c) ** 2
-    return min(foot, one, two, far)
+    return min(inner, one, two, far)
 
 
 @kernel("f8(f8[:,::1], i8, f8[:,::1], i8)")

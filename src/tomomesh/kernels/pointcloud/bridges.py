@@ -17,12 +17,13 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
 
 SECTORS = 16
-"""Directions around a point that are told apart."""
+"""Directions around a point that are told apart. Six neighbors all around leave 60 degrees: three sectors that are
+empty are 67."""
 TANGENT = 0.41421356237309503
 """Tangent of the angle of a sector: pi / 8."""
 STEEP = 0.5
 """Slope over which a bridge would leave the surface at its end."""
-ALIKE = 0.5
+SAME_SIDE = 0.5
 """Cosine of the angle between the normals over which two rims belong together."""
 
 
@@ -148,7 +149,7 @@ def bridge(
                 same += samples[p, 3 + axis] * samples[q, 3 + axis]
             length = np.sqrt(length)
             pieces = np.int64(length / gap) + 1
-            if pieces < 2 or max(abs(here), abs(there)) > STEEP * length or abs(same) < ALIKE:
+            if pieces < 2 or max(abs(here), abs(there)) > STEEP * length or abs(same) < SAME_SIDE:
                 continue
             if not is_open(sectors[p], sector(axes, step)):
                 continue

@@ -1,1 +1,1 @@
-"""Matching, updating and batch steps of networks, and the polygons that they lie on."""
+"""Matching, updating and batch steps of networks."""

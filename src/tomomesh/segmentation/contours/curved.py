@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 FINE = 16
-"""Pieces into which each side of a ring is split along its curve."""
+"""Pieces into which each side of a ring is split along its curve. Chosen: half of it changes the distance by +2.2 %,
+twice by -1.7 %."""
 TIMES = 3
 """How often the shrinking is taken back: measured, each time leaves a third of it."""
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
+from ...measure.matching import SHARED, matched, similar
 from ...model.contours import BIRTH, BRANCH, DEATH, MERGE, Event
 
 if TYPE_CHECKING:
@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .loops import Patch
-
-SHARED = 0.1
-"""Share of the smaller inside that two contours of neighboring slices must have in common to be of one structure."""
-ALIKE = 4.0
-"""Most that the areas differ of two contours that go on as each other."""
 
 
 @dataclass(frozen=True)
@@ -94,16 +89,14 @@ def track(insides: Sequence[Sequence[Patch]], sides: Sequence[Sequence[int]]) ->
 
 def _successors(shared: NDArray[np.int64], before: Sequence[int], here: Sequence[int]) -> dict[int, int]:
     """Return which contour of the slice before goes on as which, by the number of the later one."""
-    areas, others = np.array(before, float)[:, None], np.array(here, float)[None, :]
-    alike = np.maximum(areas, others) <= ALIKE * np.minimum(areas, others)
-    common = np.where(alike, shared, 0)
-    return {int(b): int(a) for a, b in zip(*linear_sum_assignment(-common), strict=True) if common[a, b] > 0}
+    pairs = matched(-shared.astype(np.float64), similar(before, here) & (shared > 0), alone=0.0)
+    return {b: a for a, b in pairs}
 
 
 def _shared(
     before: Sequence[Patch], here: Sequence[Patch], sides: Sequence[int], others: Sequence[int]
 ) -> NDArray[np.int64]:
-    """Count the pixels that contours of two slices share; 0 where they are few, or the sides differ."""
+    """Count the pixels that contours of two slices share; 0 where they are few of the smaller, or the sides differ."""
     shared = np.zeros((len(before), len(here)), np.int64)
     for a, one in enumerate(before):
         for b, other in enumerate(here):

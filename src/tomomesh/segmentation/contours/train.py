@@ -16,9 +16,9 @@ from ...progress import Progress, silent
 from ...som.even_spacing import bridged_edges, evenly
 from ...som.fit import fit, radii
 from .curved import evened, unshrunk
-from .inputs import SHORTEST, Look, components_of, looks_at_loops, solids
+from .inputs import SHORTEST, Inputs, components_of, inputs_of_loops, solids
 from .tracking import track
-from .walls import looks_at_walls
+from .walls import inputs_of_walls
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -48,9 +48,9 @@ def train_contours(
 
     ``settings.neurons`` are shared among the contours of a slice by the lengths of their outlines: `FEWEST` each at
     least (a loop: one for `SIDES_MOST` pixel sides at least), and at most one for two pixel sides. Shorter outlines
-    than `SHORTEST` sides get none: on the skull of a head they are pores. First every slice is
-    looked at, then the contours are linked from slice to slice by what they enclose, then each track is trained from
-    its first slice to its last, every ring with its first neuron next to that of the ring before it.
+    than `SHORTEST` sides get none: on the skull of a head they are pores. First the inputs of every slice are found,
+    then the contours are linked from slice to slice by what they enclose, then each track is trained from its first
+    slice to its last, every ring with its first neuron next to that of the ring before it.
 
     Parameters
     ----------
@@ -71,16 +71,16 @@ def train_contours(
     EmptyError
         Where no contour is long enough.
     """
-    looks, dropped = _looks(mask, settings, pixel_mm, seed, threads)
-    if not any(looks):
+    inputs, dropped = _inputs(mask, settings, pixel_mm, seed, threads)
+    if not any(inputs):
         raise EmptyError(
             "no contour is long enough for a network",
             found=f"{dropped} of fewer than {SHORTEST} pixel sides" if dropped else "no contour",
             expected=f"at least {SHORTEST} pixel sides",
             hint="a wider window",
         )
-    tracks = track([[look.inside for look in row] for row in looks], [[look.side for look in row] for row in looks])
-    shares = [shared(row, settings.neuron_count) for row in looks]
+    tracks = track([[one.inside for one in row] for row in inputs], [[one.side for one in row] for row in inputs])
+    shares = [shared(row, settings.neuron_count) for row in inputs]
     members = tracks.members
     trained: list[list[Contour]] = [[] for _ in members]
 
@@ -88,7 +88,7 @@ def train_contours(
         for number in range(start, stop):
             first = None
             for k, ring in members[number]:
-                one = _trained(looks[k][ring], shares[k][ring], settings, (seed, k, ring), pixel_mm, first)
+                one = _trained(inputs[k][ring], shares[k][ring], settings, (seed, k, ring), pixel_mm, first)
                 first = one.codebook[0]
                 trained[number].append(replace(one, track=number))
 
@@ -98,65 +98,65 @@ def train_contours(
     return Contours(settings.contours, tuple(order), tuple(tracks.events), dropped)
 
 
-def shared(looks: Sequence[Look], neurons: int) -> list[int]:
+def shared(inputs: Sequence[Inputs], neurons: int) -> list[int]:
     """Share neurons among the contours of a slice by the lengths of their outlines.
 
     Returns
     -------
     list of int
-        Each at least `Look.least`, so that they may be more in all, and at most `Look.most`.
+        Each at least `Inputs.least`, so that they may be more in all, and at most `Inputs.most`.
     """
-    whole = sum(look.perimeter for look in looks)
-    return [min(max(look.least, round(neurons * look.perimeter / whole)), look.most) for look in looks]
+    whole = sum(one.perimeter for one in inputs)
+    return [min(max(one.least, round(neurons * one.perimeter / whole)), one.most) for one in inputs]
 
 
-def _looks(
+def _inputs(
     mask: NDArray[np.bool_], settings: NetworkSettings, pixel_mm: tuple[float, float], seed: int, threads: int
-) -> tuple[list[list[Look]], int]:
-    """Look at all slices; return also how many contours are too small."""
+) -> tuple[list[list[Inputs]], int]:
+    """Find the inputs of all contours, slice by slice; return also how many contours are too small."""
     if settings.contours == "components":
-        return _looks_at_components(mask, settings.signal, threads)
+        return _inputs_of_components(mask, settings.signal, threads)
     if settings.contours == "loops":
-        return _in_slices(len(mask), lambda k: looks_at_loops(mask[k]), threads)
+        return _in_slices(len(mask), lambda k: inputs_of_loops(mask[k]), threads)
     return _in_slices(
-        len(mask), lambda k: looks_at_walls(mask[k], settings, np.random.default_rng([seed, k]), pixel_mm), threads
+        len(mask), lambda k: inputs_of_walls(mask[k], settings, np.random.default_rng([seed, k]), pixel_mm), threads
     )
 
 
-def _looks_at_components(mask: NDArray[np.bool_], signal: str, threads: int) -> tuple[list[list[Look]], int]:
+def _inputs_of_components(mask: NDArray[np.bool_], signal: str, threads: int) -> tuple[list[list[Inputs]], int]:
     """Show each component its outline or its pixels, as the whole body asks for that it is part of."""
     bodies, _ = ndimage.label(mask, np.ones((3, 3, 3), bool))
     found, dropped = _in_slices(len(mask), lambda k: components_of(mask[k], bodies[k]), threads)
     every = [one for row in found for one in row]
     solid = solids(every) if signal == "auto" else {one.body for one in every if signal == "boundary"}
-    looks, _ = _in_slices(len(mask), lambda k: ([one.look(solid=one.body in solid) for one in found[k]], 0), threads)
-    return looks, dropped
+    inputs, _ = _in_slices(len(mask), lambda k: ([one.inputs(solid=one.body in solid) for one in found[k]], 0), threads)
+    return inputs, dropped
 
 
-def _in_slices(count: int, look: Callable[[int], tuple[list[T], int]], threads: int) -> tuple[list[list[T]], int]:
+def _in_slices(count: int, find: Callable[[int], tuple[list[T], int]], threads: int) -> tuple[list[list[T]], int]:
     found: list[tuple[list[T], int]] = [([], 0)] * count
 
     def work(start: int, stop: int) -> None:
         for k in range(start, stop):
-            found[k] = look(k)
+            found[k] = find(k)
 
     in_blocks(work, count, block=1, threads=threads)
     return [row for row, _ in found], sum(dropped for _, dropped in found)
 
 
 def _trained(
-    look: Look, neurons: int, settings: NetworkSettings, place: tuple[int, int, int], pixel_mm: tuple[float, float],
+    own: Inputs, neurons: int, settings: NetworkSettings, place: tuple[int, int, int], pixel_mm: tuple[float, float],
     first: Floats | None,
 ) -> Contour:  # fmt: skip
     """Train one ring; `first` is where the ring before it on its track begins."""
-    graph, shown = lattice("ring", neurons), look.shown * pixel_mm
+    graph, shown = lattice("ring", neurons), own.shown * pixel_mm
     rng, pixel_area = np.random.default_rng(place), pixel_mm[0] * pixel_mm[1]
-    if look.line is None:
+    if own.line is None:
         fitted = fit(shown, graph, settings, rng, pixel_area=pixel_area)
         _, last = radii(shown, graph, settings, pixel_area)
     else:
-        start = drawn(look.line * pixel_mm, neurons, None if first is None else first * pixel_mm)
-        refined = replace(settings, radius=settings.radius or REFINED, trim=0.0 if look.outlined else settings.trim)
+        start = drawn(own.line * pixel_mm, neurons, None if first is None else first * pixel_mm)
+        refined = replace(settings, radius=settings.radius or REFINED, trim=0.0 if own.outlined else settings.trim)
         fitted = fit(shown, graph, refined, rng, pixel_area=pixel_area, start=start)
         _, last = refined.radius or REFINED
     found = fitted.codebook
@@ -166,7 +166,7 @@ def _trained(
     if settings.even:
         found, gaps = evened(found, gaps)
     return Contour(
-        place[1], place[2], look.side, -1, found / pixel_mm, gaps, look.outlined, len(shown), int((~fitted.kept).sum())
+        place[1], place[2], own.side, -1, found / pixel_mm, gaps, own.outlined, len(shown), int((~fitted.kept).sum())
     )  # fmt: skip
 
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from ...measure.polygon import area, distance, inside
 from ...model.contours import WALL_INNER, WALL_OUTER
 from ...model.lattice import lattice
 from ...som.fit import fit
-from ..polygon import area, distance, inside
 from ..signal import closed, pixels_of
-from .inputs import SHORTEST, TOUCHING, Look, look_at_loop
+from .inputs import SHORTEST, TOUCHING, Inputs, inputs_along
 from .loops import Loop, trace
 
 if TYPE_CHECKING:
@@ -23,12 +23,13 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 LONG = 0.25
-"""Borders shorter than this share of the longest are pores of a wall, not its sides."""
+"""Borders shorter than this share of the longest are pores of a wall, not its sides. Chosen: half of it changes the
+distance by +91.3 %, twice by +8.0 %."""
 
 
-def looks_at_walls(
+def inputs_of_walls(
     plane: NDArray[np.bool_], settings: NetworkSettings, rng: np.random.Generator, pixel_mm: tuple[float, float]
-) -> tuple[list[Look], int]:
+) -> tuple[list[Inputs], int]:
     """Find the walls of a slice, and show each of two rings one side.
 
     A ring in the middle of the wall, split along its normals, gives both their starts; what lies outside of it is
@@ -44,14 +45,14 @@ def looks_at_walls(
 
     Returns
     -------
-    looks : list of Look
+    inputs : list of Inputs
     dropped : int
         Parts of the window whose outer border has fewer than `SHORTEST` pixel sides.
     """
     filled, hollow, margin = closed(plane)
     parts, count = ndimage.label(filled, TOUCHING)
     framed = np.pad(plane, margin)
-    looks: list[Look] = []
+    inputs: list[Inputs] = []
     dropped = 0
     for number in range(1, count + 1):
         part = parts == number
@@ -60,10 +61,10 @@ def looks_at_walls(
         if len(outer) < SHORTEST:
             dropped += 1
         elif inner is None:
-            looks.append(look_at_loop(outer, WALL_OUTER))
+            inputs.append(inputs_along(outer, WALL_OUTER))
         else:
-            looks += _two_sides((framed & part)[margin:-margin, margin:-margin], outer, inner, settings, rng, pixel_mm)
-    return looks, dropped
+            inputs += _two_sides((framed & part)[margin:-margin, margin:-margin], outer, inner, settings, rng, pixel_mm)
+    return inputs, dropped
 
 
 def _hole(hollow: NDArray[np.bool_], margin: int) -> Loop | None:
@@ -76,7 +77,7 @@ def _hole(hollow: NDArray[np.bool_], margin: int) -> Loop | None:
 def _two_sides(
     wall: NDArray[np.bool_], outer: Loop, inner: Loop, settings: NetworkSettings, rng: np.random.Generator,
     pixel_mm: tuple[float, float],
-) -> list[Look]:  # fmt: skip
+) -> list[Inputs]:  # fmt: skip
     """Part a wall by the ring in its middle; where that follows no wall, take the borders as they are."""
     pixels = pixels_of(wall)
     graph = lattice("ring", min(settings.neuron_count, len(pixels)))
@@ -86,9 +87,9 @@ def _two_sides(
     shown = (_borders(wall) if massive else pixels) * pixel_mm
     within = inside(middle, shown)
     if min(within.sum(), (~within).sum()) < SHORTEST:
-        return [look_at_loop(outer, WALL_OUTER), look_at_loop(inner, WALL_INNER)]
+        return [inputs_along(outer, WALL_OUTER), inputs_along(inner, WALL_INNER)]
     return [
-        Look(
+        Inputs(
             seen / pixel_mm, _moved(middle, way * _apart(middle, seen)) / pixel_mm, loop.filled(), side, len(loop),
             massive,
         )

@@ -190,6 +190,7 @@ def _paint(
             found=_overlapping(shared, found.labels),
             expected="one segment a voxel",
             hint="--select with those that are wanted: only they are read, and may overlap",
+            flags=["--select"],
         )
     if found.kind == "FRACTIONAL":
         half = "FRACTIONAL: voxels of 0.5 and more belong to a segment"

@@ -59,6 +59,7 @@ def choose(frames: list[ImageFrame], wanted: int | None, *, folder: str) -> Choi
             found=table(series),
             expected="one series",
             hint="--series N",
+            flags=["--series"],
         )
     return Choice(series[0], notes)
 

@@ -99,6 +99,7 @@ def _missing(
         found=f"gap = {', '.join(where[:4])}{', ...' if len(where) > 4 else ''}",
         expected=f"a slice every {gaps.min():.4g} mm",
         hint="the missing files, or --fill-gaps to interpolate them",
+        flags=["--fill-gaps"],
     )
 
 
@@ -111,4 +112,5 @@ def _uneven(heights: NDArray[np.float64], gaps: NDArray[np.float64], study: str)
         f"widest from {heights[widest]:.6g} to {heights[widest + 1]:.6g} mm",
         expected=f"equal within {EVEN:.0%}",
         hint="the missing files, or --resample-slices to interpolate an even stack",
+        flags=["--resample-slices"],
     )

@@ -121,6 +121,7 @@ def pixel_of(frame: ImageFrame, settings: ReadSettings) -> tuple[float, float]:
             found="PixelSpacing = missing",
             expected="the distance of the pixels in mm",
             hint="--spacing x y z",
+            flags=["--spacing"],
         )
     x, y = float(frame.spacing[0]), float(frame.spacing[1])
     check_spacing((x, y), ("PixelSpacing", "PixelSpacing"), file=frame.path.name, hint="a corrected header")
@@ -173,6 +174,7 @@ def _along(
             found="ImagePositionPatient = missing" if lost else "slices = 1",
             expected="two positions and more, or the distance of the slices",
             hint="--spacing-z mm" if lost else "the folder of the series, or --spacing-z mm",
+            flags=["--spacing-z"],
         )
     note = "slices without positions, in the order of their numbers" if lost else "one slice"
     levels = np.arange(count, dtype=np.float64)

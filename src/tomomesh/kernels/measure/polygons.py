@@ -58,8 +58,8 @@ def distance_to_polygon(ring: NDArray[np.float64], points: NDArray[np.float64], 
             share = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
             squared = 0.0
             for axis in range(2):
-                foot = ring[i, axis] + share * (ring[last, axis] - ring[i, axis])
-                squared += (points[n, axis] - foot) ** 2
+                nearest = ring[i, axis] + share * (ring[last, axis] - ring[i, axis])
+                squared += (points[n, axis] - nearest) ** 2
             best = min(best, squared)
             last = i
         distance[n] = np.sqrt(best)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Any
 
+from ..summary import limit_in_words
 from .series_table import TILTED, table_of
-from .summary import limit_in_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

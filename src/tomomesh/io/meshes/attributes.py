@@ -1,4 +1,4 @@
-"""What every writer of meshes is given beside the mesh, and what 32-bit formats ask of it."""
+"""Attributes of a mesh that a writer is given beside it, and the single precision of 32-bit formats."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Written:
-    """What a writer is given beside the mesh.
+class MeshAttributes:
+    """Unit, frame and fields of a mesh that is written.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Written:
         return signature(self.unit, self.frame)
 
 
-def single(vertices: NDArray[np.float64], path: str | Path, *, kind: str) -> NDArray[np.float32]:
+def single_precision(vertices: NDArray[np.float64], path: str | Path, *, kind: str) -> NDArray[np.float32]:
     """Return 32-bit coordinates, if they still tell the vertices apart.
 
     Parameters

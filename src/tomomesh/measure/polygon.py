@@ -1,4 +1,4 @@
-"""Closed polygons in the plane of a slice."""
+"""Closed polygons in a plane: what they enclose, how long their sides are, what lies inside."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.som.polygons import distance_to_polygon, inside_polygon
+from ..kernels.measure.polygons import distance_to_polygon, inside_polygon
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,6 +36,12 @@ def distance(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[
 
 
 def area(ring: NDArray[np.float64]) -> float:
-    """Return the signed area of a closed polygon."""
-    x, y = ring.T
-    return float(0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+    """Return the area of a closed polygon (u, 2); below 0 where the inside is on its right."""
+    x, y = (ring - ring[0]).T
+    return float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)
+
+
+def side_lengths(line: NDArray[np.float64], *, closed: bool = True) -> NDArray[np.float64]:
+    """Return the lengths of the sides of a line (u, 2), the first from point 0 to point 1."""
+    onward = np.roll(line, -1, axis=0) if closed else line[1:]
+    return np.asarray(np.sqrt(((onward - line[: len(onward)]) ** 2).sum(axis=1)))

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
-from ..settings import Settings, option_of, parameters
+from ...settings import Settings, option_of, parameters
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
+
+    from ...errors import TomomeshError
+    from ...io import Series
 
 VALUES = {"--spacing": "X Y Z", "--spacing-z": "MM"}
 """What stands for the values that only the user knows."""
 SERIES, SELECT = "--series", "--select"
 
 
-def next_step(found: dict[str, Any], study: str, settings: Settings) -> str | None:
+def next_step(
+    found: dict[str, Any], study: str, settings: Settings, fault: TomomeshError | None, series: Sequence[Series]
+) -> str | None:
     """Return the command that goes on: a first mesh, or `inspect` with the flag that helps; None where none does.
 
     Parameters
@@ -26,14 +30,18 @@ def next_step(found: dict[str, Any], study: str, settings: Settings) -> str | No
         Its words on a command line.
     settings : Settings
         Those given; the command repeats them.
+    fault : TomomeshError or None
+        What refuses the study.
+    series : sequence of Series
+        Those to choose from.
     """
     given = list(_given(settings))
-    if not found["refused"]:
+    if fault is None:
         return " ".join(["tomomesh reconstruct", _first_try(found, study), *given, "-o mesh.stl"])
-    if SELECT in _named(found["refused"]):
+    if SELECT in fault.flags:
         chosen = f"--labels-in {study} {SELECT} {min(found['segments'], default='N')}"
         return " ".join(["tomomesh reconstruct", chosen, *given, "-o mesh.stl"])
-    helping = list(_helping(found))
+    helping = list(_helping(fault, series))
     return " ".join(["tomomesh inspect", study, *given, *helping]) if helping else None
 
 
@@ -56,24 +64,18 @@ def _given(settings: Settings) -> Iterator[str]:
             yield " ".join([option_of(entry.name), *(f"{one:.10g}" for one in values)])
 
 
-def _helping(found: dict[str, Any]) -> Iterator[str]:
+def _helping(fault: TomomeshError, series: Sequence[Series]) -> Iterator[str]:
     """Yield the flags that a refusal names; for a choice of series, the best one's number and what it needs."""
-    flags = _named(found["refused"])
+    flags = [*fault.flags]
     if SERIES in flags:
-        best = max(found["series"], key=_promise)
-        yield f"{SERIES} {best['number']}"
-        flags += _named(best["refused"])
+        best = max(series, key=_promise)
+        yield f"{SERIES} {best.number}"
+        flags += best.refused.flags if best.refused else ()
     for flag in dict.fromkeys(flags):
         if flag != SERIES:
             yield f"{flag} {VALUES[flag]}" if flag in VALUES else flag
 
 
-def _named(refusal: dict[str, Any] | None) -> list[str]:
-    """Return the flags that an error suggests."""
-    hint = refusal["error"].partition(" Try: ")[2] if refusal else ""
-    return re.findall(r"--[a-z]+(?:-[a-z]+)*", hint)
-
-
-def _promise(series: dict[str, Any]) -> tuple[bool, int, int]:
+def _promise(series: Series) -> tuple[bool, int, int]:
     """Rank series: those that can be read, or that a flag helps, then by their slices, the first of equals."""
-    return not series["refused"] or bool(_named(series["refused"])), series["slices"], -series["number"]
+    return series.refused is None or bool(series.refused.flags), series.slices, -series.number

@@ -22,7 +22,7 @@ from tomomesh.model.cubes import MARGIN, SIDE, keys_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tomomesh.cuberille.bitmasks import Board
+    from tomomesh.cuberille.bitmasks import Bitmask
 
     Cells = NDArray[np.int64]
 
@@ -53,22 +53,22 @@ def everywhere(blocks: Blocks) -> Cells:
     return blocks.cells(~blocks.empty())
 
 
-def stepped(blocks: Blocks, board: Board, offset: tuple[int, int, int]) -> Board:
+def stepped(blocks: Blocks, bitmask: Bitmask, offset: tuple[int, int, int]) -> Bitmask:
     """Return the set of cubes whose neighbor in a direction is in a set."""
     found = blocks.empty()
     for block, z in product(range(len(blocks)), range(8)):
-        found[block, z] = neighbor(board, blocks.table, block, z, *offset)
+        found[block, z] = neighbor(bitmask, blocks.table, block, z, *offset)
     return found
 
 
-class TestBoard:
+class TestBitmask:
     @law(100)
     @given(cells=scattered())
     def test_lists_the_cells_that_it_was_made_of(self, cells: Cells) -> None:
         blocks = Blocks.around(cells, 0)
-        board = blocks.board_of(cells)
-        assert as_set(blocks.cells(board)) == as_set(cells)
-        assert blocks.count(board).sum() == len(as_set(cells))
+        bitmask = blocks.bitmask_of(cells)
+        assert as_set(blocks.cells(bitmask)) == as_set(cells)
+        assert blocks.count(bitmask).sum() == len(as_set(cells))
 
     @law(40)
     @given(cells=scattered(), seed=seeds)
@@ -77,7 +77,7 @@ class TestBoard:
         one, other = (Blocks.around(some, 3) for some in (cells, again))
         assert one.keys.tobytes() == other.keys.tobytes()
         assert one.table.tobytes() == other.table.tobytes()
-        assert one.board_of(cells).tobytes() == other.board_of(again).tobytes()
+        assert one.bitmask_of(cells).tobytes() == other.bitmask_of(again).tobytes()
 
     @law(100)
     @given(word=st.integers(0, 2**64 - 1))
@@ -88,7 +88,7 @@ class TestBoard:
     def test_reaches_the_ends_of_the_range_of_keys(self, corner: int) -> None:
         cells = corner + np.array([[0, 0, 0], [7, 3, 9]])
         blocks = Blocks.around(cells, 64)
-        assert as_set(blocks.cells(blocks.grown(blocks.board_of(cells)))) >= as_set(cells - 1)
+        assert as_set(blocks.cells(blocks.grown(blocks.bitmask_of(cells)))) >= as_set(cells - 1)
 
     def test_is_not_begun_where_it_would_not_fit(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, "MOST", 100)
@@ -101,7 +101,7 @@ class TestNeighbors:
     @given(cells=scattered(), offset=st.sampled_from(OFFSETS))
     def test_are_those_of_a_set(self, cells: Cells, offset: tuple[int, int, int]) -> None:
         blocks = Blocks.around(cells, 1)
-        found = as_set(blocks.cells(stepped(blocks, blocks.board_of(cells), offset)))
+        found = as_set(blocks.cells(stepped(blocks, blocks.bitmask_of(cells), offset)))
         assert found == as_set(cells - np.array(offset))
 
     @law(25)
@@ -118,21 +118,23 @@ class TestNeighbors:
         blocks = Blocks.around(cells, steps)
         reach = range(-steps, steps + 1)
         wanted = set().union(*(as_set(cells + offset) for offset in product(reach, repeat=3)))
-        assert as_set(blocks.cells(blocks.grown(blocks.board_of(cells), steps))) == wanted
+        assert as_set(blocks.cells(blocks.grown(blocks.bitmask_of(cells), steps))) == wanted
 
     @law(30)
     @given(cells=scattered(), seed=seeds, steps=st.integers(0, 4))
     def test_are_walked_to_through_a_set(self, cells: Cells, seed: int, steps: int) -> None:
         rng = np.random.default_rng(seed)
         blocks = Blocks.around(cells, 2)
-        grown = blocks.cells(blocks.grown(blocks.board_of(cells), 2))
+        grown = blocks.cells(blocks.grown(blocks.bitmask_of(cells), 2))
         open_ = as_set(grown[rng.random(len(grown)) < 0.5])
         wanted = as_set(cells)
         for _ in range(steps):
             beside = {tuple(np.add(cell, offset).tolist()) for cell in wanted for offset in OFFSETS}
             wanted = wanted | (beside & open_)
-        board = blocks.spread(blocks.board_of(cells), blocks.board_of(np.array(sorted(open_)).reshape(-1, 3)), steps)
-        assert as_set(blocks.cells(board)) == wanted
+        bitmask = blocks.spread(
+            blocks.bitmask_of(cells), blocks.bitmask_of(np.array(sorted(open_)).reshape(-1, 3)), steps
+        )
+        assert as_set(blocks.cells(bitmask)) == wanted
 
 
 class TestFlood:
@@ -144,7 +146,7 @@ class TestFlood:
         all_cells = everywhere(blocks)
         closed = all_cells[np.random.default_rng(seed).random(len(all_cells)) < share]
         reached = blocks.beyond()
-        flood(~blocks.board_of(closed), blocks.table, reached)
+        flood(~blocks.bitmask_of(closed), blocks.table, reached)
         low = all_cells.min(axis=0) - 1
         open_ = np.ones(all_cells.max(axis=0) - low + 2, bool)
         open_[tuple((closed - low).T)] = False
@@ -160,8 +162,8 @@ class TestFlood:
         blocks = Blocks.around(cells, 0)
         labels, _ = ndimage.label(open_)
         seed = cells[labels[open_] == np.bincount(labels[open_]).argmax()][:1]
-        reached = blocks.board_of(seed)
-        flood(blocks.board_of(cells), blocks.table, reached)
+        reached = blocks.bitmask_of(seed)
+        flood(blocks.bitmask_of(cells), blocks.table, reached)
         assert_same(blocks.cells(reached), np.argwhere(labels == labels[tuple(seed[0])]))
 
 
@@ -183,7 +185,7 @@ class TestSpace:
         cells = np.concatenate([box(*side) for side in sides])
         blocks = Blocks.around(cells, 1)
         reached = blocks.beyond()
-        flood(~blocks.board_of(cells), blocks.table, reached)
+        flood(~blocks.bitmask_of(cells), blocks.table, reached)
         all_cells = everywhere(blocks)
         outside = ((all_cells < cells.min()) | (all_cells > cells.max())).any(axis=1)
         assert_same(blocks.cells(reached), all_cells[outside])
@@ -194,14 +196,14 @@ class TestSpace:
         cells = cells[(cells != [20, 20, 47]).any(axis=1)]
         blocks = Blocks.around(cells, 1)
         reached = blocks.beyond()
-        flood(~blocks.board_of(cells), blocks.table, reached)
+        flood(~blocks.bitmask_of(cells), blocks.table, reached)
         assert blocks.spaces == 2
         assert (reached[len(blocks) :] == ~np.uint64(0)).all()
         assert blocks.count(reached).sum() == EDGE**3 * len(blocks) - len(cells)
 
 
-def test_threads_change_no_board(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_threads_change_no_bitmask(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "SHARE", 3)
     cells = np.random.default_rng(0).integers(-20, size(60, 5), (200, 3))
     one, two = (Blocks.around(cells, 4, threads=n) for n in (1, 2))
-    assert one.grown(one.board_of(cells), 3).tobytes() == two.grown(two.board_of(cells), 3).tobytes()
+    assert one.grown(one.bitmask_of(cells), 3).tobytes() == two.grown(two.bitmask_of(cells), 3).tobytes()

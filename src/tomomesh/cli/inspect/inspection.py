@@ -5,13 +5,13 @@ from __future__ import annotations
 import shlex
 from typing import TYPE_CHECKING, Any
 
-from .. import io
-from ..errors import FormatError, GeometryError, ResourceError, TomomeshError, UnreadableError
+from ... import io
+from ...errors import FormatError, GeometryError, ResourceError, TomomeshError, UnreadableError
 from .next_step import next_step
 
 if TYPE_CHECKING:
-    from ..io import Listing, Series
-    from ..settings import Settings
+    from ...io import Listing, Series
+    from ...settings import Settings
 
 REFUSALS = (FormatError, GeometryError, ResourceError, UnreadableError)
 """What reading raises because of the study; anything else is the user's or the program's fault."""
@@ -49,7 +49,7 @@ def inspected(study: str, settings: Settings, *, typed: str = "") -> dict[str, A
     if typed:
         _rename(found, study, typed.split()[0])
     path = f"./{study}" if study.startswith("-") else study  # else it would look like an option
-    return found | {"next": next_step(found, typed or shlex.quote(path), settings)}
+    return found | {"next": next_step(found, typed or shlex.quote(path), settings, fault, listing.series)}
 
 
 def _rename(found: dict[str, Any], study: str, name: str) -> None:
@@ -61,8 +61,8 @@ def _rename(found: dict[str, Any], study: str, name: str) -> None:
 
 def _surveyed(study: str, settings: Settings, listing: Listing) -> tuple[dict[str, Any], TomomeshError | None]:
     """Return what is in a study, or the error that refuses it; a single file that is broken says nothing more."""
-    from ..segmentation.crop import crop
-    from ..segmentation.survey import survey
+    from ...segmentation.crop import crop
+    from ...segmentation.survey import survey
 
     try:
         volume = io.read_volume(study, settings=settings.read)

@@ -1,0 +1,1 @@
+"""What `tomomesh inspect` finds, tells, and suggests."""

@@ -1,0 +1,86 @@
+"""An option for each parameter: its spellings, its numbers, and its line in the help."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from ..settings import LAYERS, MANY, asked_by, limits_of, option_of, parameters
+
+if TYPE_CHECKING:
+    from dataclasses import Field
+
+ALIASES = {"cell_mm": "--cell"}
+"""Second spellings: the numbers of a cloud need not be millimeters."""
+
+
+def spellings(name: str) -> list[str]:
+    """Return the options by which a parameter goes."""
+    return [option_of(name), *([ALIASES[name]] if name in ALIASES else [])]
+
+
+SEVERAL = tuple(
+    option for _, entry in parameters() if entry.metadata["length"] == (1, 3) for option in spellings(entry.name)
+)
+"""Options that take one number or three."""
+LISTED = tuple(option_of(entry.name) for _, entry in parameters() if entry.metadata["length"] == LAYERS)
+"""Options that take one number, or several with commas between."""
+
+
+def add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
+    """Add the option of a parameter to a group of options."""
+    meta, options, name = entry.metadata, spellings(entry.name), entry.name
+    if meta["kind"] is bool:
+        action = "store_false" if entry.default else "store_true"
+        text = (f"do not {meta['help']}" if entry.default else meta["help"]).replace("%", "%%")
+        group.add_argument(asked_by(entry), dest=name, action=action, default=argparse.SUPPRESS, help=text)
+        return
+    one_or_three, many = options[0] in SEVERAL, meta["length"] == MANY
+    listed = meta["length"] == LAYERS
+    several = meta["length"][0] if meta["length"] and not (one_or_three or many or listed) else None
+    group.add_argument(
+        *options,
+        dest=name,
+        type=_numbers if one_or_three or listed else _whole_numbers if many else meta["kind"],
+        nargs=several,
+        choices=meta["choices"] or None,
+        metavar=None if meta["choices"] else _metavar(name, meta),
+        default=argparse.SUPPRESS,
+        help=_help(entry),
+    )
+
+
+def _metavar(name: str, meta: Any) -> Any:
+    if meta["length"] in (MANY, LAYERS):
+        return "N[,N...]" if meta["length"] == MANY else "X[,X...]"
+    if meta["length"] in ((), (1, 3)):
+        return "X [Y Z]" if meta["length"] else {int: "N", float: "X", str: "NAME"}[meta["kind"]]
+    if meta["metavar"]:
+        return meta["metavar"]
+    return (
+        tuple(name[0].upper() + str(n) for n in range(meta["length"][0])) if meta["length"] == (2,) else ("X", "Y", "Z")
+    )
+
+
+def _help(entry: Field[Any]) -> str:
+    """Put a parameter's text, unit, limits and default into one line."""
+    meta, default = entry.metadata, entry.default
+    if isinstance(default, tuple):
+        default = " ".join(f"{value:g}" for value in default)
+    facts = [meta["unit"], "" if meta["choices"] else limits_of(entry)]
+    facts += [] if default is None else [f"default {default:g}" if isinstance(default, float) else f"default {default}"]
+    told = "; ".join(fact for fact in facts if fact)
+    return (f"{meta['help']} ({told})" if told else str(meta["help"])).replace("%", "%%")
+
+
+def _whole_numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split(","))
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(float(part) for part in text.split(","))
+
+
+# argparse names them where they fail: "invalid whole numbers, joined by commas, value"
+_whole_numbers.__name__ = "whole numbers, joined by commas,"
+_numbers.__name__ = "numbers, joined by commas,"
