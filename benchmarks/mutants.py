@@ -128,10 +128,11 @@ def mutants(area: str) -> list[Mutant]:
 
 def run(copy: Path, test: str, plain: bool) -> None:
     """Run a file of tests in this process, a fork that knows nothing of the program yet, and end it."""
-    os.environ |= {"XDG_CACHE_HOME": str(copy / "cache"), "NUMBA_DISABLE_JIT": str(int(plain))}
+    home = str(copy / "src")
+    os.environ |= {"XDG_CACHE_HOME": str(copy / "cache"), "NUMBA_DISABLE_JIT": str(int(plain)), "PYTHONPATH": home}
     import_module("numba.core.config").reload_config()
     os.chdir(copy)
-    sys.path.insert(0, str(copy / "src"))
+    sys.path.insert(0, home)
     with Path(os.devnull).open("w") as nothing, redirect_stdout(nothing), redirect_stderr(nothing):
         os._exit(pytest.main([*ALWAYS, test]))
 

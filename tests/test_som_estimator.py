@@ -138,6 +138,18 @@ class TestFit:
         with pytest.raises(ValueError, match="features"):
             som.partial_fit(blobs(d=4))
 
+    @pytest.mark.parametrize(("neighborhood", "farthest"), [("bubble", 1), ("auto", 6), ("gaussian", 6)])
+    def test_trains_on_in_its_own_neighborhood(self, neighborhood: str, farthest: int) -> None:
+        """At a last radius of 1 one input moves the winner and its neighbors alone, or all up to 6 radii from it."""
+        line = np.linspace(0, 1, 400)[:, None] * [1.0, 2.0]
+        som = SOM(40, topology="chain", neighborhood=neighborhood, radius=(5.0, 1.0), epochs=5).fit(line)
+        before = som.codebook_.copy()
+        winner = int(som.predict(before[20:21] + 1e-3)[0])
+        moved = np.flatnonzero(
+            (som.partial_fit(np.add(before[20:21], [[0.01, -0.01]])).codebook_ != before).any(axis=1)
+        )
+        assert np.abs(moved - winner).max() == farthest
+
 
 class TestFiles:
     def test_keep_all_of_it(self, tmp_path: Path) -> None:

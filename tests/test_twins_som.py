@@ -155,3 +155,14 @@ class TestMatch:
         np.testing.assert_allclose(wanted[np.arange(n), winners], wanted.min(axis=1), rtol=1e-4, atol=1e-4)
         if whole and d < 9:
             np.testing.assert_array_equal(winners, wanted.argmin(axis=1))
+
+
+@law(40)
+@given(seed=seeds, d=st.integers(9, 40), scale=st.sampled_from([1e-4, 1.0, 1e4]))
+def test_near_ties_in_many_dimensions_are_decided_in_double_at_every_scale(seed: int, d: int, scale: float) -> None:
+    rng = np.random.default_rng(seed)
+    apart = rng.normal(size=(12, d))
+    codebook = scale * np.concatenate([apart, apart + 1e-7 * rng.normal(size=apart.shape)])
+    inputs = scale * (apart[rng.integers(12, size=30)] + 1e-2 * rng.normal(size=(30, d)))
+    nearest = [int(((codebook - one) ** 2).sum(axis=1).argmin()) for one in inputs]
+    np.testing.assert_array_equal(products.best_matching_units(codebook, inputs)[0], nearest)
