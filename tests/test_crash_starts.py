@@ -77,7 +77,7 @@ def test_a_cache_that_cannot_be_written(study: Path, tmp_path: Path) -> None:
 
 def test_eight_cold_starts_at_once(tmp_path: Path) -> None:
     """All compile and write the same kernels; `benchmarks/crash.py` does it with whole runs."""
-    program = "from tomomesh.kernels.som import polygons; from tomomesh.kernels.isosurface import surface_nets"
+    program = "from tomomesh.kernels.measure import polygons; from tomomesh.kernels.isosurface import surface_nets"
     env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cold")}
     starts = [
         subprocess.Popen([sys.executable, "-c", program], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
