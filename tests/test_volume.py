@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from itertools import permutations, product
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds
+from tomomesh.errors import GeometryError
+from tomomesh.io.volumes.affine import check_affine, check_spacing
 from tomomesh.model.volume import Volume
 
 if TYPE_CHECKING:
@@ -110,3 +113,25 @@ class TestVolume:
         indices = rng.uniform(-10, 500, (20, 3))
         back = np.linalg.solve(volume.affine[:3, :3], (volume.to_mm(indices) - volume.affine[:3, 3]).T).T
         np.testing.assert_allclose(back, indices, rtol=0, atol=1e-9)
+
+
+class TestFlatFrames:
+    """Axes are refused where they are shorter than a millionth, or span less than a thousandth of their box."""
+
+    @pytest.mark.parametrize("axis", range(3))
+    @pytest.mark.parametrize(("length", "refused"), [(0.99e-6, True), (1.01e-6, False), (1e-9, True), (0.0, True)])
+    def test_by_the_shortest_axis(self, axis: int, length: float, refused: bool) -> None:
+        affine = affine_of((2, 0, 1), (1, -1, 1))
+        affine[:3, axis] *= length / SPACING[axis]
+        check = check_affine, check_spacing
+        given = (affine,), (np.where(np.arange(3) == axis, length, SPACING), "xyz")
+        for refuse, values in zip(check, given, strict=True):
+            with pytest.raises(GeometryError) if refused else nullcontext():
+                refuse(*values, file="a.nii", hint="--spacing x y z")  # type: ignore[operator]
+
+    @pytest.mark.parametrize(("share", "refused"), [(0.99e-3, True), (1.01e-3, False)])
+    def test_by_their_volume(self, share: float, refused: bool) -> None:
+        affine = np.eye(4)
+        affine[:3, 2] = 5 * np.sqrt(1 - share**2), 0, 5 * share
+        with pytest.raises(GeometryError) if refused else nullcontext():
+            check_affine(affine, file="a.nii", hint="--spacing x y z")
