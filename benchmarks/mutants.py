@@ -7,7 +7,7 @@ A mutant is a copy of the program with one small fault: a comparison turned, a s
 each is shown to the tests that are there for the area: first those that name the module, then the others, the quick
 ones first. A test that fails has killed it, or work that takes twice as long as without a fault and ten CPU seconds
 more. All that lies in an error's message, a type or a docstring stays as it is. Kernels are compiled once, in a cache
-of the copy's own; a mutant of a kernel runs in plain Python, before laws and twins alone.
+of the copy's own; a mutant of a kernel runs in plain Python, where some files of tests are left out.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ AREAS: dict[str, tuple[list[str], str]] = {
     "dynamics": (["dynamics/*.py", "kernels/dynamics/*.py"],
         "laws_fit laws_rest collapse laws_attributes laws_surface convergence space voxels sheet clouds ways"),
     "points": (["segmentation/sample.py", "pointcloud/*.py", "kernels/pointcloud/*.py"],
-        "laws_clouds laws_spacing laws_attributes laws_tiles laws_lines laws_surface laws_matching convergence open "
-        "sheet clouds forecast two_walls ways end_to_end"),
+        "twins_points laws_clouds laws_spacing laws_attributes laws_tiles laws_lines laws_surface laws_matching convergence "
+        "open sheet clouds forecast two_walls ways end_to_end"),
     "frames": (["io/frames.py", "io/volumes/affine.py", "model/volume.py"],
         "volume io_nifti_pairs places frames io_nifti io_nrrd io_metaimage io_outputs io_agreement"),
 }  # fmt: skip
@@ -61,8 +61,8 @@ OPPOSITE: dict[type[ast.AST], Any] = {ast.Lt: ast.Gt, ast.Gt: ast.Lt, ast.LtE: a
 SILENT = (ast.Raise, ast.JoinedStr, ast.Import, ast.ImportFrom)
 BEFORE = ("numba", "scipy.spatial", "scipy.stats", "trimesh", "nibabel", "pydicom", "skimage.measure", "matplotlib")
 """Libraries that are imported once, for all mutants."""
-LONG = ("laws_surface",)
-"""Laws that take too long in plain Python."""
+LONG = {"laws_surface", "convergence", "two_walls", "ways", "forecast", "end_to_end", "several_contours"}
+"""Files of tests that take too long in plain Python."""
 PATIENCE, LEAST_S = 2, 10
 ALWAYS = ("-x", "-q", "-p", "no:cacheprovider", "-n0", "--no-header")
 
@@ -177,10 +177,8 @@ def passes(copy: Path, names: list[str], plain: bool, most_s: int = resource.RLI
 
 
 def shown(mutant: Mutant, area: str) -> list[str]:
-    """Return an area's files of tests in the order that kills soonest; a kernel sees laws and twins only."""
-    names = AREAS[area][1].split()
-    if mutant.plain:
-        names = [name for name in names if name.startswith(("laws", "twins")) and name not in LONG]
+    """Return an area's files of tests in the order that kills soonest; a kernel sees those that are short."""
+    names = [name for name in AREAS[area][1].split() if not (mutant.plain and name in LONG)]
     return sorted(names, key=lambda name: mutant.module not in (ROOT / "tests" / f"test_{name}.py").read_text())
 
 
