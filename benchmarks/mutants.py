@@ -46,8 +46,8 @@ AREAS: dict[str, tuple[list[str], str]] = {
     "dynamics": (["dynamics/*.py", "kernels/dynamics/*.py"],
         "laws_fit laws_rest collapse laws_attributes laws_surface convergence space voxels sheet clouds ways"),
     "points": (["segmentation/sample.py", "pointcloud/*.py", "kernels/pointcloud/*.py"],
-        "twins_points laws_clouds laws_spacing laws_attributes laws_tiles laws_lines laws_surface laws_matching convergence "
-        "open sheet clouds forecast two_walls ways end_to_end"),
+        "twins_points laws_clouds laws_spacing laws_attributes laws_tiles laws_lines laws_surface laws_matching "
+        "convergence open sheet clouds forecast two_walls ways end_to_end"),
     "frames": (["io/frames.py", "io/volumes/affine.py", "model/volume.py"],
         "volume io_nifti_pairs places frames io_nifti io_nrrd io_metaimage io_outputs io_agreement"),
 }  # fmt: skip
