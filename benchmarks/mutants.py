@@ -44,7 +44,8 @@ AREAS: dict[str, tuple[list[str], str]] = {
         "laws_bitmasks laws_cubes laws_tracker laws_faces laws_shell twins_geometry laws_spacing laws_surface laws_fit "
         "forecast two_walls"),
     "dynamics": (["dynamics/*.py", "kernels/dynamics/*.py"],
-        "laws_fit laws_rest collapse laws_attributes laws_surface convergence space voxels sheet clouds ways"),
+        "twins_dynamics laws_fit laws_rest collapse laws_attributes laws_surface convergence space voxels sheet "
+        "clouds ways"),
     "points": (["segmentation/sample.py", "pointcloud/*.py", "kernels/pointcloud/*.py"],
         "twins_points laws_clouds laws_spacing laws_attributes laws_tiles laws_lines laws_surface laws_matching "
         "convergence open sheet clouds forecast two_walls ways end_to_end"),
