@@ -11,6 +11,7 @@ from scipy.spatial.distance import cdist
 
 from conftest import law, seeds
 from tomomesh.pointcloud.cloud import Cloud
+from tomomesh.pointcloud.samples import distinct
 from tomomesh.pointcloud.whole import Whole
 from tomomesh.progress import silent
 
@@ -60,3 +61,10 @@ def test_strays_are_those_far_from_all_others_of_their_region(seed: int, thin: f
     expected = spacing > np.minimum(1.7 * usual, 8 * np.median(spacing))
     np.testing.assert_array_equal(stray, expected)
     np.testing.assert_allclose(found, np.where(expected, usual, np.sqrt(spacing * usual)), rtol=1e-12)
+
+
+@law(60)
+@given(seeds, st.integers(1, 60), st.integers(1, 4))
+def test_each_position_is_known_once_by_x_then_y_then_z(seed: int, count: int, places: int) -> None:
+    positions = np.random.default_rng(seed).integers(0, places, (count, 3)).astype(float)
+    np.testing.assert_array_equal(distinct(positions), np.array(sorted(set(map(tuple, positions)))))
