@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
-from conftest import law, seeds
+from conftest import law, seeds, sphere
 from tomomesh.pointcloud.cloud import Cloud
-from tomomesh.pointcloud.samples import distinct
+from tomomesh.pointcloud.samples import distinct, settle_points
 from tomomesh.pointcloud.whole import Whole
 from tomomesh.progress import silent
 
@@ -68,3 +68,10 @@ def test_strays_are_those_far_from_all_others_of_their_region(seed: int, thin: f
 def test_each_position_is_known_once_by_x_then_y_then_z(seed: int, count: int, places: int) -> None:
     positions = np.random.default_rng(seed).integers(0, places, (count, 3)).astype(float)
     np.testing.assert_array_equal(distinct(positions), np.array(sorted(set(map(tuple, positions)))))
+
+
+def test_each_of_four_passes_over_the_points_is_told() -> None:
+    told: list[tuple[int, int]] = []
+    settle_points(sphere(60), progress=lambda _, done, count: told.append((done, count)))
+    assert {count for _, count in told} == {240}
+    assert {(done - 1) // 60 for done, _ in told} == {0, 1, 2, 3}
