@@ -48,7 +48,7 @@ def surface_by_contours(found: Segmentation[Contours], settings: Settings, progr
     finest, sampling = min(found.volume.spacing_mm[:2]), found.sampling
     return surface_of_slices(
         found.points, slices_of_rings(found.points), settings, progress, finest=finest, bridged=sampling.bridged,
-        encloses=sampling.volume_mm3,
+        rings_mm3=sampling.volume_mm3,
     )  # fmt: skip
 
 

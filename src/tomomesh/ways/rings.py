@@ -50,7 +50,7 @@ def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress
     """Turn the neurons of all slices into a closed surface."""
     sampling = found.sampling
     return surface_on_cubes(
-        found.points, sampling.spacing_mm, settings, progress, encloses=sampling.volume_mm3
+        found.points, sampling.spacing_mm, settings, progress, rings_mm3=sampling.volume_mm3
     )  # fmt: skip
 
 

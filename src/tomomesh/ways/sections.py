@@ -67,7 +67,7 @@ def shell_found(
             "closing": shell.closing,
             "added_for_composition": shell.added,
             "two_sided": held.two_sided,
-            "holds": held.tight,
+            "tight": held.tight,
         },
         "surface": {
             "found": faces.count,

@@ -21,7 +21,7 @@ from ..model.columns import any_of
 from ..model.mesh import QuadMesh, TriMesh
 from ..model.points import PointSet
 from ..pointcloud.samples import settle_points
-from ..results import Segmentation, Surface, window_volume
+from ..results import Enclosed, Segmentation, Surface
 from ..segmentation.sample import Sampling
 from ..segmentation.space import is_wall, pieces_of, regions_in_space, train_space
 from ..settings import SURFACES
@@ -185,7 +185,7 @@ def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progre
     made, taken_back, crossing = mesh.value
     surface = Surface(
         found.points, rough, rough.triangulated(), made, np.empty(0, np.int32), trace=rest.value.trace,
-        filled=rest.value.filled, crossing=crossing, rests_on=found.source.places, encloses_mm3=window_volume(found),
+        filled=rest.value.filled, crossing=crossing, rests_on=found.source.places, encloses=Enclosed.window(found),
     )  # fmt: skip
     fitted = fit_found(rest.value.trace, len(rough.vertices), taken_back=taken_back)
     filled: Stage[None] = Stage(None, {"fit": {"filled_faces": int(rest.value.filled.sum())}})
