@@ -93,6 +93,40 @@ class TestHead:
         assert made.report["quality"]["volume_over_rings"] == pytest.approx(1, abs=0.01)
 
 
+@pytest.mark.skipif(not COMPILED, reason="rings on many slices, minutes without the compiler")
+class TestSolids:
+    """Rings, chains and grids that lie inside of a solid do not bound it."""
+
+    @pytest.mark.parametrize(
+        ("changes", "written"),
+        [
+            ({}, True),
+            ({"signal": "region"}, False),
+            ({"contours": "components", "signal": "region"}, False),
+            ({"contours": "loops"}, True),
+            ({"network": "chain"}, False),
+            ({"network": "sphere", "neurons": 162}, True),
+            ({"network": "sphere", "neurons": 162, "signal": "region"}, False),
+        ],
+    )
+    def test_half_of_the_window_is_enclosed_or_it_is_refused(self, changes: dict[str, Any], written: bool) -> None:
+        away = np.sqrt(((np.indices((32, 32, 32)) - 15.5) ** 2).sum(axis=0))
+        volume = Volume.from_stored((100 * np.clip(13.5 - away, 0, 1)).astype(np.float32), np.eye(4))
+        settings = Settings().replace(lower=50.0, **changes)
+        share = share_or_refusal(volume, settings)
+        assert (share is not None) == written
+        if written:
+            mesh = reconstruct(volume, settings).mesh
+            assert mesh.face_volumes.sum() == pytest.approx(4 / 3 * np.pi * 13**3, rel=0.06)
+
+    def test_one_slice_may_be_flat(self) -> None:
+        disk = np.zeros((5, 24, 24), np.float32)
+        disk[2] = 100 * (np.hypot(*(np.indices((24, 24)) - 11.5)) < 9)
+        made = reconstruct(Volume.from_stored(disk, np.eye(4)), lower=50.0, signal="region", neurons=24)
+        assert made.report["fit"]["converged"] is None
+        assert any("lie in a plane" in warning for warning in made.report["warnings"])
+
+
 class TestClouds:
     @law(20)
     @given(seed=seeds, hole=st.floats(0.0, 1.2), attraction=st.sampled_from(["auto", "nearest"]))

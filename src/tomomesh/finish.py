@@ -29,7 +29,7 @@ HINTS = {
     "rings": "no --no-caps, a larger --cell-mm or --closing, --network none, or --allow-leaks",
     "slices": "--allow-leaks, which writes it all the same",
     "samples": "a larger --cell or --closing, or --allow-leaks",
-    "window": "more --neurons, --network none, or --allow-leaks",
+    "window": "--signal boundary, more --neurons, --network none, or --allow-leaks",
 }
 """What may help, by what a mesh should have enclosed."""
 FAR = 2.0

@@ -203,7 +203,7 @@ def _of_points(report: dict[str, Any]) -> str:
 
 def _of_filled(report: dict[str, Any]) -> str:
     """Say what share of the mesh lies where a cloud has no points."""
-    if "filled_faces" not in report.get("fit", {}):
+    if report.get("fit", {}).get("converged") is None or "filled_faces" not in report["fit"]:
         return ""
     share = report["fit"]["filled_faces"] / report["quality"]["faces"]
     return f", {100 * share:.3g} % of the faces filled, not measured"

@@ -53,6 +53,27 @@ class Shell:
 
 
 @dataclass(frozen=True)
+class Inside:
+    """What is known of the inside of a surface: the volume of its rings and of its window, 0 where there are none.
+
+    `may_be_flat` tells whether the points may rightly lie in a plane, as those of a flat cloud or of one slice do.
+    """
+
+    rings_mm3: float = 0.0
+    window_mm3: float = 0.0
+    may_be_flat: bool = True
+
+    def or_more(self, hollow: Enclosed) -> Enclosed:
+        """Return the largest that is known; what a shell of cubes is hollow by counts where there are no rings."""
+        rings = Enclosed("rings", self.rings_mm3) if self.rings_mm3 else hollow
+        return max(rings, Enclosed("window", self.window_mm3), key=lambda one: one.volume)
+
+
+ANYTHING = Inside()
+"""Where nothing is known."""
+
+
+@dataclass(frozen=True)
 class Rest:
     """A mesh at rest, its faces that pass through others, and the point that draws each vertex."""
 
@@ -62,7 +83,7 @@ class Rest:
 
 
 def surface_on_cubes(
-    points: PointSet, spacing: float, settings: Settings, progress: Progress, *, rings_mm3: float = 0.0
+    points: PointSet, spacing: float, settings: Settings, progress: Progress, asked: Inside = ANYTHING
 ) -> Stage[Surface]:
     """Turn points into a closed surface that rests on them.
 
@@ -73,8 +94,8 @@ def surface_on_cubes(
         r, the edge of the cubes where none is asked for.
     settings : Settings
     progress : callable
-    rings_mm3 : float
-        Volume that the rings enclose; 0 where there are none.
+    asked : Inside
+        What is known of the inside.
 
     Raises
     ------
@@ -83,10 +104,10 @@ def surface_on_cubes(
     """
     shell = _close(points.positions, spacing, settings, progress)
     tracked = measured("cuberille", _track, shell.value)
-    walls = _walls(shell.value, points.positions, settings, rings_mm3)
+    walls = _walls(shell.value, points.positions, settings, asked)
     cubes, cuberille, _ = tracked.value
     smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.smoothing)
-    encloses = Enclosed("rings", rings_mm3) if rings_mm3 else shell.value.hollow
+    encloses = asked.or_more(shell.value.hollow)
     rest = _fit(tracked.value, smoothed.value, points.positions, settings, progress, still=walls.value == 2)
     if settings.cubes.allow_leaks and walls.value == 1 and encloses.share(rest.value.mesh) < LEAST:
         walls = walls_found(2, LEAKY_SHELL)  # found out by the fit alone: it goes back to where it began
@@ -122,15 +143,15 @@ def _track(shell: Shell) -> Tracked:
     return shell.held.faces.only(shell.taken).over(shell.grid)
 
 
-def _walls(shell: Shell, positions: Floats, settings: Settings, rings_mm3: float) -> Stage[int]:
+def _walls(shell: Shell, positions: Floats, settings: Settings, asked: Inside) -> Stage[int]:
     """Count the walls of a shell; refuse one that leaks, unless that was allowed or the points are flat.
 
     One of two is not fitted: both walls would rest on the same points, and the mesh would fall flat.
     """
-    cell = float(shell.grid.cell_mm.min())
+    cell, rings_mm3 = float(shell.grid.cell_mm.min()), asked.rings_mm3
     if shell.volume >= LEAST * rings_mm3 if rings_mm3 else shell.held.tight:
         return walls_found(1)
-    if is_flat(positions, cell):
+    if asked.may_be_flat and is_flat(positions, cell):
         return walls_found(2, FLAT_SHELL)
     if settings.cubes.allow_leaks:
         return walls_found(2, LEAKY_SHELL)
@@ -161,6 +182,7 @@ def _fit(
     )  # fmt: skip
     mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))
     ring = OneRing.of_quads(cuberille.quads.astype(np.int32), len(mesh.vertices), threads)
-    mesh, taken_back, crossing = untangle(mesh, smoothed.vertices, ring, Crossings(threads), cuberille.vertices)
+    tangled = Crossings(threads, single=True)
+    mesh, taken_back, crossing = untangle(mesh, smoothed.vertices, ring, tangled, cuberille.vertices)
     told = fit_found(None if still else rest.trace, len(mesh.vertices), collapsed=collapsed, taken_back=taken_back)
     return folded(Rest(rest, mesh, crossing), told)

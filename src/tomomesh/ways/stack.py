@@ -33,7 +33,7 @@ def surface_of_stack(points: Points, settings: Settings, progress: Progress) -> 
 
 def surface_of_slices(
     cloud: PointSet, slices: Slices, settings: Settings, progress: Progress,
-    *, finest: float | None = None, bridged: int = 0, rings_mm3: float | None = None, unit: str = "mm",
+    *, finest: float | None = None, bridged: int = 0, encloses: Enclosed | None = None, unit: str = "mm",
 ) -> Stage[Surface]:  # fmt: skip
     """Turn contours into a closed surface.
 
@@ -47,8 +47,8 @@ def surface_of_slices(
         Edge of the voxels between the slices, where no cell is asked for.
     bridged : int
         Gaps of the contours that were bridged.
-    rings_mm3 : float, optional
-        Volume that the rings of a study enclose; that of the slices where not given.
+    encloses : Enclosed, optional
+        What a study's rings or its window enclose; the slices do where not given.
     unit : str
     """
     asked = settings.cubes
@@ -58,10 +58,9 @@ def surface_of_slices(
         allow_leaks=asked.allow_leaks, fit=settings.fit, threads=settings.run.threads, progress=progress,
     )  # fmt: skip
     made = closed.value
-    encloses = Enclosed("slices", made.encloses) if rings_mm3 is None else Enclosed("rings", rings_mm3)
     surface = Surface(
         cloud, made.boundary.cuberille, made.rest.smoothed, made.mesh, made.rest.nearest, filled=made.filled,
-        cavities=made.boundary.cavities, encloses=encloses,
+        cavities=made.boundary.cavities, encloses=encloses or Enclosed("slices", made.encloses),
     )  # fmt: skip
     spaced = points_found(cloud, slices.spacing, unit=unit, bridged=bridged)
     return folded(
@@ -69,7 +68,7 @@ def surface_of_slices(
         closed,
         spaced,
         boundary_found(made.boundary, made.rest),
-        _stack_found(made, slices, of_study=rings_mm3 is not None),
+        _stack_found(made, slices, of_study=encloses is not None),
     )
 
 
