@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..measure.rings import assess_contours
 from ..results import Enclosed, Segmentation
 from ..segmentation.contours.inputs import share_of_holes, slices_with_several
@@ -19,6 +17,7 @@ from .sections import body_of_cubes, missed, points_found
 from .way import CUBES, POINTS, SPRINGS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from ..model.networks import Networks
@@ -50,8 +49,7 @@ def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> 
 def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Turn the neurons of all slices into a closed surface."""
     sampling, window = found.sampling, Enclosed.window(found)
-    flat = min(np.ptp(found.mask.nonzero(), axis=1)) == 0
-    inside = Inside(sampling.volume_mm3, window.volume, may_be_flat=bool(flat))
+    inside = Inside(sampling.volume_mm3, window.volume, found.mask)
     return surface_on_cubes(found.points, sampling.spacing_mm, settings, progress, inside)
 
 
