@@ -71,6 +71,8 @@ class Crossings:
         moved : (n,) bool array, optional
             The vertices that have moved since the last call, all marked ones among them, where nothing else changed.
         """
+        if not len(mesh.faces):
+            return np.zeros(0, np.bool_)
         if self._tree is None or moved is None:
             self._tree = Tree.of_faces(mesh, threads=self._threads)
             return marked_in(self._tree, threads=self._threads)
