@@ -10,7 +10,7 @@ import numpy as np
 from ..kernels.measure.bvh import curve_keys, enclose_leaves, enclose_nodes, order_keys
 from ..kernels.measure.triangles import nearest_simplices
 from ..kernels.threads import in_blocks
-from ..model.rows import for_kernels
+from ..model.columns import for_kernels
 from ..progress import Progress, silent
 
 if TYPE_CHECKING:

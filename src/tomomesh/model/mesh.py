@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .rows import for_kernels
+from .columns import for_kernels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
-from .rows import for_kernels
+from .columns import for_kernels
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
