@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import GeometryError
 from ..kernels.dynamics.projections import first_projections, nearest_places, renew_projections
 from ..kernels.dynamics.quads import split_quads
 from ..kernels.dynamics.springs import advance
@@ -107,15 +108,32 @@ def fit_to_surface(
     Returns
     -------
     SurfaceFit
+
+    Raises
+    ------
+    GeometryError
+        Where no vertex has samples near: all of the surface would be made up.
     """
     projector = _Projector.under(vertices, ring, samples, threads)
     steps = _EulerSteps(vertices, ring, projector, edge, settings, threads)
     state, trace = iterate(steps, settings.max_steps, progress)
     filled, normals = _unprojected(state.projections), state.projections[:, 1:].copy()
+    _require_any(~filled, samples)
     if filled.any():
         normals[filled] = ring.normals(state.places)[filled]
     places, faces = _split(state.places, normals, ring)
     return SurfaceFit(places, faces, filled, trace)
+
+
+def _require_any(met: NDArray[np.bool_], samples: Samples) -> None:
+    """Refuse a mesh and samples of which none have met."""
+    if not met.any():
+        raise GeometryError(
+            "no vertex of the mesh lies near a sample, so nothing of the surface would be measured",
+            found=f"{len(samples.positions)} sample(s), {float(np.median(samples.spacing)):.4g} apart",
+            expected="samples all over the surface, and a mesh near them",
+            hint="more points, a larger --cell, or of a network in space more --neurons",
+        )
 
 
 def _unprojected(projections: Floats) -> NDArray[np.bool_]:
@@ -207,6 +225,7 @@ class _Projector:
         index = Index.of(samples.positions, SIGHT * float(np.median(width)))
         rows = rows[index.order]
         vertex = _nearest(rows, vertices, index.frame[3], threads)
+        _require_any(vertex >= 0, samples)
         facing = np.einsum("ij,ij->i", ring.normals(vertices)[vertex], rows[:, 3:6])
         rows[:, 3:6] *= np.where(facing < 0, -1.0, 1.0)[:, None]
         if (vertex < 0).any():

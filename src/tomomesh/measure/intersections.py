@@ -75,6 +75,8 @@ class Crossings:
         moved : (n,) bool array, optional
             The vertices that have moved since the last call, all marked ones among them, where nothing else changed.
         """
+        if not len(mesh.faces):
+            return np.zeros(0, np.bool_)
         if self._single:
             mesh = mesh.moved(mesh.vertices.astype(np.float32).astype(np.float64))
         if self._tree is None or moved is None:

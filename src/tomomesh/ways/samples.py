@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import GeometryError
 from ..model.columns import box
 from ..pointcloud.forecast import require_room_for_points
 from ..pointcloud.samples import Samples, settle_points
@@ -30,6 +31,8 @@ MANY = 250_000
 NOISE = (1.8, 1.3, 1.0)
 """Edges of the cubes over the noise of the points, tried one after the other: small cubes show noise as handles,
 large ones fill thin parts."""
+STEPS = 64
+"""Steps between numbers that the extent of a cloud must hold: its cubes and the vertices between are smaller yet."""
 STRAYS = 0.05
 """Share of strays among the points over which a result is warned of."""
 
@@ -43,9 +46,21 @@ def lowest_corner(points: Points) -> Floats:
 def settle(points: Points, settings: Settings, progress: Progress) -> Stage[Samples]:
     """Let each point settle on the surface around it; strays are left out. Positions count from the lowest corner."""
     positions = points.cloud.positions
+    _require_digits(positions)
     require_room_for_points(len(positions))
     samples = settle_points(positions - lowest_corner(points), threads=settings.run.threads, progress=progress)
     return _samples_found(len(positions), samples, settings.run.units)
+
+
+def _require_digits(positions: Floats) -> None:
+    """Refuse points so far from the origin that numbers beside theirs are as far apart as the points, or as 1 is."""
+    step, extent = float(np.spacing(np.abs(positions).max())), float(np.ptp(positions, axis=0).max())
+    if step * STEPS > (extent or 1.0):
+        raise GeometryError(
+            "the points are too far from the origin for their extent",
+            found=f"extent = {extent:.4g}, distance = {np.abs(positions).max():.4g}",
+            expected=f"an extent of {STEPS} steps of 64-bit numbers there at least", hint="--local-origin",
+        )  # fmt: skip
 
 
 def _samples_found(count: int, samples: Samples, unit: str) -> Stage[Samples]:
