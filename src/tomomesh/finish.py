@@ -24,9 +24,11 @@ if TYPE_CHECKING:
     from .stage import Later
 
 PLAUSIBLE = 0.15
-"""Difference from the volume of the rings over which a result is warned of."""
+"""Difference from the volume of the rings over which a result is warned of. Measured on the built-in head and an MR:
+0.4 and 0.0 %, and 4.5 % around loops."""
 FAR = 2.0
-"""Distance of the surface from one point in twenty, slice distances, from which a result is warned of."""
+"""Distance of the surface from one point in twenty, slice distances, from which a result is warned of. Measured on the
+built-in head and an MR: 0.1 and 0.3, and 5 where a network in space leaves out bays."""
 
 
 def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage[Surface], tuple[Later, ...]]:

@@ -55,7 +55,8 @@ SLAB = 1.25
 """Noise, in sampling distances, over which points fill a slab rather than a surface, and are merged. Chosen: half and
 twice of it change no case of benchmarks/constants.py."""
 COARSER = 1.4
-"""Growth of the sampling distance where points are merged."""
+"""Growth of the sampling distance where points are merged: about the root of two, so that half of them are left.
+Chosen: half and twice of it change no case of benchmarks/constants.py."""
 LEAST_POINTS = 16
 """Points under which there is no telling what surface they describe: they stay where they are. Chosen: half and twice
 of it change no case of benchmarks/constants.py."""
