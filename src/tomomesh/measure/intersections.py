@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 BLOCK = 2_000
 """Leaves of the tree handled at once: some milliseconds."""
 ROOM = 1_000
-"""Pairs looked for first."""
+"""Pairs looked for first: where there are more, room is made. No result depends on it."""
 
 
 def self_intersections(mesh: TriMesh, *, threads: int = 0, progress: Progress = silent) -> NDArray[np.bool_]:

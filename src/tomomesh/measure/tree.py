@@ -148,6 +148,7 @@ def _boxes(vertices: Floats, simplices: Ints, threads: int) -> Floats:
 def _along_curve(vertices: Floats, simplices: Ints, threads: int) -> Ints:
     """Order simplices along a space-filling curve, the large ones after all others."""
     some = vertices[simplices[:: max(len(simplices) // SOME, 1)]]
+    # all but the farthest 1 % on each side, and a span more around: places far off do not coarsen the curve
     low, high = np.percentile(some.mean(axis=1), [1, 99], axis=0)
     span = max(float((high - low).max()), 1e-300)
     usual = max(float(np.median(np.ptp(some, axis=1).max(axis=1))), 1e-9 * span)

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 GOLDEN = (1 + 5**0.5) / 2
+"""The golden ratio: the corners of three rectangles of these sides are those of an icosahedron."""
 
 
 def icosphere(frequency: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -27,9 +27,11 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 CROWDED = 0.25
-"""Share of the slices with several components side by side over which one network a slice is warned of."""
+"""Share of the slices with several components side by side over which one network a slice is warned of. A warning's
+threshold, chosen: no mesh depends on it."""
 HOLES = 0.15
-"""Area of the holes in the slices over that of the window from which an outline that fills them is warned of."""
+"""Area of the holes in the slices over that of the window from which an outline that fills them is warned of. A
+warning's threshold, chosen: no mesh depends on it."""
 
 
 def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Networks]]:

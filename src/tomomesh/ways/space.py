@@ -42,11 +42,13 @@ if TYPE_CHECKING:
 
 NOTHING = np.empty(0)
 REACH = 1.5
-"""Most that a vertex moves in a step of the fit, sides of the finer mesh."""
+"""Most that a vertex moves in a step of the fit, sides of the finer mesh. Chosen: half of it changes the distance by
++0.0 %, twice by +0.1 %."""
 FLAT = 1e-9
 """Least volume, in its area to the power of 1.5: a ball has .09, and what lies flat has rounding errors alone."""
 LEFT_OUT = 0.01
-"""Share of the window in small pieces over which a network in space is warned of."""
+"""Share of the window in small pieces over which a network in space is warned of. A warning's threshold, chosen: no
+mesh depends on it."""
 
 
 @dataclass(frozen=True)
