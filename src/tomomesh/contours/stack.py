@@ -64,6 +64,8 @@ class ContourSurface:
         Edge of the voxels, and what it would be without a limit on the memory.
     voxels : int
         Voxels interpolated.
+    encloses : float
+        Volume between the slices: the areas of their insides times the distance.
     """
 
     boundary: Boundary
@@ -76,6 +78,7 @@ class ContourSurface:
     edge: float
     asked_edge: float
     voxels: int
+    encloses: float
 
     @property
     def mesh(self) -> TriMesh:
@@ -145,8 +148,14 @@ def contour_surface(
     return ContourSurface(
         edges, rest, np.isinf(away), len(planar),
         sum(len(outlined.rings) for outlined in found), sum(len(outlined.open) for outlined in found),
-        max(outlined.reach for outlined in found), stack.edge, asked, levels.size,
+        max(outlined.reach for outlined in found), stack.edge, asked, levels.size, _between(stack),
     )  # fmt: skip
+
+
+def _between(stack: Stack) -> float:
+    """Return the volume between the slices, by trapezoids of the areas of their insides."""
+    areas = [sum(part.moments.area for part in parts) for parts in stack.slices]
+    return float(np.trapezoid(areas, stack.heights))
 
 
 def _known(rings: Sequence[Floats]) -> tuple[Floats, Outline]:

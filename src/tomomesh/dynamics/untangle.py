@@ -29,7 +29,11 @@ BACK = 0.25
 
 
 def untangle(
-    mesh: TriMesh, origin: NDArray[np.float64], ring: OneRing, tangled: Tangled
+    mesh: TriMesh,
+    origin: NDArray[np.float64],
+    ring: OneRing,
+    tangled: Tangled,
+    lattice: NDArray[np.float64] | None = None,
 ) -> tuple[TriMesh, int, NDArray[np.bool_]]:
     """Smooth a mesh where it passes through itself, and take it back towards where it came from.
 
@@ -42,6 +46,9 @@ def untangle(
         The neighbors of its vertices.
     tangled : callable
         Marks the faces (m,) of a mesh that pass through others; told which vertices have moved since it last did.
+    lattice : (n, 3) float array, optional
+        Its vertices as corners of cubes, for what is left then: a low-pass filter of many passes may make a mesh pass
+        through itself before any fit, squares between cubes never do.
 
     Returns
     -------
@@ -62,6 +69,13 @@ def untangle(
         if count >= GENTLE:
             vertices += BACK * (origin - vertices)
         mesh = mesh.moved(np.where(region[:, None], vertices, mesh.vertices))
+        marked = tangled(mesh, region)
+    for count in range(ROUNDS):
+        if lattice is None or not marked.any():
+            break
+        region = _around(mesh, marked, count)
+        moved |= region
+        mesh = mesh.moved(np.where(region[:, None], lattice, mesh.vertices))
         marked = tangled(mesh, region)
     return mesh, int(moved.sum()), marked
 

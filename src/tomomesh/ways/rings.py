@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..measure.rings import assess_contours
-from ..results import Segmentation
+from ..results import Enclosed, Segmentation
 from ..segmentation.contours.inputs import share_of_holes, slices_with_several
 from ..segmentation.sample import Sampling, sample
 from ..segmentation.training import regions, train_study
 from ..segmentation.window import by_layer
 from ..som.schedules import schedule_warning
 from ..stage import Stage, folded, measured, timed
-from .cubes import surface_on_cubes
+from .cubes import Inside, surface_on_cubes
 from .sections import body_of_cubes, missed, points_found
 from .way import CUBES, POINTS, SPRINGS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from ..model.networks import Networks
@@ -48,10 +49,10 @@ def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> 
 
 def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Turn the neurons of all slices into a closed surface."""
-    sampling = found.sampling
-    return surface_on_cubes(
-        found.points, sampling.spacing_mm, settings, progress, encloses=sampling.volume_mm3
-    )  # fmt: skip
+    sampling, window = found.sampling, Enclosed.window(found)
+    flat = min(np.ptp(found.mask.nonzero(), axis=1)) == 0
+    inside = Inside(sampling.volume_mm3, window.volume, may_be_flat=bool(flat))
+    return surface_on_cubes(found.points, sampling.spacing_mm, settings, progress, inside)
 
 
 def _layers(kept: Selected, settings: Settings) -> NDArray[np.bool_] | None:

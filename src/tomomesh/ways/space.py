@@ -21,7 +21,7 @@ from ..model.columns import any_of
 from ..model.mesh import QuadMesh, TriMesh
 from ..model.points import PointSet
 from ..pointcloud.samples import settle_points
-from ..results import Segmentation, Surface, window_volume
+from ..results import Enclosed, Segmentation, Surface
 from ..segmentation.sample import Sampling
 from ..segmentation.space import is_wall, pieces_of, regions_in_space, train_space
 from ..settings import SURFACES
@@ -181,15 +181,14 @@ def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progre
     rough = faces.value
     ring = OneRing.of_quads(rough.quads.astype(np.int32), len(rough.vertices), threads)
     rest = measured("fit", _fitted, rough, ring, found.source, settings, progress)
-    mesh = measured("untangle", untangle, rest.value.mesh, rough.vertices, ring, Crossings(threads))
+    mesh = measured("untangle", untangle, rest.value.mesh, rough.vertices, ring, Crossings(threads, single=True))
     made, taken_back, crossing = mesh.value
     surface = Surface(
         found.points, rough, rough.triangulated(), made, np.empty(0, np.int32), trace=rest.value.trace,
-        filled=rest.value.filled, crossing=crossing, rests_on=found.source.places, encloses_mm3=window_volume(found),
+        filled=rest.value.filled, crossing=crossing, rests_on=found.source.places, encloses=Enclosed.window(found),
     )  # fmt: skip
-    fitted = fit_found(rest.value.trace, len(rough.vertices), taken_back=taken_back)
-    filled: Stage[None] = Stage(None, {"fit": {"filled_faces": int(rest.value.filled.sum())}})
-    return folded(surface, apart, faces, rest, mesh, fitted, filled)
+    fitted = fit_found(rest.value.trace, len(rough.vertices), taken_back=taken_back, filled=rest.value.filled)
+    return folded(surface, apart, faces, rest, mesh, fitted)
 
 
 @timed("smooth")
@@ -210,7 +209,7 @@ def _untangled(network: SpaceNetwork, threads: int) -> tuple[TriMesh, int]:
     """Return a network as a mesh that faces outward and does not pass through itself, if smoothing can help it."""
     mesh = TriMesh(network.codebook, network.lattice.faces)
     ring = OneRing.of_edges(mesh.edges, len(mesh.vertices), threads)
-    mesh, moved, _ = untangle(mesh, mesh.vertices, ring, Crossings(threads))
+    mesh, moved, _ = untangle(mesh, mesh.vertices, ring, Crossings(threads, single=True))
     outward = mesh.face_volumes.sum() > 0
     return mesh if outward else replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1])), moved
 
