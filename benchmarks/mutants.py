@@ -37,7 +37,7 @@ AREAS: dict[str, tuple[list[str], str]] = {
     "networks": (["som/*.py", "kernels/som/*.py"],
         "twins_som laws_networks som_measures som_training som_topologies som_estimator laws_lines several_contours"),
     "cuberille": (["cuberille/*.py", "kernels/cuberille/*.py"],
-        "laws_cubes twins_geometry laws_walls laws_boards laws_shell laws_surface laws_fit forecast"),
+        "laws_cubes twins_geometry laws_faces laws_bitmasks laws_tracker laws_shell laws_surface laws_fit forecast"),
     "dynamics": (["dynamics/*.py", "kernels/dynamics/*.py"],
         "collapse laws_fit convergence laws_surface space voxels laws_attributes sheet clouds"),
     "points": (["segmentation/sample.py", "pointcloud/*.py", "kernels/pointcloud/*.py"],

@@ -100,7 +100,7 @@ class Levels:
 
 
 @dataclass(frozen=True)
-class Crossings:
+class LevelCrossings:
     """Where a surface crosses the lines between voxels.
 
     Attributes
@@ -121,7 +121,7 @@ class Crossings:
 
 def crossings(
     levels: Levels, inner: NDArray[np.int32], steps: NDArray[np.int32], added: NDArray[np.bool_]
-) -> Crossings:
+) -> LevelCrossings:
     """Find where the boundary of a window crosses the lines between voxels.
 
     Parameters
@@ -136,10 +136,10 @@ def crossings(
 
     Returns
     -------
-    Crossings
+    LevelCrossings
     """
     outer, stepped = inner + steps, levels.stepped(inner, steps)
     share = np.full(len(inner), 0.5) if stepped else np.where(added, BARELY, levels.crossed(inner, outer))
     beyond = (levels.nearest(outer) != outer).any(axis=1)
     kinds = np.where(added, ADDED, np.where(beyond, BORDER, CROSSING)).astype(np.uint8)
-    return Crossings(inner + share[:, None] * steps, kinds, stepped)
+    return LevelCrossings(inner + share[:, None] * steps, kinds, stepped)

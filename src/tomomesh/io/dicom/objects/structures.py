@@ -147,8 +147,8 @@ def _chosen(structures: list[Structure], wanted: str | None, *, file: str) -> St
             expected="--structure with a number or a name of the table",
         )  # fmt: skip
     if not found or not found[0].contours:
-        held = _table(found or structures, file) or "0 structures"
-        raise EmptyError("there are no closed contours", file=file, found=held, expected=" or ".join(CLOSED))
+        listed = _table(found or structures, file) or "0 structures"
+        raise EmptyError("there are no closed contours", file=file, found=listed, expected=" or ".join(CLOSED))
     return found[0]
 
 
