@@ -325,7 +325,7 @@ class TestRealStudies:
         assert 1.0e6 < mesh.volume < 5.0e6
         advised = any("--contours components" in warning for warning in found.report["warnings"])
         assert advised == (options.get("lower") == 140)  # scalp and brain in one window are more than one ring
-        assert advised or found.report["cubes"]["holds"]
+        assert advised or found.report["cubes"]["tight"]
         assert advised or 0.8 < found.report["quality"]["volume_over_rings"] < 1.25
 
     def test_a_vendors_slab_of_four_slices_is_closed(self) -> None:

@@ -11,8 +11,11 @@ from __future__ import annotations
 import ast
 import builtins
 import inspect
+import json
+import keyword
 import pkgutil
 import re
+import tomllib
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -31,14 +34,27 @@ ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "tomomesh"
 MODULES = {path.relative_to(SOURCE).with_suffix("").as_posix(): path for path in sorted(SOURCE.rglob("*.py"))}
 PAGES = [*(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "ARCHITECTURE.md", "SECURITY.md"))]
-PAGES += sorted((ROOT / "docs").glob("*.md"))
+PAGES += [ROOT / "CHANGELOG.md", ROOT / "findings" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES += sorted((ROOT / "docs").glob("*.ipynb"))
 
 IMPLIED = ("__init__", "__main__")
 LONGEST, FULLEST = 300, 16
 SAYING_NOTHING = {"utils", "util", "helpers", "common", "base", "core", "misc"}
 
 DOTTED = re.compile(r"`([A-Za-z_]\w*(?:\.\w+)+)(?:\([^`]*\))?`")
-PATHS = re.compile(r"`((?:[\w.-]+/)+(?:[\w-]+\.py)?)`")
+PATHS = re.compile(r"`((?:[\w.-]+/)+(?:[\w-]+\.py)?)(?:: \w+)?`")
+BARE = re.compile(r"`([A-Za-z_]\w*)(?:\([^`]*\))?`")
+GONE = {"tomomesh.io.stated", "QuadMesh.cubes"}
+"""Names that the changelog says are no more."""
+FOREIGN = {
+    "fastmath", "parallel",  # options of Numba
+    "apply_rescale", "vtkContourFilter", "vtkFlyingEdges3D", "vtkMarchingCubes", "vtkSynchronizedTemplates3D",
+    "AnatomicalOrientation", "CenterOfRotation", "COLOR_0", "Description", "thicknesses",  # fields of formats
+    "dev54_t1", "dev54_synth_t1", "visit2", "X_mm",  # of files
+    "_deg", "_mm2", "_mm3", "_NAME",  # ends of names
+    "wall_p1_mm", "changed",  # a key with a number in it; what findings/run prints
+}  # fmt: skip
+"""What else stands between backticks alone in a page and is no name or word of ours."""
 OTHER_FILES = re.compile(r"\.(json|csv|toml|gz|tif|stl|ply|npz|cff|txt)$")
 
 
@@ -109,6 +125,34 @@ def is_key(name: str) -> bool:
     return name in rows or (key in rows and any(row.startswith(f"{section}.") for row in rows))
 
 
+def text_of(page: Path) -> str:
+    """Return what a page says of the present: of a changelog what is added and changed, of a notebook its prose."""
+    text = page.read_text(encoding="utf-8")
+    if page.suffix == ".ipynb":
+        return "\n".join("".join(cell["source"]) for cell in json.loads(text)["cells"] if cell["cell_type"] != "code")
+    if page.name == "CHANGELOG.md":
+        return "".join(re.findall(r"^### (?:Added|Changed)\n(.*?)(?=^##)", text, re.MULTILINE | re.DOTALL))
+    return text
+
+
+@cache
+def bare_names() -> set[str]:
+    """Return the names of modules, functions, classes, parameters and fields, and every whole text."""
+    found = set[str]()
+    for name, path in MODULES.items():
+        found |= set(name.split("/"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                found.add(node.name)
+            elif isinstance(node, ast.arg):
+                found.add(node.arg)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                found.add(node.value)
+            elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+                found.add(node.target.id)
+    return found
+
+
 def docstrings(tree: ast.Module) -> Iterator[tuple[str, set[str]]]:
     """Yield every docstring, and every text under a constant, with the parameters that are known there."""
     for node in ast.walk(tree):
@@ -156,18 +200,51 @@ class TestRooms:
         assert len([path for path in folder.glob("*.py") if path.stem not in IMPLIED]) <= FULLEST
 
 
+def test_the_drawing_of_the_layers_is_what_is_checked() -> None:
+    page = PAGES[2].read_text(encoding="utf-8").partition("## Who may import whom\n\n")[2]
+    (drawing,) = re.findall(r"\A((?: {4}.*\n)+)", page)
+    tools = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
+    (layers,) = (one["layers"] for one in tools["importlinter"]["contracts"] if one["name"] == "One direction")
+    checked = [named(layer.replace("tomomesh.", "")) for layer in layers]
+    assert [named(layer) for layer in drawing.split("->")] == checked
+
+
+def named(layer: str) -> set[str]:
+    return {name.strip() for name in layer.split("|")}
+
+
 class TestNames:
     @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
     def test_what_a_page_names_is_there(self, page: Path) -> None:
-        names = {name for name in DOTTED.findall(page.read_text(encoding="utf-8")) if not OTHER_FILES.search(name)}
+        names = {name for name in DOTTED.findall(text_of(page)) if not OTHER_FILES.search(name)} - GONE
         files = {name for name in names if name.endswith((".py", ".md"))}
         lost = {name for name in files if not any(ROOT.rglob(name))}
         code = {name for name in names - files if not is_key(name)}
         assert sorted(lost | {name for name in code if not (is_ours(name) or is_theirs(name))}) == []
 
     @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+    def test_what_a_page_names_without_its_module_is_there(self, page: Path) -> None:
+        names = set(BARE.findall(text_of(page))) - bare_names() - FOREIGN
+        lost = {name for name in names if not (is_key(name) or hasattr(builtins, name) or keyword.iskeyword(name))}
+        assert sorted(lost) == []
+
+    def test_names_that_are_no_more_are_found_out(self) -> None:
+        assert not any(is_ours(name) or is_theirs(name) for name in GONE)
+        assert bare_names().isdisjoint({"voxelwise", "studywise", "networkwise", *FOREIGN})
+        assert {"voxels", "surface_near_points", "LevelCrossings", "stiffness"} <= bare_names()
+
+    def test_what_the_notebook_imports_is_there(self) -> None:
+        (page,) = (page for page in PAGES if page.suffix == ".ipynb")
+        cells = json.loads(page.read_text(encoding="utf-8"))["cells"]
+        code = [ast.parse("".join(cell["source"])) for cell in cells if cell["cell_type"] == "code"]
+        taken = [node for cell in code for node in ast.walk(cell) if isinstance(node, ast.ImportFrom)]
+        names = [f"{node.module}.{name.name}" for node in taken for name in node.names]
+        assert len([name for name in names if name.startswith("tomomesh.")]) > 10
+        assert [name for name in names if not (is_ours(name) or is_theirs(name))] == []
+
+    @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
     def test_where_a_page_points_to_is_there(self, page: Path) -> None:
-        found = PATHS.findall(page.read_text(encoding="utf-8"))
+        found = PATHS.findall(text_of(page))
         assert [path for path in found if not ((ROOT / path).exists() or (SOURCE / path).exists())] == []
 
     @pytest.mark.parametrize("name", MODULES)

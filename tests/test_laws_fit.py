@@ -16,7 +16,7 @@ from conftest import composed, cuberille_of, law, seeds, size, solids, sphere
 from tomomesh.cuberille.leak_test import CLOSINGS, close_leaks
 from tomomesh.cuberille.partition import partition
 from tomomesh.dynamics.low_pass import adjacency, low_pass
-from tomomesh.dynamics.mass_spring import Fit, _EulerSteps, _State, fit
+from tomomesh.dynamics.mass_spring import Fit, _NearestState, _NearestSteps, fit
 from tomomesh.errors import UsageError
 from tomomesh.settings import FitSettings
 
@@ -320,9 +320,9 @@ def swinging(settings: FitSettings) -> tuple[Floats, Floats]:
     h = settings.step
     q = h**2 / (2 - h) ** 2
     place, none = np.array([[1 - q, 0, 0]]), np.full(1, -1, np.int32)
-    steps = _EulerSteps(place, points - grid.origin, NO_SPRINGS, np.zeros(1, np.int32), grid, settings, 1)
+    steps = _NearestSteps(place, points - grid.origin, NO_SPRINGS, np.zeros(1, np.int32), grid, settings, 1)
     velocity = np.array([[2 * q / h, 0, 0]])
-    state = _State(place - grid.origin, velocity, none, none, np.zeros(1, np.int32))
+    state = _NearestState(place - grid.origin, velocity, none, none, np.zeros(1, np.int32))
     speeds, places = list[float](), list[float]()
     for count in range(400):
         state, _ = steps.step(state, count)

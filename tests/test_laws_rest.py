@@ -132,7 +132,7 @@ class TestProjections:
     def test_springs_even_the_mesh_out_all_the_same(self, monkeypatch: pytest.MonkeyPatch) -> None:
         points = torus(size(3000, 900))
         even = spread(reconstruct_points(points))
-        monkeypatch.setattr(mls, "HOLD", 1.0)
+        monkeypatch.setattr(mls, "RESTORING", 1.0)
         assert even < 0.98 * spread(reconstruct_points(points))
 
     def test_little_is_left_to_do_after_the_last(self) -> None:
@@ -167,7 +167,7 @@ def rested_over(points: Floats) -> tuple[Any, Any, float]:
     samples, start = settle_points(points - origin), made.smoothed.vertices - origin
     ring = OneRing.of_quads(made.cuberille.quads.astype(np.int32), len(start))
     projector = mls._Projector.under(start, ring, samples, 1)
-    steps = mls._EulerSteps(start, ring, projector, edge_of(made), FitSettings(), 1)
+    steps = mls._ProjectionSteps(start, ring, projector, edge_of(made), FitSettings(), 1)
     state, trace = iterate(steps, 200, silent)
     assert trace.converged
     return state, projector, edge_of(made)

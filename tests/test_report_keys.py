@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 from tomomesh import Volume, reconstruct, reconstruct_points, segment
 
 GOLDEN = Path(__file__).parent / "report_keys.json"
+ROOT = Path(__file__).parents[1]
 STUDIES: dict[str, dict[str, Any]] = {
     "rings": {},
     "grid": {"network": "grid", "allow_leaks": True},
@@ -71,6 +73,17 @@ def found() -> dict[str, dict[str, Any]]:
 def test_a_report_has_the_keys_that_it_had(way: str, found: dict[str, dict[str, Any]]) -> None:
     golden = json.loads(GOLDEN.read_text(encoding="utf-8"))
     assert list(found[way].items()) == list(golden[way].items())
+
+
+def test_every_time_that_a_way_tells_has_a_row_and_no_other() -> None:
+    page = (ROOT / "docs" / "report.md").read_text(encoding="utf-8")
+    section = page.partition("## timings\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| `(?:timings\.)?(\w+)` \| s \|", section, re.MULTILINE)
+    sources = (path for path in (ROOT / "src").rglob("*.py") if path.name != "stage.py")
+    clocked = (re.findall(r'\b(?:timed|measured)\(\s*"(\w+)"', path.read_text(encoding="utf-8")) for path in sources)
+    assert sorted(rows) == sorted({f"{name}_s" for names in clocked for name in names} | {"total_s"})
+    told = {key for report in json.loads(GOLDEN.read_text(encoding="utf-8")).values() for key in report["timings"]}
+    assert told | {"truth_s"} == set(rows)
 
 
 if __name__ == "__main__":

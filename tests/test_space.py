@@ -177,7 +177,7 @@ class TestSurface:
 
     def test_warns_of_a_solid_that_is_shown_as_a_wall(self) -> None:
         asked: dict[str, Any] = {"lower": 100.0, "network": "sphere", "neurons": 162, "signal": "region"}
-        with pytest.raises(GeometryError, match="does not follow its window"):
+        with pytest.raises(GeometryError, match="does not follow what it was made from"):
             reconstruct(volume_of(ellipsoid()), **asked)
         made = reconstruct(volume_of(ellipsoid()), **asked, allow_leaks=True)
         assert_sound(made, genus=0)

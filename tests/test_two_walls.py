@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -18,7 +18,11 @@ from tomomesh.cli import main
 from tomomesh.errors import GeometryError
 from tomomesh.finish import finish
 from tomomesh.measure.intersections import self_intersections
+from tomomesh.results import Enclosed
 from tomomesh.settings import Settings
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 HALF = 0.5
@@ -37,20 +41,37 @@ def share_or_refusal(volume: Volume, settings: Settings) -> float | None:
         made = reconstruct(volume, settings)
     except GeometryError:
         return None
-    assert made.segmentation is not None
+    assert made.encloses is not None
     assert not self_intersections(made.mesh).any()
-    return float(made.mesh.face_volumes.sum()) / made.segmentation.sampling.volume_mm3
+    return float(made.mesh.face_volumes.sum()) / made.encloses.volume
 
 
 @pytest.mark.skipif(not COMPILED, reason="the built-in head, minutes without the compiler")
 class TestHead:
-    @pytest.mark.parametrize("paper", [False, True])
-    @pytest.mark.parametrize("factor", [0.7, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0])
-    def test_without_caps_it_is_whole_or_refused(self, factor: float, paper: bool) -> None:
+    @pytest.mark.parametrize(
+        ("changes", "written"),
+        [
+            ({"caps": False}, False),
+            ({"caps": False, "cell_factor": 1.5}, False),
+            ({"caps": False, "cell_factor": 2.0}, False),
+            ({"caps": False, "cell_factor": 3.0}, True),
+            ({"caps": True, "cell_factor": 2.0}, True),
+            ({"caps": True, "contours": "loops"}, True),
+            ({"caps": True, "network": "sphere"}, True),
+        ],
+    )
+    def test_it_is_whole_or_refused(self, changes: dict[str, Any], written: bool) -> None:
         volume, window = head()
-        base = Settings.for_paper() if paper else Settings()
-        share = share_or_refusal(volume, base.replace(**window, caps=False, cell_factor=factor))
+        share = share_or_refusal(volume, Settings().replace(**window, **changes))
+        assert (share is not None) == written
         assert share is None or share >= HALF
+
+    @pytest.mark.parametrize("factor", [0.7, 1.0, 1.5, 2.0, 3.0])
+    def test_so_it_is_under_paper(self, factor: float) -> None:
+        volume, window = head()
+        share = share_or_refusal(volume, Settings.for_paper().replace(**window, caps=False, cell_factor=factor))
+        assert share is None or share >= HALF
+        assert share_or_refusal(volume, Settings.for_paper().replace(**window)) == pytest.approx(1, abs=0.02)
 
     def test_twice_the_cell_is_refused_in_one_line(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         folder = tmp_path / "demo"
@@ -72,6 +93,40 @@ class TestHead:
         assert made.report["quality"]["volume_over_rings"] == pytest.approx(1, abs=0.01)
 
 
+@pytest.mark.skipif(not COMPILED, reason="rings on many slices, minutes without the compiler")
+class TestSolids:
+    """Rings, chains and grids that lie inside of a solid do not bound it."""
+
+    @pytest.mark.parametrize(
+        ("changes", "written"),
+        [
+            ({}, True),
+            ({"signal": "region"}, False),
+            ({"contours": "components", "signal": "region"}, False),
+            ({"contours": "loops"}, True),
+            ({"network": "chain"}, False),
+            ({"network": "sphere", "neurons": 162}, True),
+            ({"network": "sphere", "neurons": 162, "signal": "region"}, False),
+        ],
+    )
+    def test_half_of_the_window_is_enclosed_or_it_is_refused(self, changes: dict[str, Any], written: bool) -> None:
+        away = np.sqrt(((np.indices((32, 32, 32)) - 15.5) ** 2).sum(axis=0))
+        volume = Volume.from_stored((100 * np.clip(13.5 - away, 0, 1)).astype(np.float32), np.eye(4))
+        settings = Settings().replace(lower=50.0, **changes)
+        share = share_or_refusal(volume, settings)
+        assert (share is not None) == written
+        if written:
+            mesh = reconstruct(volume, settings).mesh
+            assert mesh.face_volumes.sum() == pytest.approx(4 / 3 * np.pi * 13**3, rel=0.06)
+
+    def test_one_slice_may_be_flat(self) -> None:
+        disk = np.zeros((5, 24, 24), np.float32)
+        disk[2] = 100 * (np.hypot(*(np.indices((24, 24)) - 11.5)) < 9)
+        made = reconstruct(Volume.from_stored(disk, np.eye(4)), lower=50.0, signal="region", neurons=24)
+        assert made.report["fit"]["converged"] is None
+        assert any("lie in a plane" in warning for warning in made.report["warnings"])
+
+
 class TestClouds:
     @law(20)
     @given(seed=seeds, hole=st.floats(0.0, 1.2), attraction=st.sampled_from(["auto", "nearest"]))
@@ -87,19 +142,59 @@ class TestClouds:
         assert made.mesh.face_volumes.sum() >= HALF * 4 / 3 * np.pi
 
 
+def ball(count: int, seed: int) -> NDArray[np.float64]:
+    points = np.random.default_rng(seed).normal(size=(count, 3))
+    return np.asarray(points / np.sqrt((points**2).sum(axis=1))[:, None])
+
+
+class TestUnfitted:
+    """A shell that is only smoothed may pass through itself before any fit: it is taken back to its cubes there."""
+
+    @law(25)
+    @given(
+        seed=seeds, passes=st.integers(0, 100), factor=st.floats(0.5, 1.5), closing=st.integers(0, 1),
+        attraction=st.sampled_from(["auto", "nearest"]),
+    )  # fmt: skip
+    def test_no_face_passes_through_another(
+        self, seed: int, passes: int, factor: float, closing: int, attraction: str
+    ) -> None:
+        asked: dict[str, Any] = {"smoothing": passes, "cell_factor": factor, "closing": closing}
+        stretched = ball(400, seed) * np.random.default_rng(seed).uniform(0.3, 3, 3)
+        made = reconstruct_points(stretched, attraction=attraction, stacks="none", allow_leaks=True, **asked)
+        assert not self_intersections(made.mesh).any()
+
+
+class TestStacks:
+    def test_a_stack_must_enclose_what_lies_between_its_slices(self) -> None:
+        angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+        rings = [[(10 - z) * np.cos(angle), (10 - z) * np.sin(angle), np.full(60, 2.0 * z)] for z in range(6)]
+        made = reconstruct_points(np.concatenate([np.stack(ring, axis=1) for ring in rings]))
+        assert made.report["way"]["name"] == "stack"
+        assert made.encloses is not None
+        truth = np.trapezoid([np.pi * (10 - z) ** 2 for z in range(6)], 2.0 * np.arange(6))
+        assert made.encloses.volume == pytest.approx(truth, rel=0.01)
+
+
+class TestCoarser:
+    def test_few_faces_are_no_second_wall(self) -> None:
+        made = reconstruct_points(ball(800, 1), target_faces=8)
+        assert len(made.mesh.faces) <= 8
+
+
 class TestPromise:
     def test_the_limit_is_the_stated_share(self) -> None:
         made = reconstruct_points(np.random.default_rng(0).normal(size=(800, 3)) @ np.diag([1, 1, 0.0]))
-        assert made.encloses_mm3 == 0
+        assert made.encloses is None
         rng = np.random.default_rng(1)
         ball = rng.normal(size=(800, 3))
         ball /= np.sqrt((ball**2).sum(axis=1))[:, None]
         sound = reconstruct_points(ball)
         volume = float(sound.mesh.face_volumes.sum())
-        assert 0 < sound.encloses_mm3 < volume
+        assert sound.encloses is not None
+        assert 0 < sound.encloses.volume < volume
         silent: Any = lambda *_: None  # noqa: E731
         for over, refused in ((0.49, True), (0.51, False)):
-            judged = replace(sound, encloses_mm3=volume / over)
+            judged = replace(sound, encloses=Enclosed("samples", volume / over))
             if refused:
                 with pytest.raises(GeometryError, match=r"49\.0%"):
                     finish(judged, Settings(), silent)

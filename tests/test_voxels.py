@@ -25,7 +25,7 @@ from tomomesh.io import read_mesh, read_points, read_volume
 from tomomesh.isosurface import surface_nets as nets
 from tomomesh.isosurface.crossings import CLOSEST
 from tomomesh.isosurface.diagonals import _is_odd
-from tomomesh.isosurface.surface_nets import TENSION, WALL
+from tomomesh.isosurface.surface_nets import MARGIN, TENSION
 from tomomesh.isosurface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
 from tomomesh.isosurface.well_composed import without_contacts
 from tomomesh.measure.intersections import self_intersections
@@ -250,13 +250,13 @@ class TestPlace:
 
     @pytest.mark.parametrize("stiffness", [0.05, 0.25, 1.0])
     def test_the_net_rests_where_its_forces_balance(self, stiffness: float) -> None:
-        """mean(p - c) + s mean(x_j - x) = 0, but where it presses a vertex against a wall of its cell."""
+        """mean(p - c) + s mean(x_j - x) = 0, but where it presses a vertex against a face of its cell."""
         found, _ = surface_of(ball(6))
         rest = voxel_surface(found, FitSettings(tolerance=1e-10, stiffness=stiffness, max_steps=5000)).net_fit
         net, x = found.net, rest.positions
         pull = _mean(found.crossings.positions - _mean(x, net.quads), net.fans)
         force = pull + TENSION * stiffness * (_mean(x, net.links) - x)
-        free = np.abs(x - net.low - 0.5) < 0.5 - WALL - 1e-12
+        free = np.abs(x - net.low - 0.5) < 0.5 - MARGIN - 1e-12
         assert rest.trace.converged
         assert free.mean() > 0.8
         assert np.abs(force[free]).max() < 1e-8

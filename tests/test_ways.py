@@ -57,7 +57,7 @@ def surface_toy(found, settings, progress):
     faces[inward] = faces[inward][:, ::-1]
     mesh = TriMesh(places, faces.astype(np.int64))
     rough = QuadMesh(mesh.vertices, np.empty((0, 4), np.int64))
-    stats = {"toy": {"corners": len(places)}, "fit": {"iterations": 0, "converged": None}}
+    stats = {"toy": {"corners": len(places)}}
     return Stage(Surface(found.points, rough, mesh, mesh, np.empty(0, np.int32)), stats, ("the toy fills all bays",))
 
 
@@ -104,7 +104,7 @@ class TestToy:
         assert found.report["way"] == {"name": "hull", "because": "with the toy"}
         assert found.report["toy"]["corners"] == len(found.mesh.vertices)
         sections = list(found.report)
-        assert sections.index("points") < sections.index("toy") < sections.index("fit")
+        assert sections.index("points") < sections.index("toy") < sections.index("quality")
         assert found.report["warnings"][:2] == ["--stiffness has no effect with the toy", "the toy fills all bays"]
         assert found.report["quality"]["sound"]
 

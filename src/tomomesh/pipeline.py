@@ -78,7 +78,7 @@ def reconstruct(
     made = begun.value.surface(found, settings, progress)
     done, later = finish(replace(made.value, segmentation=found), settings, progress)
     known = () if truth is None else (compare_with(done.value, truth),)
-    return replace(done.value, settings=settings, stages=(*found.stages, made, done, *known, *later))
+    return replace(done.value, way=found.way, settings=settings, stages=(*found.stages, made, done, *known, *later))
 
 
 def segment(
@@ -145,7 +145,7 @@ def reconstruct_points(
     begun = _begin(settings, changes, input=taken.value.input)
     made = begun.value.surface(taken.value, settings, progress)
     done, later = finish(replace(made.value, place=taken.value.place), settings, progress)
-    return replace(done.value, settings=settings, stages=(taken, begun, made, done, *later))
+    return replace(done.value, way=begun.value.name, settings=settings, stages=(taken, begun, made, done, *later))
 
 
 def _settled(settings: Settings | None, changes: dict[str, Any]) -> Settings:
@@ -162,9 +162,8 @@ def _input_of(volume: Volume) -> str:
 
 def _begin(settings: Settings, given: Collection[str], *, input: str) -> Stage[Way]:
     """Choose the way, and warn of what was asked for and changes nothing on it."""
-    name = choose_way(settings, input)
-    way = way_of(name)
-    section = {"name": name, "because": way.because(settings, input)}
+    way = way_of(choose_way(settings, input))
+    section = {"name": way.name, "because": way.because(settings, input)}
     return Stage(way, {"way": section}, tuple(without_effect(settings, given, input=input)))
 
 
@@ -175,4 +174,4 @@ def _segmented(
     kept = select_study(volume, labels, settings)
     assert begun.value.segment is not None
     found = begun.value.segment(kept.value, settings, progress)
-    return replace(found.value, settings=settings, stages=(folded(None, begun, kept, found),))
+    return replace(found.value, way=begun.value.name, settings=settings, stages=(folded(None, begun, kept, found),))

@@ -12,7 +12,7 @@ from .settings import Settings
 from .stage import Later, Stage, folded
 
 BEFORE = ("way", "study", "window", "networks", "rings", "points", "cubes", "stack", "voxels", "space")
-AFTER = ("surface", "fit", "quality", "print", "truth")
+AFTER = ("surface", "fit", "quality", "written", "mask", "print", "truth")
 """Sections in their order; what a way has of its own stands between the two."""
 PACKAGES = ("tomomesh", "numpy", "scipy", "numba")
 """What the result depends on."""
@@ -24,11 +24,14 @@ class Reported:
 
     Attributes
     ----------
+    way : str
+        A name of `tomomesh.ways.WAYS`.
     settings : Settings
     stages : tuple of Stage
         In their order; what is measured only for the report is made when that is first read.
     """
 
+    way: str = field(default="", repr=False, kw_only=True)
     settings: Settings = field(default_factory=Settings, repr=False, kw_only=True)
     stages: tuple[Stage[Any] | Later, ...] = field(default=(), repr=False, kw_only=True)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+import numpy as np
 from scipy.spatial import cKDTree
 
 from .model.columns import any_of
@@ -12,7 +13,6 @@ from .model.points import CAP
 from .report import Reported
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from .model.cubes import CubeGrid
@@ -60,9 +60,21 @@ class Segmentation(Reported, Generic[S]):
     source: S
 
 
-def window_volume(found: Segmentation[Any]) -> float:
-    """Return the volume of the voxels of a window, mm^3."""
-    return int(found.mask.sum()) * found.volume.voxel_mm3
+@dataclass(frozen=True)
+class Enclosed:
+    """What a mesh should enclose, at least: the volume inside its rings, its slices, its samples or its window."""
+
+    what: str
+    volume: float
+
+    @classmethod
+    def window(cls, found: Segmentation[Any]) -> Enclosed:
+        """Return the volume of the voxels of a window, mm^3."""
+        return cls("window", np.count_nonzero(found.mask) * found.volume.voxel_mm3)
+
+    def share(self, mesh: TriMesh) -> float:
+        """Return how much of it a mesh encloses; 1 where there is nothing to enclose."""
+        return float(mesh.face_volumes.sum()) / self.volume if self.volume > 0 else 1.0
 
 
 @dataclass(frozen=True)
@@ -107,8 +119,8 @@ class Surface(Reported):
         Faces that pass through others, where that is known.
     rests_on : (p, 3) float array or None
         The places that distances are measured from, where these are not the points.
-    encloses_mm3 : float
-        Volume that the rings, the window or the samples enclose, at least; 0 where they tell nothing.
+    encloses : Enclosed or None
+        What it should enclose; None where its way tells nothing of it, or where two walls were allowed.
     segmentation : Segmentation or None
         Stage one, where the points came from a study.
     place : Place or None
@@ -129,7 +141,7 @@ class Surface(Reported):
     borders: bool = False
     crossing: NDArray[np.bool_] | None = None
     rests_on: NDArray[np.float64] | None = None
-    encloses_mm3: float = 0.0
+    encloses: Enclosed | None = None
     segmentation: Segmentation[Any] | None = None
     place: Place | None = None
     part: Part | None = None

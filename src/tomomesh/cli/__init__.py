@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from . import shell
@@ -27,16 +27,13 @@ class _Terminated(BaseException):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run ``tomomesh`` and return its exit code; every fault is one line on stderr, and no signal handler is left."""
-    with _terminated():
+    """Run ``tomomesh`` and return its exit code; every fault is one line on stderr, and nothing stays set otherwise."""
+    with _terminated(), _printable(sys.stdout, sys.stderr):
         return _told(sys.argv[1:] if arguments is None else arguments)
 
 
 def _told(arguments: Sequence[str]) -> int:
     """Run, and put every fault into one line."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
     try:
         try:
             return _run(arguments)
@@ -68,6 +65,21 @@ def _run(arguments: Sequence[str]) -> int:
         return INTERRUPTED
     except _Terminated:
         return TERMINATED
+
+
+@contextmanager
+def _printable(*streams: TextIO) -> Iterator[None]:
+    """Print what a stream's encoding lacks as question marks, and put the streams back as they were."""
+    texts = [stream for stream in streams if isinstance(stream, io.TextIOWrapper)]
+    before = [stream.errors for stream in texts]
+    for stream in texts:
+        stream.reconfigure(errors="replace")
+    try:
+        yield
+    finally:
+        for stream, errors in zip(texts, before, strict=True):
+            with suppress(OSError, ValueError):  # what could not be written was told; a stream may be closed by now
+                stream.reconfigure(errors=errors)
 
 
 @contextmanager

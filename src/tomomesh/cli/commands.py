@@ -78,7 +78,7 @@ def _demo(chosen: Namespace) -> None:
             output=folder / "mesh.stl", points=folder / "points.ply", labels=folder / "labels.nii.gz",
             report=folder / "report.json", save_settings=folder / "settings.toml", figures=folder / "figures",
         )  # fmt: skip
-        write_surface(outputs, surface, settings, progress)
+        surface = write_surface(outputs, surface, settings, progress)
     _tell(chosen, surface.report, summary.of_surface(surface.report, str(chosen.output)))
 
 
@@ -101,19 +101,20 @@ def _reconstruct_one(chosen: Namespace, settings: Settings) -> Surface:
     with Bars(quiet=chosen.quiet) as progress:
         volume, labels = read_study(chosen, settings, progress)
         surface = reconstruct(volume, settings, labels=labels, progress=progress, **given_of(chosen))
-        write_surface(chosen, surface, settings, progress)
-    return surface
+        return write_surface(chosen, surface, settings, progress)
 
 
 def _segment(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     check_outputs(chosen, io.POINT_WRITERS, *sources_of(chosen, settings))
     from ..pipeline import segment
+    from ..stage import Stage
 
     with Bars(quiet=chosen.quiet) as progress:
         volume, labels = read_study(chosen, settings, progress)
         found = segment(volume, settings, labels=labels, progress=progress, **given_of(chosen))
-        found.report["written"] = write_points(found.points, found, chosen.output, settings)
+        written = write_points(found.points, found, chosen.output, settings)
+        found = replace(found, stages=(*found.stages, Stage(None, {"written": written})))
         write_stage_one(chosen, found)
         write_documents(chosen, found.report, settings)
         draw(chosen.figures, found, None, settings, progress)
@@ -134,7 +135,7 @@ def _surface(chosen: Namespace) -> None:
         points = io.read_points(chosen.cloud, settings=settings.cloud)
         progress("read", 1, 1)
         surface = reconstruct_points(points, settings, progress=progress, **given_of(chosen))
-        write_surface(chosen, surface, settings, progress)
+        surface = write_surface(chosen, surface, settings, progress)
     _tell(chosen, surface.report, summary.of_surface(surface.report, _shown(chosen)))
 
 

@@ -76,7 +76,7 @@ def build_parser() -> argparse.ArgumentParser:
     demo.add_argument("-o", "--output", default="tomomesh-demo", metavar="FOLDER", help="default: %(default)s")
     _add_settings(demo, ("network", *STAGE_TWO, "run"), without=STUDY_ONLY)
 
-    main = _command(commands, "reconstruct", "a study of slices in, a closed surface out", epilog=_ways())
+    main = _command(commands, "reconstruct", "a study of slices in, a closed surface out", epilog=_ways("study"))
     _add_study(main)
     main.add_argument(
         "-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format; with --each, a folder"
@@ -94,7 +94,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_settings(stage_one, (*STAGE_ONE, "cubes", "run"), without=SURFACE_ONLY)
 
     in_short = "stages two and three alone: points in, a closed surface out"
-    stage_two = _command(commands, "surface", in_short, epilog=_ways())
+    stage_two = _command(commands, "surface", in_short, epilog=_ways("points"))
     stage_two.add_argument("cloud", metavar="POINTS", help=f"{CLOUD}, or - with --input-format")
     stage_two.add_argument("-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format")
     _add_streams(stage_two, CLOUD_FORMATS, MESH_FORMATS, usual="xyz")
@@ -173,11 +173,10 @@ def _command(commands: Any, name: str, text: str, *, epilog: str | None = None) 
     return parser
 
 
-def _ways() -> str:
-    """List the ways to a surface."""
-    each = [
-        fill(f"{name:10}{text}", 96, initial_indent="  ", subsequent_indent=12 * " ") for name, text in WAYS.items()
-    ]
+def _ways(input: str) -> str:
+    """List the ways to a surface from a study, or from points."""
+    own = {name: text for name, text in WAYS.items() if input in text.partition(":")[0].partition(",")[0]}
+    each = [fill(f"{name:10}{text}", 78, initial_indent="  ", subsequent_indent=12 * " ") for name, text in own.items()]
     return "\n".join(["Ways to the surface, of which the first that applies is taken:", *each])
 
 

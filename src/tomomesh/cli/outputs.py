@@ -12,6 +12,7 @@ import numpy as np
 from .. import io
 from ..errors import OutputError, UsageError
 from ..io.files.source import suffix_of
+from ..stage import Stage
 from .parts import frame_of_part
 
 if TYPE_CHECKING:
@@ -82,21 +83,23 @@ def check_frame(output: str | Path, settings: Settings) -> None:
         )  # fmt: skip
 
 
-def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> None:
-    """Write the mesh, and whatever else was asked for."""
+def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> Surface:
+    """Write the mesh, and whatever else was asked for; return the surface, whose report tells of it."""
     stage_one = surface.segmentation
     at_vertices, on_faces = _fields(surface, chosen.output)
     mesh, frame = _placed(surface, chosen.output, settings)
     io.write_mesh(mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces)
-    surface.report["written"] = frame
+    told: dict[str, dict[str, Any]] = {"written": frame}
     if getattr(chosen, "points", None):
         write_points(surface.points, stage_one, chosen.points, settings, surface.place)
     if stage_one is not None:
         write_stage_one(chosen, stage_one)
     if getattr(chosen, "mask_out", None):
-        surface.report["mask"] = _write_mask(surface, chosen.mask_out, settings)
+        told["mask"] = _write_mask(surface, chosen.mask_out, settings)
+    surface = replace(surface, stages=(*surface.stages, Stage(None, told)))
     write_documents(chosen, surface.report, settings)
     draw(chosen.figures, stage_one, surface, settings, progress)
+    return surface
 
 
 def _placed(surface: Surface, output: str | Path, settings: Settings) -> tuple[TriMesh, dict[str, str]]:

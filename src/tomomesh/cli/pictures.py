@@ -45,7 +45,7 @@ def pictures(
     if surface is not None and len(surface.cuberille.quads):
         stages |= {"cuberille": surface.cuberille, "triangulated": surface.cuberille.triangulated()}
     if stage_one is not None:
-        volume, way = stage_one.volume, way_of(stage_one.report["way"]["name"])
+        volume, way = stage_one.volume, way_of(stage_one.way)
         stages |= {
             "images": volume.voxels,
             "mask": stage_one.mask,

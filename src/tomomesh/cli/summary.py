@@ -176,7 +176,7 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
 
 def _of_fit(report: dict[str, Any]) -> str:
     """Say whether the mesh has come to rest; around a mask it is evened out for a number of rounds, and never rests."""
-    fit = report["fit"]
+    fit = report.get("fit", {"converged": None})
     if not report.get("voxels", {"interpolated": True})["interpolated"]:
         return f"evened out in {fit['iterations']} rounds"
     if fit["converged"] is None:
@@ -203,7 +203,7 @@ def _of_points(report: dict[str, Any]) -> str:
 
 def _of_filled(report: dict[str, Any]) -> str:
     """Say what share of the mesh lies where a cloud has no points."""
-    if "filled_faces" not in report["fit"]:
+    if report.get("fit", {}).get("converged") is None or "filled_faces" not in report["fit"]:
         return ""
     share = report["fit"]["filled_faces"] / report["quality"]["faces"]
     return f", {100 * share:.3g} % of the faces filled, not measured"

@@ -1,9 +1,10 @@
 """From the points of one slice to the closed rings around its inside, whatever their sampling and its gaps.
 
 The strategy: a contour that is sampled well runs along sides of the Delaunay triangles of its points, along none that
-is the longest of a triangle (Urquhart 1980). Those sides that are short beside the sampling around them are walls;
-the triangles fall into regions that no wall parts, and a region is inside where an odd number of walls parts it from
-the outside. Contours that do not hold yet may have longer walls, step by step, and to one that holds only where nothing
+is the longest of a triangle (Urquhart 1980). Those sides that are short beside the sampling around them are barriers;
+the triangles fall into regions that no barrier parts, and a region is inside where an odd number of barriers parts it
+from the outside. Contours that do not close yet may have longer barriers, step by step, and to one that does only where
+nothing
 else closes them.
 """
 
@@ -26,18 +27,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 REACHES = tuple(2.0 * 1.3**n for n in range(5))
-"""Lengths of walls that are tried, in local sampling distances: from twice to some six times. Chosen: half of it
+"""Lengths of barriers that are tried, in local sampling distances: from twice to some six times. Chosen: half of it
 changes nothing, with twice of it the stack is not found."""
-HOLDS, OPEN = 0.8, 0.5
+CLOSED, OPEN = 0.8, 0.5
 """Shares of a contour's points with two sides: it need not be closed further; it counts as open where fewer have.
 Chosen: half and twice of them change no case of benchmarks/constants.py."""
 LEAST = 6
 """Points that a contour has at least. Chosen: half and twice of it change no case of benchmarks/constants.py."""
 STIRRED = 1e-3
 """Share of the mean distance by which points are moved before they are triangulated: thousands of points on one circle
-would take seconds."""
+would take seconds. Chosen: half and twice of it change no case of benchmarks/constants.py."""
 BIG = 1_000_000
-"""More than the walls between any two regions."""
+"""More than the barriers between any two regions."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Outline:
     open : list of (p,) int64 array
         Points of each contour that does not close.
     reach : float
-        The longest wall that closed a contour, in local sampling distances.
+        The longest barrier that closed a contour, in local sampling distances.
     """
 
     rings: list[NDArray[np.int64]]
@@ -77,19 +78,19 @@ def outline(points: NDArray[np.float64]) -> Outline:
     if len(points) < LEAST or np.linalg.matrix_rank(points - points[0], tol=1e-9 * np.ptp(points)) < 2:
         return Outline([], [], [np.arange(len(points))] if len(points) >= LEAST else [], 0.0)
     web = _Web.over(points)
-    walls = np.zeros(web.length.shape, np.bool_)
+    barriers = np.zeros(web.length.shape, np.bool_)
     pending, reach = np.ones(len(points), np.bool_), 0.0
     for to_others, step in product((False, True), REACHES):
-        grown = walls | (web.candidate & (web.length <= step * web.scale) & web.among(pending, to_others))
-        reach = step if (grown != walls).any() else reach
-        walls = grown
-        contour, share = web.shares(walls)
-        pending = ((share < HOLDS) | (np.bincount(contour) < LEAST))[contour]
+        grown = barriers | (web.candidate & (web.length <= step * web.scale) & web.among(pending, to_others))
+        reach = step if (grown != barriers).any() else reach
+        barriers = grown
+        contour, share = web.shares(barriers)
+        pending = ((share < CLOSED) | (np.bincount(contour) < LEAST))[contour]
         if not pending.any():
             break
     numbers = np.arange(len(points))
     opened = [numbers[contour == c] for c in np.flatnonzero((share < OPEN) & (np.bincount(contour) >= LEAST))]
-    rings, parts = web.rings(walls)
+    rings, parts = web.rings(barriers)
     return Outline(rings, parts, opened, reach)
 
 
@@ -160,6 +161,7 @@ class _Web:
     def over(cls, points: NDArray[np.float64]) -> _Web:
         low, high = points.min(axis=0), points.max(axis=0)
         wide = float((high - low).max())
+        # three widths away from the middle: what closes the web outside is no part of a contour
         frame = (low + high) / 2 + 3.0 * wide * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
         placed = np.concatenate([points, frame])
         stirred = np.random.default_rng(0).uniform(-STIRRED, STIRRED, points.shape) * (wide / len(points))
@@ -180,25 +182,25 @@ class _Web:
         ends = np.concatenate([chosen, np.zeros(4, np.bool_)])[self.ends]
         return np.asarray(ends.any(axis=2) if to_others else ends.all(axis=2))
 
-    def regions(self, walls: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Return the region of each triangle; walls part them."""
-        rows = np.broadcast_to(np.arange(len(walls))[:, None], walls.shape)
-        return _linked(rows[~walls], self.beyond[~walls], len(walls))
+    def regions(self, barriers: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return the region of each triangle; barriers part them."""
+        rows = np.broadcast_to(np.arange(len(barriers))[:, None], barriers.shape)
+        return _linked(rows[~barriers], self.beyond[~barriers], len(barriers))
 
-    def shares(self, walls: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def shares(self, barriers: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return the contour of each point, and the share of each contour's points with two sides."""
-        region = self.regions(walls)
-        contour = _linked(self.ends[walls][:, 0], self.ends[walls][:, 1], self.count)
-        parting = walls & (region[:, None] != region[self.beyond])
+        region = self.regions(barriers)
+        contour = _linked(self.ends[barriers][:, 0], self.ends[barriers][:, 1], self.count)
+        parting = barriers & (region[:, None] != region[self.beyond])
         sided = np.zeros(self.count, np.bool_)
         sided[self.ends[parting].ravel()] = True
         return contour, np.bincount(contour, sided) / np.bincount(contour)
 
-    def inside(self, walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Tell which triangles an odd number of walls parts from the outside."""
-        region = self.regions(walls)
-        one = np.broadcast_to(region[:, None], walls.shape)[walls]
-        other = region[self.beyond][walls]
+    def inside(self, barriers: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Tell which triangles an odd number of barriers parts from the outside."""
+        region = self.regions(barriers)
+        one = np.broadcast_to(region[:, None], barriers.shape)[barriers]
+        other = region[self.beyond][barriers]
         depth = np.full(int(region.max()) + 1, BIG)
         depth[region[self.outer]] = 0
         for _ in range(len(depth)):
@@ -208,12 +210,12 @@ class _Web:
                 break
         return np.asarray((depth[region] % 2 == 1) & (depth[region] < BIG))
 
-    def rings(self, walls: NDArray[np.bool_]) -> tuple[list[NDArray[np.int64]], list[int]]:
+    def rings(self, barriers: NDArray[np.bool_]) -> tuple[list[NDArray[np.int64]], list[int]]:
         """Follow the sides between inside and outside around every part of the inside."""
-        inside = self.inside(walls)
-        rows = np.broadcast_to(np.arange(len(walls))[:, None], walls.shape)
+        inside = self.inside(barriers)
+        rows = np.broadcast_to(np.arange(len(barriers))[:, None], barriers.shape)
         joined = inside[:, None] & inside[self.beyond]
-        part = _linked(rows[joined], self.beyond[joined], len(walls))
+        part = _linked(rows[joined], self.beyond[joined], len(barriers))
         border = inside[:, None] & ~inside[self.beyond]
         return _chained(self.ends[border], part[rows[border]])
 

@@ -99,7 +99,7 @@ def close_shell(cells: NDArray[np.int64], closing: int, *, threads: int = 0) -> 
 
 
 def _roomy(blocks: Blocks, enclosed: Bitmask, least: float) -> Bitmask:
-    """Leave out the small pieces of enclosed space: pockets in a thick wall tell of no inside."""
+    """Leave out the small pieces of enclosed space: pockets in a thick shell tell of no inside."""
     large = blocks.empty()
     large[len(blocks) :] = enclosed[len(blocks) :]
     flood(enclosed, blocks.table, large)

@@ -9,6 +9,7 @@ a step h <= 1 is stable on every mesh: nobody has to know the unit of a stiffnes
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,7 @@ from .low_pass import adjacency
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy import sparse
 
     from ..model.cubes import CubeGrid
     from ..model.trace import Trace
@@ -85,14 +87,14 @@ def fit(
     Fit
     """
     position, targets = (np.ascontiguousarray(places - grid.origin) for places in (vertices, points))
-    motion = _EulerSteps(position, targets, edges, cubes.astype(np.int32), grid, settings, threads)
+    motion = _NearestSteps(position, targets, edges, cubes.astype(np.int32), grid, settings, threads)
     state, trace = iterate(motion, settings.max_steps, progress)
     state = motion.matched(state)
     return Fit(np.asarray(grid.origin + state.position), state.nearest, trace)
 
 
 @dataclass(frozen=True)
-class _State:
+class _NearestState:
     """Positions and velocities of the vertices, relative to the grid's origin, and their correspondence.
 
     `nearest` are the points that draw the vertices, `left` those that drew them before, -1 where there are none;
@@ -106,9 +108,9 @@ class _State:
     cube: NDArray[np.int32]
 
 
-@dataclass
-class _EulerSteps:
-    """Steps of explicit Euler."""
+@dataclass(frozen=True)
+class _NearestSteps:
+    """Steps of explicit Euler, drawn to the nearest points."""
 
     start: NDArray[np.float64]
     points: NDArray[np.float64]
@@ -118,26 +120,48 @@ class _EulerSteps:
     settings: FitSettings
     threads: int
 
-    def __post_init__(self) -> None:
-        grid = self.grid
-        self.springs = adjacency(self.edges, len(self.start))
-        self.degree = np.diff(self.springs.indptr)[:, None]
-        self.stiffness = self.settings.stiffness / max(self.degree.mean(), 1.0)
-        self.table = neighbor_table(grid.keys)
-        self.cube_of_point = np.empty(len(self.points), np.int32)
-        self.cube_of_point[grid.order] = np.repeat(np.arange(len(grid.keys)), np.diff(grid.start))
-        self.edge = float(grid.cell_mm.min())
+    @cached_property
+    def springs(self) -> sparse.csr_array[np.float64]:
+        """Which vertices are joined, (n, n)."""
+        return adjacency(self.edges, len(self.start))
 
-    def init(self) -> _State:
+    @cached_property
+    def degree(self) -> NDArray[np.int32]:
+        """Springs of each vertex, (n, 1)."""
+        return np.diff(self.springs.indptr)[:, None]
+
+    @cached_property
+    def stiffness(self) -> float:
+        """Stiffness of a spring, so that those of a vertex have that of the settings together, on average."""
+        return self.settings.stiffness / max(float(self.degree.mean()), 1.0)
+
+    @cached_property
+    def table(self) -> NDArray[np.int32]:
+        """The 27 cubes around each cube."""
+        return neighbor_table(self.grid.keys)
+
+    @cached_property
+    def cube_of_point(self) -> NDArray[np.int32]:
+        """The cube of each point, (p,)."""
+        cubes = np.empty(len(self.points), np.int32)
+        cubes[self.grid.order] = np.repeat(np.arange(len(self.grid.keys)), np.diff(self.grid.start))
+        return cubes
+
+    @cached_property
+    def edge(self) -> float:
+        """The shortest edge of the cubes."""
+        return float(self.grid.cell_mm.min())
+
+    def init(self) -> _NearestState:
         """Return the mesh where it starts, drawn by no point yet."""
         none = np.full(len(self.start), -1, np.int32)
-        return _State(self.start, np.zeros_like(self.start), none, none, self.cubes)
+        return _NearestState(self.start, np.zeros_like(self.start), none, none, self.cubes)
 
     def rested(self, motion: Motion, count: int) -> bool:
         """Tell whether speed and acceleration have fallen below the tolerance."""
         return motion.rests(self.settings.tolerance)
 
-    def matched(self, state: _State) -> _State:
+    def matched(self, state: _NearestState) -> _NearestState:
         """Assign its nearest point to every vertex.
 
         Unless that is allowed, a vertex does not go back to the point it left last: half way between two points,
@@ -159,7 +183,7 @@ class _EulerSteps:
         cube = np.where(nearest >= 0, self.cube_of_point[nearest], state.cube)
         return replace(state, nearest=nearest, left=np.where(moves, state.nearest, state.left), cube=cube)
 
-    def step(self, state: _State, count: int) -> tuple[_State, Motion]:
+    def step(self, state: _NearestState, count: int) -> tuple[_NearestState, Motion]:
         """Take one step: x += h x', x' += h x''; no vertex moves more than one cube edge."""
         state = self.matched(state)
         drawn = (state.nearest >= 0)[:, None]

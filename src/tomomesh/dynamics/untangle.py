@@ -23,13 +23,18 @@ ROUNDS = 24
 then left."""
 GENTLE = 4
 """Rounds in which the mesh is only smoothed, which undoes most folds; later it also goes back. The region that is
-worked on grows by one ring of faces as often."""
+worked on grows by one ring of faces as often. Measured on an MR: half and twice of it leave no other faces and take
+back no other vertices."""
 BACK = 0.25
-"""Share of the way back to where it came from that a vertex takes in a later round."""
+"""Share of the way back to where it came from that a vertex takes in a later round. Measured as `GENTLE`: the same."""
 
 
 def untangle(
-    mesh: TriMesh, origin: NDArray[np.float64], ring: OneRing, tangled: Tangled
+    mesh: TriMesh,
+    origin: NDArray[np.float64],
+    ring: OneRing,
+    tangled: Tangled,
+    lattice: NDArray[np.float64] | None = None,
 ) -> tuple[TriMesh, int, NDArray[np.bool_]]:
     """Smooth a mesh where it passes through itself, and take it back towards where it came from.
 
@@ -42,6 +47,9 @@ def untangle(
         The neighbors of its vertices.
     tangled : callable
         Marks the faces (m,) of a mesh that pass through others; told which vertices have moved since it last did.
+    lattice : (n, 3) float array, optional
+        Its vertices as corners of cubes, for what is left then: a low-pass filter of many passes may make a mesh pass
+        through itself before any fit, squares between cubes never do.
 
     Returns
     -------
@@ -62,6 +70,13 @@ def untangle(
         if count >= GENTLE:
             vertices += BACK * (origin - vertices)
         mesh = mesh.moved(np.where(region[:, None], vertices, mesh.vertices))
+        marked = tangled(mesh, region)
+    for count in range(ROUNDS):
+        if lattice is None or not marked.any():
+            break
+        region = _around(mesh, marked, count)
+        moved |= region
+        mesh = mesh.moved(np.where(region[:, None], lattice, mesh.vertices))
         marked = tangled(mesh, region)
     return mesh, int(moved.sum()), marked
 

@@ -13,7 +13,7 @@ from ..kernels.cuberille.cells import label_components
 from ..model.mesh import QuadMesh
 from ..model.points import PointSet
 from ..progress import Progress, silent
-from .crossings import Crossings, Levels, crossings
+from .crossings import LevelCrossings, Levels, crossings
 from .diagonals import placed, right_handed, triangulated
 from .surface_nets import Net, NetFit, net_around, settle
 from .well_composed import without_contacts
@@ -34,7 +34,7 @@ class Boundary:
     ----------
     volume : Volume
     net : Net
-    crossings : Crossings
+    crossings : LevelCrossings
         One a face.
     added : int
         Voxels added so that no two touch along an edge or at a corner alone.
@@ -42,7 +42,7 @@ class Boundary:
 
     volume: Volume
     net: Net
-    crossings: Crossings
+    crossings: LevelCrossings
     added: int
 
     @cached_property

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import GeometryError
-from ..kernels.measure.fill import add_walls
+from ..kernels.measure.fill import add_winding_steps
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def fill_mesh(mesh: TriMesh, volume: Volume) -> Mask:
     """Tell which voxels of a grid have their centers inside a closed mesh.
 
-    A ray along the slices through every row and column counts the walls that it passes; cost grows with the surface
+    A ray along the slices through every row and column counts the faces that it passes; cost grows with the surface
     and with the voxels around it.
 
     Parameters
@@ -61,7 +61,7 @@ def fill_mesh(mesh: TriMesh, volume: Volume) -> Mask:
     steps = np.zeros([max(0, side.stop - side.start) for side in box], np.int16)
     if steps.size:
         first = np.array([side.start for side in box[::-1]], np.float64)
-        add_walls(np.ascontiguousarray(places - first), np.ascontiguousarray(mesh.faces, np.int64), steps)
+        add_winding_steps(np.ascontiguousarray(places - first), np.ascontiguousarray(mesh.faces, np.int64), steps)
         np.cumsum(steps, axis=0, out=steps)
         inside[tuple(box)] = steps > 0 if np.linalg.det(volume.affine[:3, :3]) > 0 else steps < 0
     return inside

@@ -1,7 +1,7 @@
-"""An open surface as a sheet with borders: shell of cubes -> one of its two walls -> fit -> cut along the borders.
+"""An open surface as a sheet with borders: shell of cubes -> one of its two sides -> fit -> cut along the borders.
 
 The samples are carried on beyond their borders by an apron, and the cubes are dilated once: so the shell has no
-holes but those that are wide, and both walls reach over the borders. They come apart where the apron ends; the one
+holes but those that are wide, and both sides reach over the borders. They come apart where the apron ends; the one
 that is kept is laid over the samples, and what lies beyond the borders is cut away.
 """
 
@@ -16,11 +16,11 @@ from ..cuberille.closing import close_shell
 from ..cuberille.faces import exposed_faces
 from ..cuberille.leak_test import LeakTest
 from ..cuberille.neighbors import dilate
-from ..cuberille.partition import cubes_over
+from ..cuberille.partition import cubes_over, dimensions
 from ..dynamics.low_pass import OneRing
 from ..dynamics.moving_least_squares import SurfaceFit, fit_to_surface
 from ..dynamics.untangle import untangle
-from ..errors import GeometryError
+from ..errors import EmptyError, GeometryError
 from ..model.columns import any_of
 from ..model.cubes import cells_of
 from ..model.mesh import TriMesh
@@ -42,13 +42,13 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
 
 CLOSINGS = (0, 1, 2)
-"""Closings that are tried until the two walls come apart, cubes. Chosen: half of it changes the distance by +0.1 %,
+"""Closings that are tried until the two sides come apart, cubes. Chosen: half of it changes the distance by +0.1 %,
 twice by +0.1 %."""
 APRON = 0.7
 """How far a sheet is carried on beyond its borders, in the radius of the disks there. Chosen: half of it changes the
 distance by -6.6 %, twice by -0.3 %."""
 TIP = 0.8
-"""Share of the apron from which the walls are cut away. Chosen: half of it changes the distance by -12.2 %, twice leads
+"""Share of the apron from which the shell is cut away. Chosen: half of it changes the distance by -12.2 %, twice leads
 to a refusal."""
 DENSE = 0.5
 """Distance of the places on the apron, cube edges. Chosen: half of it changes the distance by -1.2 %, twice by -1.9 %.
@@ -73,16 +73,16 @@ class OpenSheet:
 
     Attributes
     ----------
-    held : LeakTest
-        The shell and both its walls.
+    leak_test : LeakTest
+        Of the shell with both its sides.
     cubes : int
         Cubes of the shell before it was closed.
     lattice : (n, 3) float array
-        Vertices of the wall that is kept.
+        Vertices of the side that is kept.
     quads : (q, 4) int64 array
         Its squares.
     smoothed : TriMesh
-        The wall after the low-pass filter.
+        That side after the low-pass filter.
     mesh : TriMesh
         The sheet: a consistently oriented 2-manifold with borders.
     filled : (m,) bool array
@@ -94,7 +94,7 @@ class OpenSheet:
         Vertices that do not lie where the fit had them.
     """
 
-    held: LeakTest
+    leak_test: LeakTest
     cubes: int
     lattice: Floats
     quads: Integers
@@ -137,14 +137,17 @@ def open_sheet(
     Raises
     ------
     GeometryError
-        Where both sides of the surface are one.
+        Where both sides of the surface are one, or the samples lie on a line or at one place.
+    EmptyError
+        Where nothing of the sheet is measured, or nothing lies within its borders.
     """
+    _require_extent(samples)
     threads, edge = settings.run.threads, float(cell.min())
     found, samples = borders(samples, edge, threads=threads)
-    wall = _wall(samples, spanned, found, cell, settings)
-    ring = wall.side.ring
-    fitted = fit_to_surface(wall.start, ring, samples, edge, settings.fit, threads=threads, progress=progress)
-    mesh, taken_back, _ = untangle(TriMesh(fitted.vertices, fitted.faces), wall.start, ring, tangled)
+    kept = _kept_side(samples, spanned, found, cell, settings)
+    ring = kept.side.ring
+    fitted = fit_to_surface(kept.start, ring, samples, edge, settings.fit, threads=threads, progress=progress)
+    mesh, taken_back, _ = untangle(TriMesh(fitted.vertices, fitted.faces), kept.start, ring, tangled)
     height = np.minimum(found.depths(mesh.vertices, threads=threads) + OVER * edge, 2 * edge)
     even = ring.smoothed(np.repeat(height[:, None], 3, axis=1), EVEN)[:, 0]
     most = SHIFT * np.abs(height)
@@ -155,18 +158,39 @@ def open_sheet(
         if not crossing.any():
             break
     filled = any_of(fitted.filled[mesh.faces])[source]
-    quads, smoothed = ring.quads.astype(np.int64), TriMesh(wall.smoothed, mesh.faces)
+    _require_measured(filled, samples)
+    quads, smoothed = ring.quads.astype(np.int64), TriMesh(kept.smoothed, mesh.faces)
     return OpenSheet(
-        wall.held, wall.cubes, wall.lattice, quads, smoothed, sheet, filled, crossing,
+        kept.leak_test, kept.cubes, kept.lattice, quads, smoothed, sheet, filled, crossing,
         fitted, taken_back,
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Wall:
-    """One wall of a shell: vertices (n, 3) on the lattice, smoothed, and where the fit starts."""
+def _require_extent(samples: Samples) -> None:
+    """Refuse samples that span no surface."""
+    extent = dimensions(samples.positions, float(np.median(samples.spacing)))
+    if extent < 2:
+        raise GeometryError(
+            "the points span no surface: they lie " + ("on a line" if extent else "at one place"),
+            found=f"{len(samples.positions)} sample(s)", expected="points all over a surface",
+        )  # fmt: skip
 
-    held: LeakTest
+
+def _require_measured(filled: NDArray[np.bool_], samples: Samples) -> None:
+    """Refuse a sheet of which nothing, or nothing measured, lies within its borders."""
+    if filled.all():
+        raise EmptyError(
+            "nothing of the sheet is measured within its borders",
+            found=f"{len(samples.positions)} sample(s), {float(np.median(samples.spacing)):.4g} apart",
+            expected="points all over a surface", hint="more points, or another --cell",
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _ShellSide:
+    """One side of a shell: vertices (n, 3) on the lattice, smoothed, and where the fit starts."""
+
+    leak_test: LeakTest
     cubes: int
     lattice: Floats
     smoothed: Floats
@@ -174,8 +198,8 @@ class _Wall:
     side: Side
 
 
-def _wall(samples: Samples, spanned: Bridges, found: Borders, cell: Floats, settings: Settings) -> _Wall:
-    """Return one of the two walls around the sheet, from the narrowest closing that keeps them apart."""
+def _kept_side(samples: Samples, spanned: Bridges, found: Borders, cell: Floats, settings: Settings) -> _ShellSide:
+    """Return one of the two sides of the shell around the sheet, from the narrowest closing that keeps them apart."""
     edge = float(cell.min())
     apron, share = found.apron(APRON, DENSE * edge)
     lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places, apron]), cell)
@@ -189,8 +213,8 @@ def _wall(samples: Samples, spanned: Bridges, found: Borders, cell: Floats, sett
         start = smoothed - edge * ring.normals(smoothed)
         side = one_side(start, ring, samples, apron, share >= TIP, edge, largest=settings.cubes.largest)
         if side is not None:
-            kept, held = side.vertices, LeakTest(shell, both, both.least_two_sided)
-            return _Wall(held, len(cells), lattice[kept], smoothed[kept], start[kept], side)
+            kept, tested = side.vertices, LeakTest(shell, both, both.least_two_sided)
+            return _ShellSide(tested, len(cells), lattice[kept], smoothed[kept], start[kept], side)
     raise GeometryError(
         "the two sides of the surface do not come apart: it has one side only, as a Moebius strip, or its borders "
         "are lost in the noise",

@@ -1,4 +1,4 @@
-"""The two walls of the shell of an open surface, and which of them is kept."""
+"""The two sides of the shell of an open surface, and which of them is kept."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     Marks = NDArray[np.bool_]
 
 LEAST_PIECE = 0.01
-"""Share of the squares under which a piece of the walls is left out. Chosen: half and twice of it change no case of
+"""Share of the squares under which a piece of the shell is left out. Chosen: half and twice of it change no case of
 benchmarks/constants.py."""
 PLOT = 1.5
-"""Edge of the plots over which two pieces are compared, cube edges: every wall has vertices over each. Chosen: half and
+"""Edge of the plots over which two pieces are compared, cube edges: each side has vertices over each. Chosen: half and
 twice of it change no case of benchmarks/constants.py."""
 SAME = 0.5
 """Share of its plots that a piece has in common with its other side. Chosen: half of it changes nothing, twice by
@@ -54,7 +54,7 @@ def sheet_ring(quads: NDArray[np.int32], count: int, threads: int = 0) -> OneRin
 
 @dataclass(frozen=True)
 class Side:
-    """What is kept of the walls: one side of each sheet.
+    """What is kept of a shell: one side of each sheet.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Side:
 def one_side(
     vertices: Floats, ring: OneRing, samples: Samples, apron: Floats, tips: Marks, edge: float, *, largest: bool = False
 ) -> Side | None:
-    """Cut the walls where they turn over the rim, and keep one side of each sheet.
+    """Cut the shell where it turns over the rim, and keep one side of each sheet.
 
     The outer one is kept where the sheet is hollow; else the one that faces along the axis that it faces most.
 
@@ -80,7 +80,7 @@ def one_side(
     ----------
     vertices : (n, 3) float array
     ring : OneRing
-        The squares of the walls.
+        The squares of the shell.
     samples : Samples
     apron : (a, 3) float array
         Places that carry the sheet on beyond its borders.

@@ -73,8 +73,8 @@ def _last_bins(counts: NDArray[np.int64], middles: NDArray[np.float64], classes:
     number = np.concatenate([[0], np.cumsum(counts)]).astype(np.float64)
     # about the mean, so that no digits are lost where levels lie far from zero
     mass = np.concatenate([[0.0], np.cumsum(counts * (middles - np.average(middles, weights=counts)))])
-    held, sums = number[None, :] - number[:, None], mass[None, :] - mass[:, None]
-    worth = np.where(held > 0, sums**2 / np.maximum(held, 1), -np.inf)  # of the bins from row to column
+    inside, sums = number[None, :] - number[:, None], mass[None, :] - mass[:, None]
+    worth = np.where(inside > 0, sums**2 / np.maximum(inside, 1), -np.inf)  # of the bins from row to column
     best, cuts = worth[0], []
     for _ in range(classes - 1):
         table = best[:, None] + worth

@@ -106,7 +106,11 @@ def _inside(meta: Mapping[str, Any], value: Any) -> bool:
         return isinstance(value, str) and bool(value.strip())
     if isinstance(value, bool) or not isinstance(value, int if meta["kind"] is int else (int, float)):
         return False
-    return bool(math.isfinite(value) and meta["low"] <= value <= meta["high"] and value > meta["above"])
+    try:
+        finite = math.isfinite(value)
+    except OverflowError:  # a whole number beyond what a float can hold
+        return False
+    return bool(finite and meta["low"] <= value <= meta["high"] and value > meta["above"])
 
 
 def limits_of(entry: Field[Any]) -> str:

@@ -11,7 +11,7 @@ from .parameter import Group, param
 class ReadSettings(Group):
     """How a study is read where its files leave a choice."""
 
-    series: int | None = param(None, "number of the series to take from a folder that holds several", kind=int, low=0)
+    series: int | None = param(None, "number of the series to take from a folder that holds several", kind=int, low=1)
     spacing: tuple[float, ...] | None = param(
         None,
         "distance of the voxels along columns, rows and slices, for files that hold none",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,7 @@ WAYS = {
 def way_of(name: str) -> Way:
     """Return a way by its name."""
     found: Way = import_module(f"{__name__}.{name}").WAY
-    return found
+    return replace(found, name=name)
 
 
 def choose_way(settings: Settings, input: str) -> str:

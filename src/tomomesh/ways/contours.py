@@ -9,7 +9,7 @@ import numpy as np
 from ..contours.known import known_slices
 from ..errors import EmptyError
 from ..measure.rings import assess_contours
-from ..results import Segmentation
+from ..results import Enclosed, Segmentation
 from ..segmentation.contours.train import train_contours
 from ..segmentation.sample import Sampling, sample_contours
 from ..segmentation.training import regions
@@ -45,10 +45,11 @@ def segment_by_contours(kept: Selected, settings: Settings, progress: Progress) 
 
 def surface_by_contours(found: Segmentation[Contours], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Close the contours of all slices."""
+    inside = Enclosed("rings", found.sampling.volume_mm3), Enclosed.window(found)
     finest, sampling = min(found.volume.spacing_mm[:2]), found.sampling
     return surface_of_slices(
         found.points, slices_of_rings(found.points), settings, progress, finest=finest, bridged=sampling.bridged,
-        encloses=sampling.volume_mm3,
+        encloses=max(inside, key=lambda one: one.volume),
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +15,7 @@ from ..dynamics.mass_spring import Fit, fit
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError
 from ..measure.intersections import Crossings
-from ..results import LEAST, Surface
+from ..results import LEAST, Enclosed, Surface
 from ..stage import Stage, folded, measured, timed
 from .sections import FLAT_SHELL, LEAKY_SHELL, fit_found, shell_found, walls_found
 
@@ -47,9 +47,32 @@ class Shell:
         return float(self.held.faces.volumes[self.taken].sum() * self.grid.cell_mm.prod())
 
     @property
-    def hollow(self) -> float:
+    def hollow(self) -> Enclosed:
         """The same without the cubes themselves, which may be two walls with nothing between them."""
-        return max(0.0, self.volume - float(len(self.grid.keys) * self.grid.cell_mm.prod()))
+        return Enclosed("samples", max(0.0, self.volume - float(len(self.grid.keys) * self.grid.cell_mm.prod())))
+
+
+@dataclass(frozen=True)
+class Inside:
+    """What is known of the inside of a surface: the volume of its rings, and its window; nothing of a cloud's."""
+
+    rings_mm3: float = 0.0
+    window_mm3: float = 0.0
+    mask: NDArray[np.bool_] | None = None
+
+    @property
+    def may_be_flat(self) -> bool:
+        """Whether points may rightly lie in a plane, as those of a flat cloud or of a window of one slice do."""
+        return self.mask is None or bool(min(np.ptp(self.mask.nonzero(), axis=1)) == 0)
+
+    def or_more(self, hollow: Enclosed) -> Enclosed:
+        """Return the largest that is known; what a shell of cubes is hollow by counts where there are no rings."""
+        rings = Enclosed("rings", self.rings_mm3) if self.rings_mm3 else hollow
+        return max(rings, Enclosed("window", self.window_mm3), key=lambda one: one.volume)
+
+
+ANYTHING = Inside()
+"""Where nothing is known."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +85,7 @@ class Rest:
 
 
 def surface_on_cubes(
-    points: PointSet, spacing: float, settings: Settings, progress: Progress, *, encloses: float = 0.0
+    points: PointSet, spacing: float, settings: Settings, progress: Progress, asked: Inside = ANYTHING
 ) -> Stage[Surface]:
     """Turn points into a closed surface that rests on them.
 
@@ -73,8 +96,8 @@ def surface_on_cubes(
         r, the edge of the cubes where none is asked for.
     settings : Settings
     progress : callable
-    encloses : float
-        Volume that the rings enclose; 0 where there are none.
+    asked : Inside
+        What is known of the inside.
 
     Raises
     ------
@@ -83,19 +106,18 @@ def surface_on_cubes(
     """
     shell = _close(points.positions, spacing, settings, progress)
     tracked = measured("cuberille", _track, shell.value)
-    walls = _walls(shell.value, points.positions, settings, encloses)
+    walls = _walls(shell.value, points.positions, settings, asked)
     cubes, cuberille, _ = tracked.value
     smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.smoothing)
-    still = settings.replace(max_steps=0)
-    rest = _fit(tracked.value, smoothed.value, points.positions, settings if walls.value == 1 else still, progress)
-    told = encloses or shell.value.hollow
-    if settings.cubes.allow_leaks and walls.value == 1 and rest.value.mesh.face_volumes.sum() < LEAST * told:
-        walls = walls_found(2, LEAKY_SHELL)
-        rest = _fit(tracked.value, smoothed.value, points.positions, still, progress)
+    encloses = asked.or_more(shell.value.hollow)
+    rest = _fit(tracked.value, smoothed.value, points.positions, settings, progress, still=walls.value == 2)
+    if settings.cubes.allow_leaks and walls.value == 1 and encloses.share(rest.value.mesh) < LEAST:
+        walls = walls_found(2, LEAKY_SHELL)  # found out by the fit alone: it goes back to where it began
+        rest = _fit(tracked.value, smoothed.value, points.positions, settings, progress, still=True)
     made = Surface(
         points, cuberille, smoothed.value, rest.value.mesh, rest.value.fit.nearest, cubes, rest.value.fit.trace,
         cavities=int((shell.value.held.faces.inward & shell.value.taken).sum()), crossing=rest.value.crossing,
-        encloses_mm3=told if walls.value == 1 else 0.0,
+        encloses=encloses if walls.value == 1 else None,
     )  # fmt: skip
     return folded(made, shell, tracked, walls, smoothed, rest)
 
@@ -123,15 +145,15 @@ def _track(shell: Shell) -> Tracked:
     return shell.held.faces.only(shell.taken).over(shell.grid)
 
 
-def _walls(shell: Shell, positions: Floats, settings: Settings, encloses: float) -> Stage[int]:
+def _walls(shell: Shell, positions: Floats, settings: Settings, asked: Inside) -> Stage[int]:
     """Count the walls of a shell; refuse one that leaks, unless that was allowed or the points are flat.
 
     One of two is not fitted: both walls would rest on the same points, and the mesh would fall flat.
     """
-    cell = float(shell.grid.cell_mm.min())
-    if shell.volume >= LEAST * encloses if encloses else shell.held.tight:
+    cell, rings_mm3 = float(shell.grid.cell_mm.min()), asked.rings_mm3
+    if shell.volume >= LEAST * rings_mm3 if rings_mm3 else shell.held.tight:
         return walls_found(1)
-    if is_flat(positions, cell):
+    if is_flat(positions, cell) and asked.may_be_flat:
         return walls_found(2, FLAT_SHELL)
     if settings.cubes.allow_leaks:
         return walls_found(2, LEAKY_SHELL)
@@ -149,16 +171,20 @@ def _smoothed(cuberille: QuadMesh, passes: int) -> TriMesh:
 
 
 @timed("fit")
-def _fit(tracked: Tracked, smoothed: TriMesh, positions: Floats, settings: Settings, progress: Progress) -> Stage[Rest]:
+def _fit(
+    tracked: Tracked, smoothed: TriMesh, positions: Floats, settings: Settings, progress: Progress, *, still: bool
+) -> Stage[Rest]:
+    """Draw the mesh to the points, unless it is to stay as it is."""
     (cubes, cuberille, origins), threads = tracked, settings.run.threads
+    asked = replace(settings.fit, max_steps=0) if still else settings.fit
     springs = cuberille.edges if settings.fit.springs == "quads" else smoothed.edges
     rest = fit(
-        smoothed.vertices, springs, origins, positions, cubes, settings.fit,
+        smoothed.vertices, springs, origins, positions, cubes, asked,
         threads=threads, progress=progress,
     )  # fmt: skip
     mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))
     ring = OneRing.of_quads(cuberille.quads.astype(np.int32), len(mesh.vertices), threads)
-    mesh, taken_back, crossing = untangle(mesh, smoothed.vertices, ring, Crossings(threads))
-    trace = rest.trace if settings.fit.max_steps else None
-    told = fit_found(trace, len(mesh.vertices), collapsed=collapsed, taken_back=taken_back)
+    tangled = Crossings(threads, single=True)
+    mesh, taken_back, crossing = untangle(mesh, smoothed.vertices, ring, tangled, cuberille.vertices)
+    told = fit_found(None if still else rest.trace, len(mesh.vertices), collapsed=collapsed, taken_back=taken_back)
     return folded(Rest(rest, mesh, crossing), told)

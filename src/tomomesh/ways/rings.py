@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..measure.rings import assess_contours
-from ..results import Segmentation
+from ..results import Enclosed, Segmentation
 from ..segmentation.contours.inputs import share_of_holes, slices_with_several
 from ..segmentation.sample import Sampling, sample
 from ..segmentation.training import regions, train_study
 from ..segmentation.window import by_layer
 from ..som.schedules import schedule_warning
 from ..stage import Stage, folded, measured, timed
-from .cubes import surface_on_cubes
+from .cubes import Inside, surface_on_cubes
 from .sections import body_of_cubes, missed, points_found
 from .way import CUBES, POINTS, SPRINGS, TRAINING, Way, parameters
 
@@ -27,9 +27,11 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 CROWDED = 0.25
-"""Share of the slices with several components side by side over which one network a slice is warned of."""
+"""Share of the slices with several components side by side over which one network a slice is warned of. A warning's
+threshold, chosen: no mesh depends on it."""
 HOLES = 0.15
-"""Area of the holes in the slices over that of the window from which an outline that fills them is warned of."""
+"""Area of the holes in the slices over that of the window from which an outline that fills them is warned of. A
+warning's threshold, chosen: no mesh depends on it."""
 
 
 def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Networks]]:
@@ -48,10 +50,9 @@ def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> 
 
 def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Turn the neurons of all slices into a closed surface."""
-    sampling = found.sampling
-    return surface_on_cubes(
-        found.points, sampling.spacing_mm, settings, progress, encloses=sampling.volume_mm3
-    )  # fmt: skip
+    sampling, window = found.sampling, Enclosed.window(found)
+    inside = Inside(sampling.volume_mm3, window.volume, found.mask)
+    return surface_on_cubes(found.points, sampling.spacing_mm, settings, progress, inside)
 
 
 def _layers(kept: Selected, settings: Settings) -> NDArray[np.bool_] | None:

@@ -18,13 +18,17 @@ if TYPE_CHECKING:
     from ..model.trace import Trace
 
 DRAWN = 0.9
-"""Share of the vertices that must have a point near them, else a result is warned of."""
+"""Share of the vertices that must have a point near them, else a result is warned of. A warning's threshold, chosen: no
+mesh depends on it."""
 WIDE = 3
-"""Closing over which a result is warned of, cubes."""
+"""Closing over which a result is warned of, cubes. A warning's threshold, chosen: no mesh depends on it. The built-in
+head and an MR are closed by one (measured)."""
 FILLED = 0.05
-"""Share of filled faces over which a result is warned of."""
+"""Share of filled faces over which a result is warned of. A warning's threshold, chosen: no mesh depends on it."""
 
 
+SMALL = ": the cubes are small for the points"
+"""What that may mean, on ways that go by cubes."""
 FLAT_SHELL = "the points lie in a plane, on a line or at one place: their shell is smoothed, but not fitted"
 LEAKY_SHELL = "the outside leaks into the shell: its surface has two walls, and is smoothed, but not fitted"
 """What is warned of where a shell is written though both its walls would rest on the same points."""
@@ -67,7 +71,7 @@ def shell_found(
             "closing": shell.closing,
             "added_for_composition": shell.added,
             "two_sided": held.two_sided,
-            "holds": held.tight,
+            "tight": held.tight,
         },
         "surface": {
             "found": faces.count,
@@ -103,7 +107,7 @@ def fit_found(
         section |= _course(trace)
         drawn = 1 - trace.unattracted[-1] / max(vertices, 1)
         if drawn < DRAWN:
-            warnings.append(f"{1 - drawn:.0%} of the vertices have no point near: the cubes are small for the points")
+            warnings.append(f"{1 - drawn:.0%} of the vertices have no point near{'' if filled is not None else SMALL}")
         if not trace.converged:
             warnings.append(f"the mesh had not come to rest after {steps} steps")
     section["taken_back"] = taken_back

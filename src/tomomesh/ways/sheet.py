@@ -33,7 +33,7 @@ def surface_of_sheet(points: Points, settings: Settings, progress: Progress) -> 
         points.cloud, QuadMesh(made.lattice + origin, made.quads),
         made.smoothed.moved(made.smoothed.vertices + origin), made.mesh.moved(made.mesh.vertices + origin),
         np.empty(0, np.int32), trace=made.fitted.trace, filled=made.filled, borders=True, crossing=made.crossing,
-        cavities=int(made.held.faces.inward.sum()),
+        cavities=int(made.leak_test.faces.inward.sum()),
     )  # fmt: skip
     fitted = fit_found(
         made.fitted.trace, len(made.fitted.vertices), taken_back=made.taken_back, filled=made.filled
@@ -46,8 +46,8 @@ def _lay(samples: Samples, settings: Settings, progress: Progress) -> Stage[Open
     cell, threads = cell_edges(samples, settings)[0], settings.run.threads
     spanned = bridges(samples, float(cell.min()), threads=threads, progress=progress)
     made = open_sheet(samples, spanned, cell, settings, Crossings(threads), progress)
-    every = np.ones(made.held.faces.count, bool)
-    return folded(made, shell_found(made.held, every, cell, made.cubes, len(spanned.places)), walls_found(1))
+    every = np.ones(made.leak_test.faces.count, bool)
+    return folded(made, shell_found(made.leak_test, every, cell, made.cubes, len(spanned.places)), walls_found(1))
 
 
 WAY = Way(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..contours.stack import ContourSurface, contour_surface
-from ..results import Surface
+from ..results import Enclosed, Surface
 from ..stage import Stage, folded, measured
 from .points import place_found
 from .sections import body_of_voxels, boundary_found, points_found
@@ -21,19 +21,20 @@ if TYPE_CHECKING:
     from .points import Points
 
 APART = 1.5
-"""Distance of two slices of a stack of contours, in median ones, over which a result is warned of."""
+"""Distance of two slices of a stack of contours, in median ones, over which a result is warned of: half a slice more
+than one, so that a missing slice is told. A warning's threshold, chosen: no mesh depends on it."""
 
 
 def surface_of_stack(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
     """Close a cloud that is a stack of contours."""
     assert points.slices is not None
-    made = surface_of_slices(points.cloud, points.slices, settings, progress, unit=settings.run.units, told=True)
+    made = surface_of_slices(points.cloud, points.slices, settings, progress, unit=settings.run.units)
     return folded(made.value, made, place_found(points))
 
 
 def surface_of_slices(
     cloud: PointSet, slices: Slices, settings: Settings, progress: Progress,
-    *, finest: float | None = None, bridged: int = 0, encloses: float = 0.0, unit: str = "mm", told: bool = False,
+    *, finest: float | None = None, bridged: int = 0, encloses: Enclosed | None = None, unit: str = "mm",
 ) -> Stage[Surface]:  # fmt: skip
     """Turn contours into a closed surface.
 
@@ -47,11 +48,9 @@ def surface_of_slices(
         Edge of the voxels between the slices, where no cell is asked for.
     bridged : int
         Gaps of the contours that were bridged.
-    encloses : float
-        Volume that the contours enclose, where it is known.
+    encloses : Enclosed, optional
+        What a study's rings or its window enclose; the slices do where not given.
     unit : str
-    told : bool
-        Whether to warn of slices that lie far apart.
     """
     asked = settings.cubes
     edge = finest if asked.cell_mm is None else float(np.min(asked.cell_mm))
@@ -62,13 +61,19 @@ def surface_of_slices(
     made = closed.value
     surface = Surface(
         cloud, made.boundary.cuberille, made.rest.smoothed, made.mesh, made.rest.nearest, filled=made.filled,
-        cavities=made.boundary.cavities, encloses_mm3=encloses,
+        cavities=made.boundary.cavities, encloses=encloses or Enclosed("slices", made.encloses),
     )  # fmt: skip
     spaced = points_found(cloud, slices.spacing, unit=unit, bridged=bridged)
-    return folded(surface, closed, spaced, boundary_found(made.boundary, made.rest), _stack_found(made, slices, told))
+    return folded(
+        surface,
+        closed,
+        spaced,
+        boundary_found(made.boundary, made.rest),
+        _stack_found(made, slices, of_study=encloses is not None),
+    )
 
 
-def _stack_found(made: ContourSurface, slices: Slices, told: bool) -> Stage[None]:
+def _stack_found(made: ContourSurface, slices: Slices, *, of_study: bool) -> Stage[None]:
     """Tell of the slices, and the voxels between them."""
     widest = float(np.diff(slices.heights).max())
     stats: dict[str, dict[str, Any]] = {
@@ -85,7 +90,7 @@ def _stack_found(made: ContourSurface, slices: Slices, told: bool) -> Stage[None
         "fit": {"filled_faces": int(made.filled.sum())},
     }
     warnings = []
-    if told and widest > APART * slices.distance:
+    if not of_study and widest > APART * slices.distance:
         warnings.append(f"slices lie up to {widest:.4g} apart, {slices.distance:.4g} as a rule: that is interpolated")
     if made.edge > made.asked_edge:
         warnings.append(f"voxels of {made.asked_edge:.4g} would not fit: they are {made.edge:.4g} wide")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -63,6 +63,13 @@ class Way:
         Lines of the summary, before and after that of the points, from the report.
     pictures : callable
         What `tomomesh.show.draw_all` takes of a segmentation, besides what it takes of all.
+    name : str
+        Its own in the table, which `tomomesh.ways.way_of` gives it.
+
+    Notes
+    -----
+    Its stages must tell, of the report, ``points`` with ``unit``, ``count`` and ``spacing_mm``, as
+    `tomomesh.ways.sections.points_found` does; all else may be left out.
     """
 
     applies: Callable[[Settings, str], bool]
@@ -73,7 +80,8 @@ class Way:
     require: Callable[[Settings], None] = nothing_more
     of_networks: Callable[[Told], list[str]] = no_lines
     of_body: Callable[[Told], list[str]] = no_lines
-    pictures: Callable[[Segmentation[Any]], dict[str, Any]] = field(default=no_stages)
+    pictures: Callable[[Segmentation[Any]], dict[str, Any]] = no_stages
+    name: str = ""
 
 
 def on_input(settings: Settings, input: str) -> str:

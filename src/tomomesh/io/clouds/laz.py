@@ -38,17 +38,17 @@ def check_chunks(path: Path, header: Any) -> None:
     IndexError, OSError, ValueError, struct.error
         Where the chunks make no sense.
     """
-    held, start = path.stat().st_size, header.offset_to_point_data
+    size, start = path.stat().st_size, header.offset_to_point_data
     compressor, points_each = RECORD.unpack_from(header.vlrs.get("LasZipVlr")[0].record_data)
     if compressor == UNCHUNKED:
         return
     with path.open("rb") as file:
         count = _count(file, start)
         # every chunk begins with a point as it is
-        require_bytes(count * header.point_format.size, held, file=str(path))
+        require_bytes(count * header.point_format.size, size, file=str(path))
         require_rows(header.point_count, count * points_each, "points in its chunks", file=str(path))
         if header.point_format.id in CHUNK_LAYERS:
-            _check_layers(file, start, header, held, str(path))
+            _check_layers(file, start, header, size, str(path))
 
 
 def _count(file: IO[bytes], start: int) -> int:
@@ -62,7 +62,7 @@ def _count(file: IO[bytes], start: int) -> int:
     return int.from_bytes(file.read(4), "little")
 
 
-def _check_layers(file: IO[bytes], start: int, header: Any, held: int, name: str) -> None:
+def _check_layers(file: IO[bytes], start: int, header: Any, size: int, name: str) -> None:
     """Step from chunk to chunk: a point, how many there are, the length of each layer, the layers."""
     layers = CHUNK_LAYERS[header.point_format.id] + header.point_format.num_extra_bytes
     head = struct.Struct(f"<{1 + layers}I")
@@ -71,7 +71,7 @@ def _check_layers(file: IO[bytes], start: int, header: Any, held: int, name: str
         file.seek(at + header.point_format.size)
         count, *lengths = head.unpack(file.read(head.size))
         at += header.point_format.size + head.size + sum(lengths)
-        require_bytes(at, held, file=name)
+        require_bytes(at, size, file=name)
         if count == 0:
             raise ValueError(at)
         left -= count

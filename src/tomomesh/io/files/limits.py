@@ -18,13 +18,13 @@ def require_memory(promised: int, *, file: str) -> None:
     ResourceError
         Where `promised` bytes are more than the physical memory.
     """
-    held = physical_memory()
-    if promised > held:
+    memory = physical_memory()
+    if promised > memory:
         raise ResourceError(
             "the data do not fit into the memory",
             file=file,
             found=f"size = {promised} bytes",
-            expected=f"at most {held} bytes",
+            expected=f"at most {memory} bytes",
             hint="a part of it, or a machine with more memory",
         )
 

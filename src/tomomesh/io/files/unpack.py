@@ -100,7 +100,7 @@ def _opened(plain: Any, packing: str) -> Any:
     return _Zlib(plain) if packing == ZLIB else plain
 
 
-def check_promise(promised: int, held: int, packing: str, *, file: str) -> None:
+def check_promise(promised: int, packed: int, packing: str, *, file: str) -> None:
     """Compare the bytes that a header promises with the memory, and with what so many packed bytes can hold.
 
     Raises
@@ -111,7 +111,7 @@ def check_promise(promised: int, held: int, packing: str, *, file: str) -> None:
         Where the file cannot hold them.
     """
     require_memory(promised, file=file)
-    require_bytes(promised, max(held, 0) * RATIOS[packing], file=file)
+    require_bytes(promised, max(packed, 0) * RATIOS[packing], file=file)
 
 
 def fill(data: NDArray[Any], stream: Any, *, file: str) -> None:

@@ -94,7 +94,7 @@ def find_studies(folder: str | Path, *, without: Iterable[Path] = (), series: in
         raise FormatError("--each takes a folder of studies", file=str(folder), found="a file")
     left_out = {path.resolve() for path in without}
     inner = sorted(path for path in top.iterdir() if path.is_dir() and not path.name.startswith("."))
-    whole = _holds_slices(top)
+    whole = _has_slices(top)
     found = _volumes_in(top, top, deep=False) + (_slices_in(top, top, series) if whole else [])
     for path in inner:
         if not path.is_symlink() and path.resolve() not in left_out:
@@ -107,7 +107,7 @@ def find_studies(folder: str | Path, *, without: Iterable[Path] = (), series: in
     return _named(sorted(found, key=lambda study: (study.path, study.series or 0)))
 
 
-def _holds_slices(folder: Path) -> bool:
+def _has_slices(folder: Path) -> bool:
     """Tell whether a folder itself holds DICOM, so that it is read with all that is below it."""
     return index_in(folder) is not None or any(map(_surely_dicom, regular_files(folder)[0]))
 

@@ -112,7 +112,7 @@ def advance(
     begin, end : int
         Vertices to work on.
     """
-    h, damping, limit, hold = rates[0], rates[1], rates[2], rates[3]
+    h, damping, limit, restoring = rates[0], rates[1], rates[2], rates[3]
     pull, total = np.empty(3), np.empty(3)
     sums[:] = 0.0
     for v in range(begin, end):
@@ -120,14 +120,14 @@ def advance(
         along = projections[v, 0]
         tension = speed = change = drawn = 0.0
         total[:] = 0.0
-        for n in range(start[v], start[v + 1] if hold < 1.0 else start[v]):
+        for n in range(start[v], start[v + 1] if restoring < 1.0 else start[v]):
             for axis in range(3):
                 total[axis] += places[neighbors[n], axis]
         for axis in range(3):
             speed += velocities[v, axis] ** 2
         slow = min(1.0, limit / max(h * np.sqrt(speed), 1e-300))
         for axis in range(3):
-            pull[axis] = (1 - hold) * total[axis] / count + hold * origins[v, axis] - places[v, axis]
+            pull[axis] = (1 - restoring) * total[axis] / count + restoring * origins[v, axis] - places[v, axis]
             along += projections[v, 1 + axis] * (places[v, axis] - anchors[v, axis])
             tension += projections[v, 1 + axis] * pull[axis]
             drawn += projections[v, 1 + axis] ** 2

@@ -51,7 +51,7 @@ def move_in_cells(
     steps: NDArray[np.float64],
     places: NDArray[np.float64],
     low: NDArray[np.float64],
-    wall: float,
+    margin: float,
     moves: NDArray[np.float64],
     sums: NDArray[np.float64],
     start: int,
@@ -67,8 +67,8 @@ def move_in_cells(
         Where the vertices are.
     low : (n, 3) float array
         Lowest corners of their cells, whose edge is 1.
-    wall : float
-        How far a vertex keeps from the walls of its cell.
+    margin : float
+        How far a vertex keeps from the faces of its cell.
     moves : (n, 3) float array
         How far each moved last; afterwards, how far it moves now.
     sums : (3,) float array
@@ -81,7 +81,7 @@ def move_in_cells(
         speed = change = 0.0
         for axis in range(3):
             place = places[v, axis] + steps[v, axis]
-            place = min(max(place, low[v, axis] + wall), low[v, axis] + (1 - wall))
+            place = min(max(place, low[v, axis] + margin), low[v, axis] + (1 - margin))
             move = place - places[v, axis]
             speed += move * move
             change += (move - moves[v, axis]) ** 2

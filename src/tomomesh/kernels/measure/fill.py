@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 
 @kernel("void(f8[:,::1], i8[:,::1], i2[:,:,::1])")
-def add_walls(vertices: NDArray[np.float64], faces: NDArray[np.int64], steps: NDArray[np.int16]) -> None:
-    """Add to every voxel the walls that lie between it and the voxel below: 1 on the way in, -1 on the way out.
+def add_winding_steps(vertices: NDArray[np.float64], faces: NDArray[np.int64], steps: NDArray[np.int16]) -> None:
+    """Add to every voxel the faces that lie between it and the voxel below: 1 on the way in, -1 on the way out.
 
     The running sum along k is then the winding number at each center.
 
@@ -31,7 +31,7 @@ def add_walls(vertices: NDArray[np.float64], faces: NDArray[np.int64], steps: ND
     -----
     A ray runs along k through every (i, j). A side of a face is crossed by the line of row j where one end lies at or
     before the row and the other one behind it, at a place that is always counted from the end of lower number: so the
-    faces on its two sides agree on which rays pass on which side of it, whatever is rounded, and as many walls lead
+    faces on its two sides agree on which rays pass on which side of it, whatever is rounded, and as many faces lead
     into the mesh as out of it. Centers on the mesh are inside where it begins, and outside where it ends.
     """
     last_k, last_j, last_i = steps.shape

@@ -29,7 +29,7 @@ class PixelElement:
     keyword: str
     kind: str
     start: int
-    held: int
+    available: int
     encapsulated: bool
 
 
@@ -62,5 +62,5 @@ def pixel_element(file: BinaryIO, header: Any, *, name: str) -> PixelElement:
     start += 12 if wide else 8
     remaining = max(file.seek(0, os.SEEK_END) - start, 0)
     kind = "OW" if implicit or head[4:6] == b"OW" else "OB"
-    held = remaining if length == UNDEFINED else min(length, remaining)
-    return PixelElement(keyword, kind, start, held, length == UNDEFINED)
+    available = remaining if length == UNDEFINED else min(length, remaining)
+    return PixelElement(keyword, kind, start, available, length == UNDEFINED)

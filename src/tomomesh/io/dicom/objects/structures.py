@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 FINEST, FINE = 0.1, 0.3
 """Distances of the points on a contour, in distances of the slices: corners that are nearer are left out; longer sides
-get points."""
+get points. Chosen, on a torus: half of the first changes the distance by -6 %, twice by +18 %; half of the other by
+-23 %, twice by +58 %."""
 MOST_POINTS = 20_000_000
 """Points that a structure may have: their positions alone are half a gigabyte."""
 
@@ -146,8 +147,8 @@ def _chosen(structures: list[Structure], wanted: str | None, *, file: str) -> St
             expected="--structure with a number or a name of the table",
         )  # fmt: skip
     if not found or not found[0].contours:
-        held = _table(found or structures, file) or "0 structures"
-        raise EmptyError("there are no closed contours", file=file, found=held, expected=" or ".join(CLOSED))
+        listed = _table(found or structures, file) or "0 structures"
+        raise EmptyError("there are no closed contours", file=file, found=listed, expected=" or ".join(CLOSED))
     return found[0]
 
 

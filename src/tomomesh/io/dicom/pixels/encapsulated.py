@@ -82,7 +82,7 @@ def _check_whole(file: BinaryIO, element: PixelElement, name: str) -> None:
     FormatError
         Where one is cut off, or the last is not followed by the end.
     """
-    place, end = element.start, element.start + element.held
+    place, end = element.start, element.start + element.available
     while place + 8 <= end:
         file.seek(place)
         group, number, length = struct.unpack("<HHI", file.read(8))
@@ -92,4 +92,4 @@ def _check_whole(file: BinaryIO, element: PixelElement, name: str) -> None:
         if group << 16 | number != ITEM:
             raise FormatError("the compressed pixels are no sequence of fragments", file=name)
         place += length
-    require_bytes(place + 8 - element.start, element.held, file=name)
+    require_bytes(place + 8 - element.start, element.available, file=name)

@@ -35,13 +35,13 @@ def check_native(element: PixelElement, layout: PixelLayout) -> None:
             found=f"TransferSyntaxUID = {layout.syntax.name}",
             hint="a corrected header",
         )
-    promised, held = layout.plain_bytes, element.held
-    require_bytes(promised, held, file=layout.name)
-    if held - promised >= max(promised // (layout.frames * layout.rows), 2):
+    promised, available = layout.plain_bytes, element.available
+    require_bytes(promised, available, file=layout.name)
+    if available - promised >= max(promised // (layout.frames * layout.rows), 2):
         raise FormatError(
             "the file holds more pixels than its header promises",
             file=layout.name,
-            found=f"data = {held} bytes",
+            found=f"data = {available} bytes",
             expected=f"{promised} bytes for Rows x Columns",
         )
 

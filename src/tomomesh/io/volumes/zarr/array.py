@@ -175,13 +175,13 @@ def _check_lengths(array: Any, files: dict[str, Path], file: str) -> None:
     """Compare what chunks hold with their voxels; those in shards, and zstd's that do not say it, are passed over."""
     codecs = array.compressors[-1:] if not array.shards else ()
     packing = next((str(getattr(codec, "codec_id", type(codec).__name__)) for codec in codecs), "")
-    held = 2 * math.prod(array.chunks) * array.dtype.itemsize + 2**16
+    most = 2 * math.prod(array.chunks) * array.dtype.itemsize + 2**16
     for key in (key for key in files if Path(key).name not in (*DOCUMENTS, ".zattrs")):
-        promised = promised_bytes(files[key], packing.removesuffix("Codec").lower(), held, file=file)
-        if promised > held:
+        promised = promised_bytes(files[key], packing.removesuffix("Codec").lower(), most, file=file)
+        if promised > most:
             found = f"chunk = {promised} bytes and more"
             raise ResourceError(
-                "a chunk holds far more than its voxels", file=file, found=found, expected=f"{held} bytes"
+                "a chunk holds far more than its voxels", file=file, found=found, expected=f"{most} bytes"
             )
 
 
