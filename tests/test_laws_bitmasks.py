@@ -16,7 +16,7 @@ from tomomesh.cuberille import bitmasks as module
 from tomomesh.cuberille.bitmasks import EDGE, Blocks
 from tomomesh.cuberille.neighbors import OFFSETS
 from tomomesh.errors import ResourceError
-from tomomesh.kernels.cuberille.bitmasks import flood, neighbor, popcount
+from tomomesh.kernels.cuberille.bitmasks import flood, neighbor, popcount, touches
 from tomomesh.model.cubes import MARGIN, SIDE, keys_of
 
 if TYPE_CHECKING:
@@ -207,3 +207,17 @@ def test_threads_change_no_bitmask(monkeypatch: pytest.MonkeyPatch) -> None:
     cells = np.random.default_rng(0).integers(-20, size(60, 5), (200, 3))
     one, two = (Blocks.around(cells, 4, threads=n) for n in (1, 2))
     assert one.grown(one.bitmask_of(cells), 3).tobytes() == two.grown(two.bitmask_of(cells), 3).tobytes()
+
+
+@pytest.mark.parametrize(
+    ("column", "step"),
+    [(4, (0, 0, -1)), (10, (0, -1, 0)), (12, (-1, 0, 0)), (14, (1, 0, 0)), (16, (0, 1, 0)), (22, (0, 0, 1))],
+)
+def test_a_block_is_left_over_the_side_where_it_is_reached(column: int, step: tuple[int, int, int]) -> None:
+    """By each of its cubes alone."""
+    for cell in product(range(8), repeat=3):
+        blocks = Blocks.around(np.array([cell]), 0)
+        reached = blocks.bitmask_of(np.array([cell]))
+        leaves = any(not 0 <= at + by < 8 for at, by in zip(cell, step, strict=True))
+        [block] = np.flatnonzero(blocks.count(reached).any(axis=1))
+        assert touches(reached, block, column) == leaves

@@ -13,6 +13,7 @@ from conftest import law, seeds
 from tomomesh.kernels.pointcloud.bridges import bridge, full_sectors
 from tomomesh.kernels.pointcloud.linear_algebra import smallest_axis, solve, tangents
 from tomomesh.kernels.pointcloud.samples import fit_planes, settle
+from tomomesh.kernels.pointcloud.sheet import DIRECTIONS, find_disks
 from tomomesh.pointcloud.search import Index
 
 if TYPE_CHECKING:
@@ -138,3 +139,21 @@ class TestBridges:
         steps = wide * np.arange(1, pieces) / pieces
         assert all(np.abs(straight[:, 0] - step).min() < 1e-9 for step in steps)
         assert (laid[:total, 2] == 0).all()
+
+
+@law(40)
+@given(seeds, st.floats(0.8, 2.0))
+def test_disks_that_touch_a_sample_are_empty_where_no_center_is_nearer_to_another(seed: int, radius: float) -> None:
+    places = np.random.default_rng(seed).uniform(-3, 3, (12, 2))
+    rows = np.column_stack([places, np.zeros((12, 3)), np.ones((12, 2))])
+    index = Index.of(rows[:, :3], 2.0)
+    rows, beyond, radii = rows[index.order], np.empty(12, np.int64), np.empty(12)
+    find_disks(rows, *index.cells, radius, beyond, radii, 0, 12)
+    np.testing.assert_allclose(radii, radius)
+    axes, turn = np.empty((2, 3)), 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    tangents(np.array([0, 0, 1.0]), axes)
+    for p, row in enumerate(rows[:, :3]):
+        centers = row + radius * (np.outer(np.cos(turn), axes[0]) + np.outer(np.sin(turn), axes[1]))
+        others = np.delete(rows[:, :3], p, axis=0)
+        empty = (np.linalg.norm(centers[:, None] - others, axis=2) >= radius).all(axis=1)
+        np.testing.assert_array_equal([beyond[p] >> way & 1 for way in range(DIRECTIONS)], empty)
