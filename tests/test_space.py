@@ -182,7 +182,7 @@ class TestSurface:
         made = reconstruct(volume_of(ellipsoid()), **asked, allow_leaks=True)
         assert_sound(made, genus=0)
         assert any("--signal boundary" in warning for warning in made.report["warnings"])
-        assert any("of what it should" in warning for warning in made.report["warnings"])
+        assert any("of the volume of its window" in warning for warning in made.report["warnings"])
 
     def test_faces_outward_from_a_mirrored_start(self) -> None:
         vertices, faces = icosphere(4)
