@@ -298,7 +298,7 @@ class TestFaults:
         assert (out.errors, err.errors) == ("strict", "backslashreplace")
         err.write("\u00fc")
         err.flush()
-        said = err.buffer.getvalue()  # type: ignore[attr-defined]
+        said = err.buffer.getvalue()
         assert said.count(b"\\xfc") == 1
         assert b"\\xe4" not in said
         assert ends or b"h?upter" in said
