@@ -3,7 +3,7 @@
     python benchmarks/constants.py pointcloud.cloud pointcloud.samples
 
 For each number that a module defines: by how much the mean distance to the truth and the volume or area change, the
-worst over some made clouds, stacks and networks, or what fails. Numbers of compiled kernels are baked in: edit them.
+worst over some made clouds, stacks, studies and parts, or what fails.
 """
 
 from __future__ import annotations
@@ -17,34 +17,89 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numba.core.caching import NullCache
+from numba.core.dispatcher import Dispatcher
 
 from tomomesh import TomomeshError, Volume, reconstruct, reconstruct_points
+from tomomesh.measure.thickness import walls_and_gaps
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
+    from tomomesh.results import Surface
+
     Floats = NDArray[np.float64]
 
 COUNT = 3000
-CASES = {
-    "pointcloud": ("torus", "noisy"),
+ANY_POINTS = ("torus", "noisy", "noisier", "holes", "thin")
+IN_SPACE = ("ball in space", "nearest", "torus in space")
+CASES: dict[str, tuple[str, ...]] = {
+    "pointcloud": ANY_POINTS,
     "contours": ("stack",),
     "opensurface": ("half a ball",),
-    "segmentation": ("components", "walls"),
+    "segmentation": ("rings", "components", "walls"),
+    "segmentation.space": IN_SPACE,
+    "som": ("rings", "online", "components", "walls", *IN_SPACE),
+    "model": IN_SPACE,
     "measure": ("components", "walls", "stack"),
+    "isosurface": ("soft", "mask"),
+    "dynamics": ("rings", "ball in space", *ANY_POINTS),
+    "printing": ("hollow",),
+    "ways": ("rings", "ball in space", *ANY_POINTS),
+    "kernels.pointcloud": ANY_POINTS,
+    "kernels.pointcloud.sheet": ("half a ball",),
+    "kernels.dynamics": ("ball in space", *ANY_POINTS),
+    "kernels.measure": ("walls and gaps",),
+    "kernels.som": ("rings", "online"),
 }
-"""What the numbers of each folder are tried on."""
+"""What the numbers of each folder are tried on; of one with several entries the longest counts."""
+STUDIES: dict[str, dict[str, Any]] = {
+    "rings": {"neurons": 60},
+    "online": {"neurons": 60, "training": "online"},
+    "components": {"neurons": 60, "contours": "components"},
+    "walls": {"neurons": 60, "contours": "walls"},
+    "soft": {"network": "none"},
+    "mask": {"network": "none"},
+    "ball in space": {"network": "sphere", "signal": "boundary"},
+    "nearest": {"network": "sphere", "signal": "boundary", "attraction": "nearest"},
+    "torus in space": {"network": "torus", "neurons": 600},
+    "hollow": {"network": "none", "hollow": 2.0},
+    "walls and gaps": {"network": "none"},
+}
+"""How each study of a thick shell, or a torus, is meshed."""
 OUTER, INNER, MIDDLE = 28.0, 20.0, np.array([39.0, 39.0, 31.0])
 """Radii and middle of a thick shell, mm."""
+RING, TUBE = 24.0, 9.0
+"""Radii of a torus around the same middle, mm."""
 NOISE = 0.05
-"""Of the noisy torus of radii 3 and 1: a quarter of the distance of its points."""
+"""Of the noisy torus of radii 3 and 1: a quarter of the distance of its points.
+
+The noisier one has three times that, the thin disk a fifth.
+"""
 
 
 def around(places: Floats) -> Floats:
     """Return the distance to a torus of radii 3 and 1."""
     return np.asarray(np.hypot(np.hypot(places[:, 0], places[:, 1]) - 3, places[:, 2]) - 1)
+
+
+FLAT = np.array([1.0, 1.0, 0.15])
+"""Half axes of a thin disk."""
+
+
+def beside_disk(places: Floats) -> Floats:
+    """Return the distance to a flat ellipsoid, to first order."""
+    at, slope = places / FLAT, 2 * places / FLAT**2
+    return np.asarray(((at**2).sum(axis=1) - 1) / np.sqrt((slope**2).sum(axis=1)))
+
+
+def _outside(places: Floats, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Tell which points (n,) lie outside of six round holes, two to seven sampling distances wide."""
+    middles, radii = rng.choice(places, 6, replace=False), np.linspace(0.2, 0.7, 6)
+    apart = np.sqrt(((places[:, None] - middles) ** 2).sum(axis=2))
+    return np.asarray((apart > radii).all(axis=1))
 
 
 @cache
@@ -67,34 +122,59 @@ def clouds() -> dict[str, tuple[Floats, dict[str, Any], Callable[[Floats], Float
     return {
         "torus": (torus, {}, around),
         "noisy": (noisy, {}, around),
+        "noisier": (torus + rng.normal(0, 3 * NOISE, torus.shape), {}, around),
+        "holes": (torus[_outside(torus, rng)], {}, around),
+        "thin": (0.2 * NOISE * rng.normal(size=ball.shape) + ball * FLAT, {}, beside_disk),
         "half a ball": (ball[ball[:, 2] > 0], {"open": True}, lambda x: np.sqrt((x**2).sum(axis=1)) - 1),
         "stack": (rings, {}, around),
     }
 
 
 def measured(name: str) -> tuple[float, float]:
-    """Return the mean distance of a mesh to its truth, and its volume, or area where it is open."""
+    """Return the mean distance of a mesh to its truth, and its area."""
     if name in clouds():
         points, changes, distance = clouds()[name]
-        made = reconstruct_points(points, threads=1, **changes)
-        size = made.mesh.corners
-        area = np.sqrt((np.cross(size[:, 1] - size[:, 0], size[:, 2] - size[:, 0]) ** 2).sum(axis=1)).sum() / 2
-        return float(np.abs(distance(made.mesh.vertices)).mean()), float(area)
-    made = reconstruct(shell(), lower=50.0, contours=name, neurons=60, threads=1)
-    radius = np.sqrt(((made.mesh.vertices - MIDDLE) ** 2).sum(axis=1))
-    off = np.minimum(np.abs(radius - OUTER), np.abs(radius - INNER))
-    return float(off.mean()), float(made.report["quality"]["area_mm2"])
+        mesh = reconstruct_points(points, threads=1, **changes).mesh
+        return float(np.abs(distance(mesh.vertices)).mean()), float(mesh.face_areas.sum())
+    made = meshed(name)
+    if name == "walls and gaps":
+        walls, gaps = walls_and_gaps(made.mesh, threads=1)
+        wide = [np.minimum(found.widths, 2 * OUTER) for found in (walls, gaps)]
+        return float(np.abs(wide[0] - (OUTER - INNER)).mean()), float(wide[1].mean())
+    if made.part is None:
+        return beside_truth(name, made.mesh.vertices), float(made.mesh.face_areas.sum())
+    added = made.part.mesh.vertices[len(made.mesh.vertices) :]
+    radius, wall = np.sqrt(((added - MIDDLE) ** 2).sum(axis=1)), STUDIES[name]["hollow"]
+    off = np.minimum(np.abs(radius - OUTER + wall), np.abs(radius - INNER - wall))
+    return float(off.mean()), float(made.part.mesh.face_areas.sum())
+
+
+def meshed(name: str) -> Surface:
+    """Mesh a study."""
+    kind = "torus" if name.startswith("torus") else "mask" if name == "mask" else "shell"
+    return reconstruct(study(kind), lower=50.0, threads=1, **STUDIES[name])
+
+
+def beside_truth(name: str, places: Floats) -> float:
+    """Return the mean distance of places to the nearer border of what a study shows."""
+    away = places - MIDDLE
+    if name.startswith("torus"):
+        return float(np.abs(np.hypot(np.hypot(away[:, 0], away[:, 1]) - RING, away[:, 2]) - TUBE).mean())
+    radius = np.sqrt((away**2).sum(axis=1))
+    return float(np.minimum(np.abs(radius - OUTER), np.abs(radius - INNER)).mean())
 
 
 @cache
-def shell() -> Volume:
-    """Return a study of a thick shell, with two specks beside it: 16 slices 3 mm apart, 2 mm pixels, soft borders."""
-    z, y, x = (np.indices((22, 40, 40)).T * [3.0, 2.0, 2.0]).T - np.reshape(
-        [MIDDLE[2], MIDDLE[1], MIDDLE[0]], (3, 1, 1, 1)
-    )
+def study(kind: str) -> Volume:
+    """Return a study of a torus, or a thick shell with two specks beside it: 22 slices 3 mm apart, 2 mm pixels."""
+    z, y, x = (np.indices((22, 40, 40)).T * [3.0, 2.0, 2.0]).T - np.reshape(MIDDLE[::-1], (3, 1, 1, 1))
     radius = np.sqrt(x**2 + y**2 + z**2)
-    levels = 100 * np.clip(0.5 + np.minimum(OUTER - radius, radius - INNER) / 2, 0, 1)
-    levels[2, 3:5, 3:5] = levels[11, 3:9, 3:9] = 100
+    inside = np.minimum(OUTER - radius, radius - INNER)
+    if kind == "torus":
+        inside = TUBE - np.hypot(np.hypot(x, y) - RING, z)
+    levels = 100.0 * (inside > 0) if kind == "mask" else 100 * np.clip(0.5 + inside / 2, 0, 1)
+    if kind != "torus":
+        levels[2, 3:5, 3:5] = levels[11, 3:9, 3:9] = 100
     return Volume.from_stored(levels.astype(np.int16), np.diag([2.0, 2.0, 3.0, 1.0]))
 
 
@@ -134,15 +214,28 @@ def other(module: Any, name: str, new: Any) -> Iterator[None]:
         one
         for key, one in list(sys.modules.items())
         if key.startswith("tomomesh") and getattr(one, name, None) is old
-        if one is module or re.search(rf"from \S*\b{tail} import .*\b{name}\b", Path(one.__file__ or "").read_text())
+        if one is module
+        or re.search(rf"from \S*\b{tail} import ([^\n(]*|\([^)]*)\b{name}\b", Path(one.__file__ or "").read_text())
     ]
-    for one in own:
-        setattr(one, name, new)
-    try:
-        yield
-    finally:
+    for value in (new, old):
         for one in own:
-            setattr(one, name, old)
+            setattr(one, name, value)
+        recompile(own, name)
+        if value is new:
+            yield
+
+
+def recompile(modules: list[Any], name: str) -> None:
+    """Compile anew, callees first, the kernels in which a number of some modules is baked in."""
+    stale: set[str] = set()
+    for module in [one for key, one in sys.modules.items() if key.startswith("tomomesh.kernels")]:
+        for key, found in list(vars(module).items()):
+            if isinstance(found, Dispatcher) and found.py_func.__module__ == module.__name__:
+                used = set(found.py_func.__code__.co_names)
+                if used & stale or (name in used and module in modules):
+                    found._cache = NullCache()  # type: ignore[attr-defined]
+                    found.recompile()
+                    stale.add(key)
 
 
 def told(before: dict[str, Any], after: dict[str, Any]) -> str:
@@ -166,7 +259,7 @@ def main() -> None:
     """Print a row a number."""
     known: dict[tuple[str, ...], dict[str, Any]] = {}
     for path in sys.argv[1:]:
-        cases = CASES[path.partition(".")[0]]
+        cases = CASES[max((folder for folder in CASES if path.startswith(folder)), key=len)]
         before = known.setdefault(cases, results(cases))
         module = importlib.import_module(f"tomomesh.{path}")
         for name, value in list(numbers_of(module)):

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from .stage import Later
 
 PLAUSIBLE = 0.15
-"""Difference from the volume of the rings over which a result is warned of."""
+"""Difference from the volume of the rings over which a result is warned of. Measured on the built-in head and an MR:
+0.4 and 0.0 %, and 4.5 % around loops."""
 HINTS = {
     "rings": "no --no-caps, a larger --cell-mm or --closing, --network none, or --allow-leaks",
     "slices": "--allow-leaks, which writes it all the same",
@@ -33,7 +34,8 @@ HINTS = {
 }
 """What may help, by what a mesh should have enclosed."""
 FAR = 2.0
-"""Distance of the surface from one point in twenty, slice distances, from which a result is warned of."""
+"""Distance of the surface from one point in twenty, slice distances, from which a result is warned of. Measured on the
+built-in head and an MR: 0.1 and 0.3, and 5 where a network in space leaves out bays."""
 
 
 def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage[Surface], tuple[Later, ...]]:

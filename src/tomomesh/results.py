@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+import numpy as np
 from scipy.spatial import cKDTree
 
 from .model.columns import any_of
@@ -12,7 +13,6 @@ from .model.points import CAP
 from .report import Reported
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from .model.cubes import CubeGrid
@@ -70,7 +70,7 @@ class Enclosed:
     @classmethod
     def window(cls, found: Segmentation[Any]) -> Enclosed:
         """Return the volume of the voxels of a window, mm^3."""
-        return cls("window", int(found.mask.sum()) * found.volume.voxel_mm3)
+        return cls("window", np.count_nonzero(found.mask) * found.volume.voxel_mm3)
 
     def share(self, mesh: TriMesh) -> float:
         """Return how much of it a mesh encloses; 1 where there is nothing to enclose."""

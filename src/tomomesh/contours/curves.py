@@ -25,8 +25,8 @@ LONG = 1.5
 """Medians over which a side of a ring is a gap, and gets points. Chosen: half of it changes the distance by +22.6 %,
 twice by -4.0 %."""
 DENSE = 0.25
-"""Distance of the points on a fine curve, in pixels. Chosen: half of it changes the distance by +0.4 %, twice by -0.2
-%."""
+"""Distance of the points on a fine curve, in pixels. Chosen: half of it changes the distance by +0.4 %, twice by
+-0.2 %."""
 NEAR = 3.0
 """Pixels from a curve within which distances are exact. Chosen: half of it changes the distance by +2.5 %, twice by
 +10.4 %."""

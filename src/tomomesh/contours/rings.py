@@ -36,7 +36,7 @@ LEAST = 6
 """Points that a contour has at least. Chosen: half and twice of it change no case of benchmarks/constants.py."""
 STIRRED = 1e-3
 """Share of the mean distance by which points are moved before they are triangulated: thousands of points on one circle
-would take seconds."""
+would take seconds. Chosen: half and twice of it change no case of benchmarks/constants.py."""
 BIG = 1_000_000
 """More than the barriers between any two regions."""
 
@@ -161,6 +161,7 @@ class _Web:
     def over(cls, points: NDArray[np.float64]) -> _Web:
         low, high = points.min(axis=0), points.max(axis=0)
         wide = float((high - low).max())
+        # three widths away from the middle: what closes the web outside is no part of a contour
         frame = (low + high) / 2 + 3.0 * wide * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
         placed = np.concatenate([points, frame])
         stirred = np.random.default_rng(0).uniform(-STIRRED, STIRRED, points.shape) * (wide / len(points))

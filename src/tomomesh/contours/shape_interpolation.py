@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Array = TypeVar("Array", Floats, Values)
 
 MARGIN = 3
-"""Voxels of background around the shapes."""
+"""Voxels of background around the shapes. Chosen: half of it changes the distance by -0.2 %, twice by 0.0 %."""
 FAR = np.float32(1e4)
 """Distance far outside, in voxels. Farther than volumes are wide, and exact in 32 bits."""
 ENDS = 0.5

@@ -46,8 +46,8 @@ STIR = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np
 """Odd numbers of 64 bits, which stir the bits of three coordinates into one."""
 LOOKED_AT, CLOSED, SHORT = 8, 0.5, 2.0
 """Slices whose contours are looked at, the share of the points that must be on closed ones, and the longest gaps that
-those may have, in local sampling distances. Chosen: half and twice change distance -1.3 % and distance +1.2 %
-(LOOKED_AT); nothing and no stack found (CLOSED); no stack found and nothing (SHORT)."""
+those may have, in local sampling distances. Chosen: half of the first changes the distance by -1.3 %,
+twice by +1.2 %; with twice of the second, or half of the third, the stack is not found."""
 
 
 @dataclass(frozen=True)

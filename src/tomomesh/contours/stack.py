@@ -120,7 +120,7 @@ def contour_surface(
     GeometryError
         Where a contour does not close; names the height of its slice.
     EmptyError
-        Where no contour encloses anything.
+        Where no contour encloses anything, or all are too thin for the voxels.
     """
     placed = slices.placed(points)
     planar = [np.unique(placed[slices.labels == k, :2], axis=0) for k in range(len(slices.heights))]
@@ -138,7 +138,9 @@ def contour_surface(
     levels = filled_between(stack, threads=threads, progress=progress)
     np.negative(levels, out=levels)
     volume = _volume(levels, stack, slices)
-    edges = boundary(volume, levels > 0, lower=0.0, threads=threads)
+    inside = levels > 0
+    _require_any(inside, stack.edge)
+    edges = boundary(volume, inside, lower=0.0, threads=threads)
     fit = fit or FitSettings()
     softer = replace(fit, stiffness=SPRINGS * fit.stiffness)
     rest = voxel_surface(edges, softer, threads=threads, progress=progress)
@@ -150,6 +152,15 @@ def contour_surface(
         sum(len(outlined.rings) for outlined in found), sum(len(outlined.open) for outlined in found),
         max(outlined.reach for outlined in found), stack.edge, asked, levels.size, _between(stack),
     )  # fmt: skip
+
+
+def _require_any(inside: NDArray[np.bool_], edge: float) -> None:
+    """Refuse contours that enclose the center of no voxel."""
+    if not inside.any():
+        raise EmptyError(
+            "the contours enclose no voxel", found=f"edge = {edge:.4g}", expected="contours wider than a voxel",
+            hint="a smaller --cell",
+        )  # fmt: skip
 
 
 def _between(stack: Stack) -> float:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Bitmask = NDArray[np.uint64]
 
 EDGE = 8
-"""Cubes along a block."""
+"""Cubes along a block: a row of them is a byte, a layer a word of 64 bits."""
 SHARE = 4_096
 """Blocks worked on in one call: a few milliseconds."""
 MOST = 4_000_000

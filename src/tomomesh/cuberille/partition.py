@@ -87,9 +87,14 @@ def cubes_over(
 
 def is_flat(positions: NDArray[np.float64], length: float) -> bool:
     """Tell whether points lie in a plane, on a line or at one place, up to a millionth of a length."""
+    return dimensions(positions, length) < 3
+
+
+def dimensions(positions: NDArray[np.float64], length: float) -> int:
+    """Return 3 for points in space, 2 in a plane, 1 on a line and 0 at one place, up to a millionth of a length."""
     centered = positions - positions.mean(axis=0)
     variance = np.linalg.svd(centered.T @ centered / len(positions), compute_uv=False)
-    return bool(variance[-1] <= (FLAT * length) ** 2)
+    return int(np.count_nonzero(variance > (FLAT * length) ** 2))
 
 
 def sampling_distance(positions: NDArray[np.float64], *, neighbors: int = 6, threads: int = 0) -> float:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import GeometryError
 from ..kernels.dynamics.projections import first_projections, nearest_places, renew_projections
 from ..kernels.dynamics.quads import split_quads
 from ..kernels.dynamics.springs import advance
@@ -41,7 +42,7 @@ NARROW = 0.68
 """Width of the weights of exact samples, sampling distances: the best of those measured on clean clouds."""
 SHARE = 1 / 3
 """Width of the weights over the width with which a sample was settled: what is settled is smooth already, and a third
-only spans the samples (more folds thin parts)."""
+only spans the samples (more folds thin parts). Chosen: half of it changes the distance by -0.1 %, twice by -13.7 %."""
 SEEKING = (3, 6, 10, 20)
 """Steps before which vertices are projected anew, and from then on drawn back to where they were. After the last
 nothing changes but that each moves straight to its projection, so that all come to rest, in 30 steps for clean and
@@ -52,10 +53,12 @@ STALE = 0.15
 EXACT = 0.05
 """The same the last time: wrong by 0.0003, less than the default tolerance."""
 RESTORING = 1 / 3
-"""Share that the spring which draws a vertex back to where it was has of the stiffness of all its springs."""
+"""Share that the spring which draws a vertex back to where it was has of the stiffness of all its springs. Chosen: half
+of it changes the distance by -0.9 %, twice by +2.0 %."""
 SAGITTA = 0.5
-"""Share of the height of a square's middle by which its corners rise: a chord lies below the curve, and this much
-makes the mean distance of the surface from its samples least."""
+"""Share of the height of a square's middle by which its corners rise: a chord lies below the curve, and this much makes
+the mean distance of the surface from its samples least. Measured, of the vertices alone half of it changes the distance
+by -25 %, twice by +50 %."""
 
 
 @dataclass(frozen=True)
@@ -107,15 +110,32 @@ def fit_to_surface(
     Returns
     -------
     SurfaceFit
+
+    Raises
+    ------
+    GeometryError
+        Where no vertex has samples near: all of the surface would be made up.
     """
     projector = _Projector.under(vertices, ring, samples, threads)
     steps = _ProjectionSteps(vertices, ring, projector, edge, settings, threads)
     state, trace = iterate(steps, settings.max_steps, progress)
     filled, normals = _unprojected(state.projections), state.projections[:, 1:].copy()
+    _require_any(~filled, samples)
     if filled.any():
         normals[filled] = ring.normals(state.places)[filled]
     places, faces = _split(state.places, normals, ring)
     return SurfaceFit(places, faces, filled, trace)
+
+
+def _require_any(met: NDArray[np.bool_], samples: Samples) -> None:
+    """Refuse a mesh and samples of which none have met."""
+    if not met.any():
+        raise GeometryError(
+            "no vertex of the mesh lies near a sample, so nothing of the surface would be measured",
+            found=f"{len(samples.positions)} sample(s), {float(np.median(samples.spacing)):.4g} apart",
+            expected="samples all over the surface, and a mesh near them",
+            hint="more points, a larger --cell, or of a network in space more --neurons",
+        )
 
 
 def _unprojected(projections: Floats) -> NDArray[np.bool_]:
@@ -208,6 +228,7 @@ class _Projector:
         index = Index.of(samples.positions, SIGHT * float(np.median(width)))
         rows = rows[index.order]
         vertex = _nearest(rows, vertices, index.frame[3], threads)
+        _require_any(vertex >= 0, samples)
         facing = np.einsum("ij,ij->i", ring.normals(vertices)[vertex], rows[:, 3:6])
         rows[:, 3:6] *= np.where(facing < 0, -1.0, 1.0)[:, None]
         if (vertex < 0).any():

@@ -33,14 +33,16 @@ if TYPE_CHECKING:
 BLOCK = 40_000
 """Vertices or faces handled in one call: far below 100 ms."""
 MARGIN = 1e-3
-"""Share of a cell that a vertex keeps from its faces, so that two vertices, each in a cell of its own, never meet."""
+"""Share of a cell that a vertex keeps from its faces, so that two vertices, each in a cell of its own, never meet.
+Chosen: half and twice of it change the distance by 0.0 %."""
 TENSION = 2.4
 """Stiffness of the springs at a setting of 1. Measured on a CT and an MR at the default setting: more would turn less
 than marching cubes by more than a tenth, and lie farther from them than 0.06 and 0.09 voxel."""
 BENDING, BENDS = 0.4, 40
 """Share of the bending force that is followed in a step: a net that goes up and down from vertex to vertex keeps 1 - 4b
 of its height, and half would never rest. And the most steps: more would move it on for hundreds of them, by less than
-0.01 voxel each, and round off what the mask shows."""
+0.01 voxel each, and round off what the mask shows. Chosen: half of the share changes the distance by +4.8 %, twice by
++205 %; half of the steps by +4.7 %, twice by -3.3 %."""
 
 STEPS = np.array([key_step(direction) for direction in DIRECTIONS])
 MIXED = np.array([0 < case < 255 for case in range(256)])

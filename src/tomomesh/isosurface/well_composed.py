@@ -25,7 +25,7 @@ LAYERS = 8
 MOST_CELLS = 40_000_000
 """Cells over which a surface is refused: it would take some 16 gigabytes."""
 PART = 200_000
-"""Cells or voxels looked at together."""
+"""Cells or voxels looked at together. No result depends on it."""
 CORNERS = np.array([(n & 1, n >> 1 & 1, n >> 2) for n in range(8)], np.int32)
 """Steps (x, y, z) from the lowest corner of a cell to each of its eight."""
 

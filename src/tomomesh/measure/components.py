@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int32]
 
 LISTED = 100
-"""Components that are listed at most."""
+"""Components that are listed at most, so that a report stays readable."""
 
 
 class Components:

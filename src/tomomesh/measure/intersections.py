@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 BLOCK = 2_000
 """Leaves of the tree handled at once: some milliseconds."""
 ROOM = 1_000
-"""Pairs looked for first."""
+"""Pairs looked for first: where there are more, room is made. No result depends on it."""
 
 
 def self_intersections(mesh: TriMesh, *, threads: int = 0, progress: Progress = silent) -> NDArray[np.bool_]:
@@ -75,6 +75,8 @@ class Crossings:
         moved : (n,) bool array, optional
             The vertices that have moved since the last call, all marked ones among them, where nothing else changed.
         """
+        if not len(mesh.faces):
+            return np.zeros(0, np.bool_)
         if self._single:
             mesh = mesh.moved(mesh.vertices.astype(np.float32).astype(np.float64))
         if self._tree is None or moved is None:

@@ -10,6 +10,7 @@ import numpy as np
 from ..kernels.measure.bvh import curve_keys, enclose_leaves, enclose_nodes, order_keys
 from ..kernels.measure.triangles import nearest_simplices
 from ..kernels.threads import in_blocks
+from ..model.columns import for_kernels
 from ..progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -62,13 +63,14 @@ class Tree:
     @classmethod
     def over(cls, vertices: Floats, simplices: Ints, *, threads: int = 0) -> Tree:
         """Build the tree of simplices (m, k) over vertices (n, 3)."""
-        vertices = np.ascontiguousarray(vertices, np.float64)
+        vertices, simplices = for_kernels(vertices, np.float64), for_kernels(simplices, np.int32)
         order = _along_curve(vertices, simplices, threads)
         simplices = simplices.take(order, axis=0)
         return cls(vertices, simplices, order, _boxes(vertices, simplices, threads))
 
     def moved(self, vertices: Floats, *, threads: int = 0) -> Tree:
         """Return the tree of the same simplices where their vertices have moved a little."""
+        vertices = for_kernels(vertices, np.float64)
         return replace(self, vertices=vertices, boxes=_boxes(vertices, self.simplices, threads))
 
     def nodes_with(self, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -109,6 +111,7 @@ class Tree:
         (p,) int32 array
             Numbers of the simplices.
         """
+        points = for_kernels(points, np.float64)
         distance, number = np.empty(len(points)), np.empty(len(points), np.int32)
         if len(points) == 0:
             return distance, number
@@ -144,8 +147,8 @@ def _boxes(vertices: Floats, simplices: Ints, threads: int) -> Floats:
 
 def _along_curve(vertices: Floats, simplices: Ints, threads: int) -> Ints:
     """Order simplices along a space-filling curve, the large ones after all others."""
-    vertices = np.ascontiguousarray(vertices, np.float64)
     some = vertices[simplices[:: max(len(simplices) // SOME, 1)]]
+    # all but the farthest 1 % on each side, and a span more around: places far off do not coarsen the curve
     low, high = np.percentile(some.mean(axis=1), [1, 99], axis=0)
     span = max(float((high - low).max()), 1e-300)
     usual = max(float(np.median(np.ptp(some, axis=1).max(axis=1))), 1e-9 * span)

@@ -1,14 +1,19 @@
-"""Reductions of (n, k) arrays with few columns, column by column: along the rows numpy takes twenty times as long."""
+"""(n, k) arrays with few columns: as kernels take them, and reduced column by column.
+
+Along the rows numpy takes twenty times as long.
+"""
 
 from __future__ import annotations
 
 from functools import reduce
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
+
+Kind = TypeVar("Kind", bound=np.generic)
 
 
 def box(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -26,3 +31,8 @@ def cells_at(
 def any_of(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Tell which rows (n, k) have any true column, (n,)."""
     return reduce(np.logical_or, rows.T)
+
+
+def for_kernels(numbers: ArrayLike, kind: type[Kind]) -> NDArray[Kind]:
+    """Return numbers of one type, row after row, aligned and writable; a copy only where they are not."""
+    return np.require(numbers, kind, ["C", "A", "W"])

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 GOLDEN = (1 + 5**0.5) / 2
+"""The golden ratio: the corners of three rectangles of these sides are those of an icosahedron."""
 
 
 def icosphere(frequency: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -31,7 +32,8 @@ def icosphere(frequency: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     # a vertex is its integer weights of the twelve corners, so that what two faces share is found exactly
     keys, numbers = np.unique(weights.reshape(-1, len(corners)), axis=0, return_inverse=True)
     places = keys @ corners
-    faces = numbers.reshape(len(triangles), -1)[:, _pieces(frequency)].reshape(-1, 3)
+    # NumPy lays what it picks by columns as it likes: of one piece a triangle, column by column
+    faces = np.ascontiguousarray(numbers.reshape(len(triangles), -1)[:, _pieces(frequency)].reshape(-1, 3))
     return places / np.sqrt((places**2).sum(axis=1, keepdims=True)), faces
 
 

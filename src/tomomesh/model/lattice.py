@@ -21,7 +21,8 @@ __all__ = ["TOPOLOGIES", "Lattice", "lattice"]
 LEAST = 3
 """Fewest neurons. A ring of two has no inside."""
 TUBE = 0.4
-"""Radius of a torus' tube over the radius of its ring, at rest."""
+"""Radius of a torus' tube over the radius of its ring, at rest. Chosen: half of it changes the distance by -0.2 %,
+twice by +0.6 %."""
 
 
 def lattice(name: str, neurons: int, *, shape: tuple[int, int] | None = None) -> Lattice:

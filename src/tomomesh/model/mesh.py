@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .columns import for_kernels
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class TriMesh:
     """A triangle mesh: two arrays, and whatever follows from them on first use.
+
+    Arrays of any type and order of memory are taken, lists too; a copy is made where they are not as below.
 
     Attributes
     ----------
@@ -34,6 +38,10 @@ class TriMesh:
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", for_kernels(self.vertices, np.float64))
+        object.__setattr__(self, "faces", for_kernels(self.faces, np.int64))
 
     def moved(self, vertices: NDArray[np.float64]) -> TriMesh:
         """Return the same faces over other positions."""

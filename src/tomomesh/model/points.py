@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from .columns import for_kernels
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -71,6 +72,7 @@ class PointSet:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "positions", for_kernels(self.positions, np.float64))
         for name, values in self.attributes.items():
             if values.ndim not in (1, 2) or len(values) != len(self.positions):
                 raise UsageError(

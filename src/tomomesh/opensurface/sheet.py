@@ -16,11 +16,11 @@ from ..cuberille.closing import close_shell
 from ..cuberille.faces import exposed_faces
 from ..cuberille.leak_test import LeakTest
 from ..cuberille.neighbors import dilate
-from ..cuberille.partition import cubes_over
+from ..cuberille.partition import cubes_over, dimensions
 from ..dynamics.low_pass import OneRing
 from ..dynamics.moving_least_squares import SurfaceFit, fit_to_surface
 from ..dynamics.untangle import untangle
-from ..errors import GeometryError
+from ..errors import EmptyError, GeometryError
 from ..model.columns import any_of
 from ..model.cubes import cells_of
 from ..model.mesh import TriMesh
@@ -137,8 +137,11 @@ def open_sheet(
     Raises
     ------
     GeometryError
-        Where both sides of the surface are one.
+        Where both sides of the surface are one, or the samples lie on a line or at one place.
+    EmptyError
+        Where nothing of the sheet is measured, or nothing lies within its borders.
     """
+    _require_extent(samples)
     threads, edge = settings.run.threads, float(cell.min())
     found, samples = borders(samples, edge, threads=threads)
     kept = _kept_side(samples, spanned, found, cell, settings)
@@ -155,11 +158,32 @@ def open_sheet(
         if not crossing.any():
             break
     filled = any_of(fitted.filled[mesh.faces])[source]
+    _require_measured(filled, samples)
     quads, smoothed = ring.quads.astype(np.int64), TriMesh(kept.smoothed, mesh.faces)
     return OpenSheet(
         kept.leak_test, kept.cubes, kept.lattice, quads, smoothed, sheet, filled, crossing,
         fitted, taken_back,
     )  # fmt: skip
+
+
+def _require_extent(samples: Samples) -> None:
+    """Refuse samples that span no surface."""
+    extent = dimensions(samples.positions, float(np.median(samples.spacing)))
+    if extent < 2:
+        raise GeometryError(
+            "the points span no surface: they lie " + ("on a line" if extent else "at one place"),
+            found=f"{len(samples.positions)} sample(s)", expected="points all over a surface",
+        )  # fmt: skip
+
+
+def _require_measured(filled: NDArray[np.bool_], samples: Samples) -> None:
+    """Refuse a sheet of which nothing, or nothing measured, lies within its borders."""
+    if filled.all():
+        raise EmptyError(
+            "nothing of the sheet is measured within its borders",
+            found=f"{len(samples.positions)} sample(s), {float(np.median(samples.spacing)):.4g} apart",
+            expected="points all over a surface", hint="more points, or another --cell",
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from .samples import Samples
 
 SETTLED = 480
-"""Bytes for each point while the points are settled."""
+"""Bytes for each point while the points are settled. Measured, as those below: tests hold a run's peak under their
+sum."""
 MEASURED = 100
 """Bytes for each point while the distances to the mesh are measured."""
 FACE = 860

@@ -30,7 +30,7 @@ STRAIGHTER = 0.9
 leads to a refusal."""
 OFF = 5.0
 """Distance from the surface under a point, over the region's, from which it is a stray. Chosen: half of it changes the
-distance by +1.0 %, twice nothing."""
+distance by +15.5 %, twice by -0.2 %."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 FIT = FitSettings()
 """At the default stiffness the inner side is even; with less of it, its vertices swing about the distance asked for."""
 SIMPLER = 0.005
-"""Distance over the thickness of the wall by which the inner side may move where it is made coarser."""
+"""Distance over the thickness of the wall by which the inner side may move where it is made coarser. Chosen: half of it
+changes the distance by -0.5 %, twice by +0.1 %."""
 
 
 def hollowed(mesh: TriMesh, wall: float, *, threads: int, progress: Progress) -> TriMesh:

@@ -22,9 +22,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 STEPS = 3
-"""Nodes along the thickness of a wall."""
+"""Nodes along the thickness of a wall. Chosen: half of it changes the distance of the inner side by +7.1 %, twice by
+-0.9 %, with eight times the nodes."""
 COARSEST = 16
-"""Nodes along the blocks that are looked at first; they are halved four times."""
+"""Nodes along the blocks that are looked at first; they are halved four times. Only speed depends on it."""
 MOST_NODES = 100_000_000
 """Nodes over which a grid is refused: it would take some two gigabytes."""
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 SIDES = 48
 """Sides of a hole. Its area is (2 pi / 48)^2 / 6 = 0.3 % under the circle's, its narrowest width 0.2 %."""
 WIDEST = 0.5
-"""Most of the part's width that a hole may take: a wider one would take the shape away."""
+"""Most of the part's width that a hole may take: a wider one would take the shape away. Chosen, for a refusal only."""
 INSIDE = 1e-6
 """Height over the size of the part from which the wall below a cavity is looked for. What 32-bit coordinates keep,
 6e-8, with room for one turn."""
@@ -61,6 +61,7 @@ def drained(mesh: TriMesh, diameter: float, down: str) -> TriMesh:
     piece, volumes = pieces_of(mesh)
     holes = []
     for inward in np.flatnonzero(volumes < 0):
+        # what lies within a tenth of the hole of the lowest place is its floor
         place = _floor(mesh.corners[piece == inward].mean(axis=1), way, 0.1 * diameter)
         hits = solid.ray_cast(place - INSIDE * size * way, place + size * way)
         holes += _hole(place, way, [hit.distance * (1 + INSIDE) * size for hit in hits], diameter)

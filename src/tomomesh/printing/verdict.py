@@ -19,10 +19,11 @@ if TYPE_CHECKING:
     from ..settings import PrintSettings
 
 STEEP = float(np.sqrt(0.5))
-"""Cosine of the angle to the way down over which a face hangs over: 45 degrees. The usual limit of printers without
-supports."""
+"""Cosine of the angle to the way down over which a face hangs over: 45 degrees, the usual limit of printers without
+supports (Thomas 2009)."""
 NEAR = 10
-"""Widest gap that is looked for, over the thinnest wall that the printer makes."""
+"""Widest gap that is looked for, over the thinnest wall that the printer makes. Chosen: wider ones are left out of the
+report, and none of them keeps a part from being printed."""
 ON_PLATE = 1e-6
 """Height over the size of the part up to which it lies on the plate. What 32-bit coordinates keep, 6e-8, with room for
 one turn."""

@@ -18,11 +18,12 @@ if TYPE_CHECKING:
 NAMED = 24
 """Labels that are named where one is missing, at most. So that an error stays a line."""
 MOST = 4096
-"""Labels over which a label map is doubted."""
+"""Labels over which a label map is doubted. A warning's threshold, chosen: maps at hand have 2 to 54."""
 HIGHEST_LABEL = 2**16
 """A volume with higher levels is no label map. Label maps have 8 or 16 bits."""
 EVEN = 0.8
-"""Share of equal neighbors, among those that are both over 0, from which levels are labels."""
+"""Share of equal neighbors, among those that are both over 0, from which levels are labels. Measured: 0.86 to 1.00 in
+label maps, 0.03 to 0.22 in images."""
 
 
 def select(labels: Volume, wanted: Sequence[int]) -> NDArray[np.bool_]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .window import Limit
 
 APART = 4
-"""One slice in so many is looked at for labels."""
+"""One slice in so many is looked at for labels. Only a warning depends on it; labels fill many slices."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 WIDE = 8
 """Dimensions over which matrix products are faster than the compiled loops: measured, 58 to 1,600 neurons."""
 BLOCK = 2_048
-"""Inputs matched together."""
+"""Inputs matched together. No result depends on it."""
 
 
 def best_matching_units(codebook: Floats, inputs: Floats) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

@@ -54,14 +54,16 @@ class Shell:
 
 @dataclass(frozen=True)
 class Inside:
-    """What is known of the inside of a surface: the volume of its rings and of its window, 0 where there are none.
-
-    `may_be_flat` tells whether the points may rightly lie in a plane, as those of a flat cloud or of one slice do.
-    """
+    """What is known of the inside of a surface: the volume of its rings, and its window; nothing of a cloud's."""
 
     rings_mm3: float = 0.0
     window_mm3: float = 0.0
-    may_be_flat: bool = True
+    mask: NDArray[np.bool_] | None = None
+
+    @property
+    def may_be_flat(self) -> bool:
+        """Whether points may rightly lie in a plane, as those of a flat cloud or of a window of one slice do."""
+        return self.mask is None or bool(min(np.ptp(self.mask.nonzero(), axis=1)) == 0)
 
     def or_more(self, hollow: Enclosed) -> Enclosed:
         """Return the largest that is known; what a shell of cubes is hollow by counts where there are no rings."""
@@ -151,7 +153,7 @@ def _walls(shell: Shell, positions: Floats, settings: Settings, asked: Inside) -
     cell, rings_mm3 = float(shell.grid.cell_mm.min()), asked.rings_mm3
     if shell.volume >= LEAST * rings_mm3 if rings_mm3 else shell.held.tight:
         return walls_found(1)
-    if asked.may_be_flat and is_flat(positions, cell):
+    if is_flat(positions, cell) and asked.may_be_flat:
         return walls_found(2, FLAT_SHELL)
     if settings.cubes.allow_leaks:
         return walls_found(2, LEAKY_SHELL)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..measure.rings import assess_contours
 from ..results import Enclosed, Segmentation
 from ..segmentation.contours.inputs import share_of_holes, slices_with_several
@@ -19,6 +17,7 @@ from .sections import body_of_cubes, missed, points_found
 from .way import CUBES, POINTS, SPRINGS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from ..model.networks import Networks
@@ -28,9 +27,11 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 CROWDED = 0.25
-"""Share of the slices with several components side by side over which one network a slice is warned of."""
+"""Share of the slices with several components side by side over which one network a slice is warned of. A warning's
+threshold, chosen: no mesh depends on it."""
 HOLES = 0.15
-"""Area of the holes in the slices over that of the window from which an outline that fills them is warned of."""
+"""Area of the holes in the slices over that of the window from which an outline that fills them is warned of. A
+warning's threshold, chosen: no mesh depends on it."""
 
 
 def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Networks]]:
@@ -50,8 +51,7 @@ def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> 
 def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Turn the neurons of all slices into a closed surface."""
     sampling, window = found.sampling, Enclosed.window(found)
-    flat = min(np.ptp(found.mask.nonzero(), axis=1)) == 0
-    inside = Inside(sampling.volume_mm3, window.volume, may_be_flat=bool(flat))
+    inside = Inside(sampling.volume_mm3, window.volume, found.mask)
     return surface_on_cubes(found.points, sampling.spacing_mm, settings, progress, inside)
 
 

@@ -18,11 +18,13 @@ if TYPE_CHECKING:
     from ..model.trace import Trace
 
 DRAWN = 0.9
-"""Share of the vertices that must have a point near them, else a result is warned of."""
+"""Share of the vertices that must have a point near them, else a result is warned of. A warning's threshold, chosen: no
+mesh depends on it."""
 WIDE = 3
-"""Closing over which a result is warned of, cubes."""
+"""Closing over which a result is warned of, cubes. A warning's threshold, chosen: no mesh depends on it. The built-in
+head and an MR are closed by one (measured)."""
 FILLED = 0.05
-"""Share of filled faces over which a result is warned of."""
+"""Share of filled faces over which a result is warned of. A warning's threshold, chosen: no mesh depends on it."""
 
 
 SMALL = ": the cubes are small for the points"

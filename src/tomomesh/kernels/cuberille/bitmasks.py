@@ -21,10 +21,15 @@ if TYPE_CHECKING:
     Table = NDArray[np.int32]
 
 ONE, EIGHT, SEVEN, LONG = np.uint64(1), np.uint64(8), np.uint64(7), np.uint64(56)
+"""Steps within a word of 8 x 8 cubes: to the next along x, the next along y, and to the other end of either."""
 FIRST_COLUMN, LAST_COLUMN = np.uint64(0x0101010101010101), np.uint64(0x8080808080808080)
+"""The cubes of x = 0 and of x = 7."""
 PAIRS, FOURS, EIGHTS = np.uint64(0x5555555555555555), np.uint64(0x3333333333333333), np.uint64(0x0F0F0F0F0F0F0F0F)
+"""Every other bit, two bits and four bits: bits are counted in pairs, fours and eights (Warren 2002)."""
 TWO, FOUR = np.uint64(2), np.uint64(4)
+"""Bits by which those are moved."""
 FIRST_ROW, ZERO, ALL = np.uint64(0xFF), np.uint64(0), np.uint64(0xFFFFFFFFFFFFFFFF)
+"""The cubes of y = 0, none, and all."""
 
 
 @kernel("i8(u8)")

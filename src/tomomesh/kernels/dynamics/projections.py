@@ -16,10 +16,12 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
 
 LONGER = 1.25
-"""Most that the reach grows where samples are far: at 2.25 x 1.25 = 2.8 widths a Gaussian weight is down to 2 %."""
+"""Most that the reach grows where samples are far: at 2.25 x 1.25 = 2.8 widths a Gaussian weight is down to 2 %.
+Chosen: half of it changes the distance by +35 %, twice by +7 %."""
 FACING = 0.2
 """Cosine of the angle between a sample's normal and the mesh's under which the sample belongs to another side: 78
-degrees, so that both planes of a sharp edge have a say and the back of a thin part has none."""
+degrees, so that both planes of a sharp edge have a say and the back of a thin part has none. Chosen: half of it changes
+the distance by +0.3 %, twice by -1.0 %."""
 
 
 @kernel("void(f8[:,::1], f8[:,::1], i8[::1], i4[::1], f8[::1], i4[::1], i8, i8)")
@@ -124,7 +126,7 @@ def project(
         for axis in range(3):
             projection[1 + axis] += weights[n] * samples[p, 3 + axis]
     length = np.sqrt(projection[1] ** 2 + projection[2] ** 2 + projection[3] ** 2)
-    if total < 1e-12 or length == 0.0:
+    if total < 1e-12 or length == 0.0:  # seven widths away
         return False
     for axis in range(3):
         projection[1 + axis] /= length
@@ -226,6 +228,7 @@ def renew_projections(
         for axis in range(3):
             away += (places[v, axis] - samples[nearest[v], axis]) ** 2
         reach = SIGHT * samples[nearest[v], 6]
+        # a hundredth more than the way to the nearest sample, or rounding would leave it out
         reach = min(max(1.01 * np.sqrt(away), reach), LONGER * reach)
         if project(samples, blocks, start, frame, places[v], projections[v, 1:], reach, projection, found, weights):
             projections[v], anchors[v] = projection, places[v]

@@ -14,15 +14,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FACING = 0.5
-"""Cosine of 60 degrees: two places face each other where their normals are opposite but for so much."""
+"""Cosine of 60 degrees: two places face each other where their normals are opposite but for so much. Chosen: of a wall
+of 8 mm, half of it changes the width between by -1.9 %, with twice of it no places face."""
 FREE = 0.5
 """Radius of the ball that must be free of all faces, over that of the ball that those which face the place leave: one
-with less looks past an edge."""
+with less looks past an edge. Chosen: half of it changes the error of a wall's thickness by -22 %, and with twice of it
+hardly a ball is free."""
 CLOSE = 0.005
-"""Share of its diameter by which a ball may be too large: a node that would change less is not looked at, or a ball
-in a ball would touch every face."""
+"""Share of its diameter by which a ball may be too large: a node that would change less is not looked at, or a ball in
+a ball would touch every face. Chosen: half of it changes the error of a wall's thickness by 0.0 %, twice by +0.1 %."""
 ROUNDS = 12
-"""Most times that a ball is made smaller at one face; each leaves a fraction of the error of the one before."""
+"""Most times that a ball is made smaller at one face; each leaves a fraction of the error of the one before. Chosen:
+half and twice of it change no case of benchmarks/constants.py."""
 
 
 @kernel("f8(f8[::1], f8[:,::1], i4[:,::1], i8, f8[::1])")

@@ -67,6 +67,7 @@ def curve_keys(
             cell = (cell | cell << 4) & 0x10C30C30C30C30C3
             cell = (cell | cell << 2) & 0x1249249249249249
             key |= cell << axis
+        # each size spans a factor of 8; 200 of the 256 numbers that 8 bits above the curve have, so that none overflows
         while extent > 8.0 * usual and key < np.int64(200) << SIZE:
             extent /= 8.0
             key += np.int64(1) << SIZE

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     Rows = NDArray[np.float64]
 
 BOX, PLANE, ROWS = 3, 5, 7
+"""Columns, or rows, of a face's prepared numbers: where its box and its plane begin, after three corners, and all."""
 APART, COPLANAR, THROUGH = 0, 1, 2
+"""What two faces are to each other."""
 ROUNDING = 8e-16
 """Largest error of a computed 3 x 3 determinant of differences, over the sum of its terms' sizes (Shewchuk 1997)."""
 

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 TINY = 1e-300
+"""Least divisor: below all that places in 64 bits leave, so that it changes no quotient but 0 / 0, which becomes 0."""
 
 
 @kernel("f8(f8[:,::1], i8, f8[:,::1], i4[:,::1], i8)")

@@ -22,9 +22,11 @@ empty are 67."""
 TANGENT = 0.41421356237309503
 """Tangent of the angle of a sector: pi / 8."""
 STEEP = 0.5
-"""Slope over which a bridge would leave the surface at its end."""
+"""Slope over which a bridge would leave the surface at its end. Chosen: half of it changes the distance by +6.8 %,
+twice by 0.0 %."""
 SAME_SIDE = 0.5
-"""Cosine of the angle between the normals over which two rims belong together."""
+"""Cosine of the angle between the normals over which two rims belong together. Chosen: half of it changes the distance
+by +0.1 %, twice by +5.3 %."""
 
 
 @kernel("i8(f8[:,::1], f8[::1])")

@@ -23,6 +23,7 @@ def smallest_axis(matrix: Floats, axis: Floats) -> None:
     vectors = np.eye(3)
     for _ in range(8):
         off = matrix[0, 1] ** 2 + matrix[0, 2] ** 2 + matrix[1, 2] ** 2
+        # squares: what is left beside the diagonal is a million millionth of it, and rounding is next
         if off <= 1e-24 * (matrix[0, 0] ** 2 + matrix[1, 1] ** 2 + matrix[2, 2] ** 2):
             break
         for i in range(2):
@@ -61,7 +62,7 @@ def solve(matrix: Floats, right: Floats) -> bool:
             for k in range(j):
                 rest -= matrix[i, k] * matrix[j, k]
             if i == j:
-                if rest <= 1e-12:
+                if rest <= 1e-12:  # not positive, but for rounding
                     return False
                 matrix[i, i] = np.sqrt(rest)
             else:

@@ -17,11 +17,14 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
 
 DIRECTIONS = 32
-"""Directions around a sample in which a disk is laid beside it."""
+"""Directions around a sample in which a disk is laid beside it. Chosen: half of it changes the distance by +3.3 %; for
+twice of it a word has too few bits."""
 BEND = 0.5
-"""Sine of the angle between two planes from which a neighbor is unfolded about the line where they meet."""
+"""Sine of the angle between two planes from which a neighbor is unfolded about the line where they meet. Chosen: half
+of it changes the distance by -1.3 %, twice nothing."""
 STEEP = 0.5
-"""Slope over which a neighbor that faces alike lies on another sheet."""
+"""Slope over which a neighbor that faces alike lies on another sheet. Chosen: half and twice of it change no case of
+benchmarks/constants.py."""
 
 
 @kernel("f8(f8[::1], f8[::1])")

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 COLUMNS = 64
-"""Columns of the totals that are added together."""
+"""Columns of the totals that are added together: 1,000 rows of them are half a megabyte, and stay in the second cache.
+No result depends on it."""
 
 
 @kernel("void(f8[:,::1], f8[::1], i4[::1], f4[::1], f8[:,::1])")

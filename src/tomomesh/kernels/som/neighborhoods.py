@@ -22,7 +22,8 @@ What inhibition pushes away moves farther the farther it is. Measured on a ring 
 a learning rate of 0.5 and leaves tangles in every run, -0.03 in none, and lies as near to the true line as a bubble.
 """
 FAR, FAR_END = 0.0015, 9.0
-"""Weight of the weak excitatory zone beyond, and where that ends in radii."""
+"""Weight of the weak excitatory zone beyond, and where that ends in radii: the paper gives no numbers. Chosen: half of
+the weight changes the distance by -3.5 %, twice by -3.0 %; half of the radii by -6.8 %, twice by +2.3 %."""
 
 
 @kernel("i8(f8[::1], f8, f8, i8)")

@@ -33,6 +33,7 @@ def finely(ring: Floats) -> Floats:
     """
     closed = np.concatenate([ring, ring[:1]])
     chord = np.sqrt((np.diff(closed, axis=0) ** 2).sum(axis=1))
+    # a millionth of the longest chord at least: neurons at one place get knots of their own
     step = np.sqrt(np.maximum(chord, 1e-6 * max(float(chord.max()), 1e-300)))
     knots = np.concatenate([[0.0], np.cumsum(step)])
     place = knots[:-1, None] + np.arange(FINE) / FINE * step[:, None]

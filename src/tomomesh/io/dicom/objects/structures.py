@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 FINEST, FINE = 0.1, 0.3
 """Distances of the points on a contour, in distances of the slices: corners that are nearer are left out; longer sides
-get points."""
+get points. Chosen, on a torus: half of the first changes the distance by -6 %, twice by +18 %; half of the other by
+-23 %, twice by +58 %."""
 MOST_POINTS = 20_000_000
 """Points that a structure may have: their positions alone are half a gigabyte."""
 
