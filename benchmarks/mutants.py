@@ -4,9 +4,10 @@
 
 A mutant is a copy of the program with one small fault: a comparison turned, a sign, a constant half as large again, a
 `not` dropped, an `and` for an `or`, a statement left out. Those of a seed are drawn evenly from an area's modules, and
-each is shown to the tests that are there for the area, the quick ones first. A test that fails, or that takes
-ten times as long as without a fault, has killed it. All that lies in an error's message, a type or a docstring
-stays as it is. Kernels are compiled once, in a cache of the copy's own; a mutant of a kernel runs in plain Python.
+each is shown to the tests that are there for the area: first those that name the module, then the others, the quick
+ones first. A test that fails has killed it, or work that takes twice as long as without a fault and ten CPU seconds
+more. All that lies in an error's message, a type or a docstring stays as it is. Kernels are compiled once, in a cache
+of the copy's own; a mutant of a kernel runs in plain Python, where some files of tests are left out.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from __future__ import annotations
 import argparse
 import ast
 import os
+import pkgutil
 import random
+import resource
 import shutil
 import sys
 import tempfile
@@ -35,15 +38,19 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[1]
 AREAS: dict[str, tuple[list[str], str]] = {
     "networks": (["som/*.py", "kernels/som/*.py"],
-        "twins_som laws_networks som_measures som_training som_topologies som_estimator laws_lines several_contours"),
+        "twins_som laws_networks laws_tiles som_measures som_training som_topologies som_estimator laws_lines "
+        "several_contours"),
     "cuberille": (["cuberille/*.py", "kernels/cuberille/*.py"],
-        "laws_cubes twins_geometry laws_faces laws_bitmasks laws_tracker laws_shell laws_surface laws_fit forecast"),
+        "laws_bitmasks laws_cubes laws_tracker laws_faces laws_shell twins_geometry laws_spacing laws_surface laws_fit "
+        "forecast two_walls"),
     "dynamics": (["dynamics/*.py", "kernels/dynamics/*.py"],
-        "collapse laws_fit convergence laws_surface space voxels laws_attributes sheet clouds"),
+        "twins_dynamics laws_fit laws_rest collapse laws_attributes laws_surface convergence space voxels sheet "
+        "clouds ways"),
     "points": (["segmentation/sample.py", "pointcloud/*.py", "kernels/pointcloud/*.py"],
-        "laws_attributes convergence laws_lines laws_surface open sheet clouds forecast end_to_end"),
-    "frames": (["io/**/frames.py", "io/**/affine.py"],
-        "frames io_nifti_pairs places io_nifti io_nrrd io_metaimage io_outputs io_agreement"),
+        "twins_points laws_clouds laws_spacing laws_attributes laws_tiles laws_lines laws_surface laws_matching "
+        "convergence open sheet clouds forecast two_walls ways end_to_end"),
+    "frames": (["io/frames.py", "io/volumes/affine.py", "model/volume.py"],
+        "volume io_nifti_pairs places frames io_nifti io_nrrd io_metaimage io_outputs io_agreement"),
 }  # fmt: skip
 TURNED: dict[type[ast.AST], Any] = {
     ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
@@ -55,7 +62,9 @@ OPPOSITE: dict[type[ast.AST], Any] = {ast.Lt: ast.Gt, ast.Gt: ast.Lt, ast.LtE: a
 SILENT = (ast.Raise, ast.JoinedStr, ast.Import, ast.ImportFrom)
 BEFORE = ("numba", "scipy.spatial", "scipy.stats", "trimesh", "nibabel", "pydicom", "skimage.measure", "matplotlib")
 """Libraries that are imported once, for all mutants."""
-PATIENCE = 10
+LONG = {"laws_surface", "convergence", "two_walls", "ways", "forecast", "end_to_end", "several_contours"}
+"""Files of tests that take too long in plain Python."""
+PATIENCE, LEAST_S = 2, 10
 ALWAYS = ("-x", "-q", "-p", "no:cacheprovider", "-n0", "--no-header")
 
 
@@ -66,6 +75,16 @@ class Mutant:
     path: Path
     node: ast.expr | ast.stmt
     after: str
+
+    @property
+    def module(self) -> str:
+        """Return the dotted name of the module."""
+        return ".".join(self.path.relative_to("src").with_suffix("").parts)
+
+    @property
+    def plain(self) -> bool:
+        """Tell whether it runs in plain Python."""
+        return "kernels" in self.path.parts
 
     def source(self) -> str:
         """Return the whole module with its fault."""
@@ -126,46 +145,63 @@ def mutants(area: str) -> list[Mutant]:
     ]
 
 
-def run(copy: Path, test: str, plain: bool) -> None:
-    """Run a file of tests in this process, a fork that knows nothing of the program yet, and end it."""
-    home = str(copy / "src")
-    os.environ |= {"XDG_CACHE_HOME": str(copy / "cache"), "NUMBA_DISABLE_JIT": str(int(plain)), "PYTHONPATH": home}
-    import_module("numba.core.config").reload_config()
+def prepare(copy: Path) -> None:
+    """Import the kernels of the copy, and what else no mutant changes, once for all forks."""
+    os.environ |= {"XDG_CACHE_HOME": str(copy / "cache"), "PYTHONPATH": str(copy / "src")}
+    sys.path.insert(0, str(copy / "src"))
+    for name in BEFORE:
+        import_module(name)
+    kernels = import_module("tomomesh.kernels")
+    for module in pkgutil.walk_packages(kernels.__path__, "tomomesh.kernels."):
+        import_module(module.name)
+
+
+def run(copy: Path, names: list[str], plain: bool, most_s: int) -> None:
+    """Run files of tests in this process, a fork that knows of the program at most its kernels, and end it."""
+    resource.setrlimit(resource.RLIMIT_CPU, (most_s, most_s))
+    if plain:
+        os.environ["NUMBA_DISABLE_JIT"] = "1"
+        import_module("numba.core.config").reload_config()
+        for name in [name for name in sys.modules if name.startswith("tomomesh")]:
+            del sys.modules[name]
     os.chdir(copy)
-    sys.path.insert(0, home)
     with Path(os.devnull).open("w") as nothing, redirect_stdout(nothing), redirect_stderr(nothing):
-        os._exit(pytest.main([*ALWAYS, test]))
+        os._exit(pytest.main([*ALWAYS, *(f"tests/test_{name}.py" for name in names)]))
 
 
-def passes(copy: Path, area: str, *, plain: bool, most_s: float | None = None) -> bool:
-    """Tell whether all tests of an area pass in time; those of kernels in plain Python are laws and twins."""
-    names = [name for name in AREAS[area][1].split() if name.startswith(("laws", "twins")) or not plain]
-    return all(ends_well((copy, f"tests/test_{name}.py", plain), most_s) for name in names)
-
-
-def ends_well(what: tuple[Path, str, bool], most_s: float | None) -> bool:
-    """Tell whether a fork that runs a file of tests ends in time, and without a fault."""
-    child = get_context("fork").Process(target=run, args=what, daemon=True)
+def passes(copy: Path, names: list[str], plain: bool, most_s: int = resource.RLIM_INFINITY) -> bool:
+    """Tell whether a fork that runs files of tests ends without a fault, in so many seconds of work."""
+    child = get_context("fork").Process(target=run, args=(copy, names, plain, most_s))
     child.start()
-    child.join(most_s)
-    child.kill()
+    child.join()
     return child.exitcode == 0
+
+
+def shown(mutant: Mutant, area: str) -> list[str]:
+    """Return an area's files of tests in the order that kills soonest; a kernel sees those that are short."""
+    names = [name for name in AREAS[area][1].split() if not (mutant.plain and name in LONG)]
+    return sorted(names, key=lambda name: mutant.module not in (ROOT / "tests" / f"test_{name}.py").read_text())
 
 
 def judged(copy: Path, area: str, chosen: list[Mutant]) -> Iterator[tuple[Mutant, bool]]:
     """Yield each mutant, and whether it survives."""
-    usual: dict[bool, float] = {}
+    usual_s: dict[bool, int] = {}
     for stamp, mutant in enumerate(chosen, int(time.time())):
-        plain, path = "kernels" in mutant.path.parts, copy / mutant.path
-        if plain not in usual:
-            began = time.perf_counter()
-            if not passes(copy, area, plain=plain):
+        plain, path, names = mutant.plain, copy / mutant.path, shown(mutant, area)
+        if plain not in usual_s:
+            began = work_s()
+            if not passes(copy, names, plain):
                 raise SystemExit(f"the tests of {area} fail without a fault (compiled: {not plain})")
-            usual[plain] = time.perf_counter() - began
+            usual_s[plain] = work_s() - began
         path.write_text(mutant.source(), encoding="utf-8")
         os.utime(path, (stamp, stamp))  # Python tells an old module from a new one by seconds
-        yield mutant, passes(copy, area, plain=plain, most_s=PATIENCE * usual[plain])
+        yield mutant, passes(copy, names, plain, PATIENCE * usual_s[plain] + LEAST_S)
         shutil.copy2(ROOT / mutant.path, path)
+
+
+def work_s() -> int:
+    """Return the CPU seconds of all forks so far."""
+    return int(sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2]))
 
 
 def main() -> None:
@@ -175,13 +211,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--folder", type=Path, help="where the copy stays, so that its kernels need no compiling again")
     chosen = parser.parse_args()
-    for name in BEFORE:
-        import_module(name)
     with tempfile.TemporaryDirectory() as temporary:
         copy = (chosen.folder or Path(temporary)) / ROOT.name
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".*", "__pycache__"), dirs_exist_ok=True)
         if not (shared := copy.parent / "shared").is_symlink():
             shared.symlink_to(ROOT.parent / shared.name)
+        prepare(copy)
         for area in chosen.area:
             found, told = mutants(area), Counter[bool]()
             some = random.Random(chosen.seed).sample(found, min(chosen.count, len(found)))

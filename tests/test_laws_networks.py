@@ -15,7 +15,7 @@ from tomomesh.errors import EmptyError
 from tomomesh.model.lattice import TOPOLOGIES, lattice
 from tomomesh.segmentation.training import regions, train_study
 from tomomesh.settings import FALLS, NetworkSettings
-from tomomesh.som.fit import fit, match, start_positions
+from tomomesh.som.fit import fit, match, radii, start_positions
 from tomomesh.som.region import train_region
 from tomomesh.som.shapes import SHAPES, shape
 
@@ -201,6 +201,19 @@ class TestRegion:
     def test_wants_an_input_for_every_neuron(self) -> None:
         with pytest.raises(EmptyError, match="5 inputs"):
             train_region(np.zeros((5, 2)), NetworkSettings(neurons=6))
+
+
+class TestRadius:
+    @law(30)
+    @given(neurons=st.integers(60, 90), radius=st.floats(45, 60), half_width=st.floats(5, 8), share=st.floats(0.3, 3))
+    def test_of_a_ring_ends_at_half_of_its_band_in_neurons(
+        self, neurons: int, radius: float, half_width: float, share: float
+    ) -> None:
+        """However finely the band is sampled."""
+        mask = np.abs(np.hypot(*np.mgrid[-70:70, -70:70]) - radius) < half_width
+        kind = NetworkSettings(training="batch", neighborhood="gaussian")
+        last = radii(np.argwhere(mask) * share**0.5, lattice("ring", neurons), kind, share)[1]
+        assert last == pytest.approx(half_width * neurons / (2 * np.pi * radius), rel=0.06)
 
 
 class TestNeighborStart:

@@ -14,6 +14,7 @@ from tomomesh.dynamics import moving_least_squares as mls
 from tomomesh.dynamics.iterate import iterate
 from tomomesh.dynamics.low_pass import OneRing
 from tomomesh.isosurface.voxels import boundary, voxel_surface
+from tomomesh.kernels.dynamics.springs import advance
 from tomomesh.model.trace import Motion, Trace
 from tomomesh.model.volume import Grid, Volume
 from tomomesh.pipeline import reconstruct_points
@@ -114,6 +115,19 @@ class TestProjections:
         """Without them it would creep: four times as fast at the twentieth step."""
         made = reconstruct_points(torus(size(3000, 1500)))
         assert trace_of(made).speed[19] < 0.004
+
+    def test_a_third_of_the_springs_holds_until_the_last_projection(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        shares: list[float] = []
+
+        def told(*given: Any) -> None:
+            shares.append(float(given[7][3]))
+            advance(*given)
+
+        monkeypatch.setattr(mls, "advance", told)
+        made = reconstruct_points(sphere(300), max_steps=22)
+        assert len(made.mesh.vertices) < mls.BLOCK
+        assert shares == [pytest.approx(1 / 3)] * 20 + [1.0] * (len(shares) - 20)
+        assert len(shares) > 20
 
     def test_springs_even_the_mesh_out_all_the_same(self, monkeypatch: pytest.MonkeyPatch) -> None:
         points = torus(size(3000, 900))

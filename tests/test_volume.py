@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from itertools import permutations, product
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds
+from tomomesh.errors import GeometryError
+from tomomesh.io.volumes.affine import check_affine, check_spacing
 from tomomesh.model.volume import Volume
 
 if TYPE_CHECKING:
@@ -93,11 +96,21 @@ class TestVolume:
     def test_keeps_the_layers_of_a_color_last(self) -> None:
         color = np.stack([numbered(), -numbered()], axis=-1)
         volume = Volume.from_stored(color, affine_of((2, 0, 1), (1, -1, 1))).along(0)
-        assert volume.voxels.shape[3] == 2
+        assert volume.layers == 2
+        assert Volume.from_stored(numbered(), np.eye(4)).layers == 1
         np.testing.assert_array_equal(volume.voxels[..., 0], -volume.voxels[..., 1])
 
     def test_is_axial_where_spacings_are_equal(self) -> None:
         assert Volume.from_stored(numbered(), np.diag([1.0, 1.0005, 1.0, 1.0])).thickest_axis() == 2
+
+    @pytest.mark.parametrize("axis", range(3))
+    @pytest.mark.parametrize(("rows", "cut_across"), [(16, False), (17, True)])
+    def test_is_not_cut_across_the_width_of_a_slab(self, axis: int, rows: int, cut_across: bool) -> None:
+        """Of two slices whose rows and columns are more than eight times as many, wherever the wide spacing is."""
+        shape = [2 if n == axis else rows + 5 * (n == (axis + 1) % 3) for n in range(3)]
+        wide = (axis + 1) % 3
+        affine = np.diag([*(3.0 if n == wide else 1.0 for n in range(3)), 1.0])
+        assert Volume.from_stored(np.zeros(shape[::-1]), affine).thickest_axis() == (axis if cut_across else wide)
 
     @law(100)
     @given(seed=seeds, angle=st.floats(-3, 3), shift=st.floats(-1e3, 1e3))
@@ -108,5 +121,29 @@ class TestVolume:
         affine[:3, 3] = shift
         volume = Volume.from_stored(numbered(), affine)
         indices = rng.uniform(-10, 500, (20, 3))
-        back = np.linalg.solve(volume.affine[:3, :3], (volume.to_mm(indices) - volume.affine[:3, 3]).T).T
-        np.testing.assert_allclose(back, indices, rtol=0, atol=1e-9)
+        positions = volume.to_mm(indices)
+        by_hand = [[row[:3] @ index + row[3] for row in volume.affine[:3]] for index in indices]
+        np.testing.assert_allclose(positions, by_hand, rtol=1e-12, atol=1e-9)
+        np.testing.assert_allclose(volume.to_indices(positions), indices, rtol=0, atol=1e-9)
+
+
+class TestFlatFrames:
+    """Axes are refused where they are shorter than a millionth, or span less than a thousandth of their box."""
+
+    @pytest.mark.parametrize("axis", range(3))
+    @pytest.mark.parametrize(("length", "refused"), [(0.99e-6, True), (1.01e-6, False), (1e-9, True), (0.0, True)])
+    def test_by_the_shortest_axis(self, axis: int, length: float, refused: bool) -> None:
+        affine = affine_of((2, 0, 1), (1, -1, 1))
+        affine[:3, axis] *= length / SPACING[axis]
+        check = check_affine, check_spacing
+        given = (affine,), (np.where(np.arange(3) == axis, length, SPACING), "xyz")
+        for refuse, values in zip(check, given, strict=True):
+            with pytest.raises(GeometryError) if refused else nullcontext():
+                refuse(*values, file="a.nii", hint="--spacing x y z")  # type: ignore[operator]
+
+    @pytest.mark.parametrize(("share", "refused"), [(0.99e-3, True), (1.01e-3, False)])
+    def test_by_their_volume(self, share: float, refused: bool) -> None:
+        affine = np.eye(4)
+        affine[:3, 2] = 5 * np.sqrt(1 - share**2), 0, 5 * share
+        with pytest.raises(GeometryError) if refused else nullcontext():
+            check_affine(affine, file="a.nii", hint="--spacing x y z")

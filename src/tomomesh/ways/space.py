@@ -160,8 +160,7 @@ def _outlined(mask: NDArray[np.bool_], settings: Settings) -> bool:
 
 def _sampled(network: SpaceNetwork) -> Sampling:
     """Return the neurons as the point set P; r is the longest edge."""
-    ends = network.codebook[network.lattice.edges]
-    spacing = float(np.sqrt(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1)).max())
+    spacing = float(_lengths(network.codebook, network.lattice.edges).max())
     points = replace(
         PointSet.from_positions(network.codebook), neurons=np.arange(len(network.codebook), dtype=np.int32)
     )
@@ -236,7 +235,7 @@ def _fitted(rough: QuadMesh, ring: OneRing, found: SpaceFound, settings: Setting
     unfilled = np.zeros(len(start.faces), np.bool_)
     if not found.network.outlined:
         return _Rest(start, unfilled, None)
-    edge = REACH * float(np.median(_lengths(rough)))
+    edge = REACH * float(np.median(_lengths(rough.vertices, rough.edges)))
     if settings.fit.attraction == "nearest":
         mesh, trace = _drawn_to_points(rough, found.places, edge, settings, progress)
         return _Rest(mesh, unfilled, trace)
@@ -247,8 +246,8 @@ def _fitted(rough: QuadMesh, ring: OneRing, found: SpaceFound, settings: Setting
     return _Rest(mesh, any_of(rest.filled[rest.faces]), rest.trace)
 
 
-def _lengths(rough: QuadMesh) -> Floats:
-    ends = rough.vertices[rough.edges]
+def _lengths(places: Floats, edges: NDArray[np.int64]) -> Floats:
+    ends = places[edges]
     return np.asarray(np.sqrt(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1)))
 
 
@@ -284,8 +283,7 @@ def _of_body(report: dict[str, Any]) -> list[str]:
 
 
 def _because(settings: Settings, input: str) -> str:
-    network = settings.network
-    return f"with {'--space volume' if network.space == 'volume' else f'--network {network.network}'}"
+    return f"with {'--space volume' if settings.network.space == 'volume' else f'--network {settings.network.network}'}"
 
 
 NEAREST = {"attraction": ("nearest",)}
