@@ -28,7 +28,7 @@ WALLS = {
     "ways/cloud.py", "ways/cubes.py", "ways/sections.py",  # the report's *two walls*
 }  # fmt: skip
 """Modules that may name walls. Nothing else has any: not a cell, a ray, a sheet or a contour's triangles."""
-LEFT = {("ways/cloud.py", "held"), ("ways/cloud.py", "_hold"), ("ways/cloud.py", "_holding"), ("ways/cubes.py", "held")}
+LEFT = {("ways/cloud.py", "held"), ("ways/cubes.py", "held")}
 """Names that are still to be changed."""
 SEVERAL = {"Components", "Net", "Part", "Rest", "Segmentation", "Shell", "Shown", "Slices", "Stack"}
 """Classes of one name in several modules, whose packages say which is meant; none may be added."""
