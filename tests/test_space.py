@@ -21,7 +21,7 @@ from tomomesh.cli import main
 from tomomesh.dynamics.subdivision import squares_of
 from tomomesh.errors import EmptyError, GeometryError, UsageError
 from tomomesh.measure.distance import distance_to_surface
-from tomomesh.measure.intersections import Crossings
+from tomomesh.measure.intersections import CrossingFaces
 from tomomesh.model.icosphere import icosphere
 from tomomesh.model.lattice import lattice
 from tomomesh.model.mesh import TriMesh
@@ -74,7 +74,7 @@ def assert_sound(made: Surface, genus: int) -> None:
     assert mesh.is_winding_consistent
     assert mesh.volume > 0
     assert mesh.euler_number == 2 - 2 * genus
-    assert not Crossings(0)(made.mesh).any()
+    assert not CrossingFaces(0)(made.mesh).any()
 
 
 @pytest.fixture(scope="module")
