@@ -110,10 +110,13 @@ def surface_on_cubes(
     cubes, cuberille, _ = tracked.value
     smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.smoothing)
     encloses = asked.or_more(shell.value.hollow)
-    rest = _fit(tracked.value, smoothed.value, points.positions, settings, progress, still=walls.value == 2)
+    drawn = tracked.value, smoothed.value, points.positions, settings, progress
+    # a study's millimeters fit 32 bits, in which most meshes are kept; a cloud may lie anywhere
+    tangled = CrossingFaces(settings.run.threads, single=asked.mask is not None)
+    rest = _fit(*drawn, tangled, still=walls.value == 2)
     if settings.cubes.allow_leaks and walls.value == 1 and encloses.share(rest.value.mesh) < LEAST:
         walls = walls_found(2, LEAKY_SHELL)  # found out by the fit alone: it goes back to where it began
-        rest = _fit(tracked.value, smoothed.value, points.positions, settings, progress, still=True)
+        rest = _fit(*drawn, tangled, still=True)
     made = Surface(
         points, cuberille, smoothed.value, rest.value.mesh, rest.value.fit.nearest, cubes, rest.value.fit.trace,
         cavities=int((shell.value.leak_test.faces.inward & shell.value.taken).sum()), crossing=rest.value.crossing,
@@ -172,8 +175,9 @@ def _smoothed(cuberille: QuadMesh, passes: int) -> TriMesh:
 
 @timed("fit")
 def _fit(
-    tracked: Tracked, smoothed: TriMesh, positions: Floats, settings: Settings, progress: Progress, *, still: bool
-) -> Stage[Rest]:
+    tracked: Tracked, smoothed: TriMesh, positions: Floats, settings: Settings, progress: Progress,
+    tangled: CrossingFaces, *, still: bool,
+) -> Stage[Rest]:  # fmt: skip
     """Draw the mesh to the points, unless it is to stay as it is."""
     (cubes, cuberille, origins), threads = tracked, settings.run.threads
     asked = replace(settings.fit, max_steps=0) if still else settings.fit
@@ -184,7 +188,6 @@ def _fit(
     )  # fmt: skip
     mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))
     ring = OneRing.of_quads(cuberille.quads.astype(np.int32), len(mesh.vertices), threads)
-    tangled = CrossingFaces(threads, single=True)
     mesh, taken_back, crossing = untangle(mesh, smoothed.vertices, ring, tangled, cuberille.vertices)
     told = fit_found(None if still else rest.trace, len(mesh.vertices), collapsed=collapsed, taken_back=taken_back)
     return folded(Rest(rest, mesh, crossing), told)
