@@ -48,9 +48,10 @@ class TestSeries:
         folder = self.two(tmp_path / "s", [0, 1, 2])
         assert_in_place(read_volume(folder, settings=ReadSettings(series=2)))
         assert read_volume(folder, settings=ReadSettings(series=1)).shape == (3, 7, 9)
-        for wrong in (0, 3):
-            with pytest.raises(UsageError, match="no such series"):
-                read_volume(folder, settings=ReadSettings(series=wrong))
+        with pytest.raises(UsageError, match="no such series"):
+            read_volume(folder, settings=ReadSettings(series=3))
+        with pytest.raises(UsageError, match="at least 1"):
+            ReadSettings(series=0)
 
     def test_the_only_candidate_is_taken_and_said(self, tmp_path: Path) -> None:
         volume = read_volume(self.two(tmp_path / "s", [0]))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from conftest import law
 from tomomesh import TomomeshError, Volume, phantom, reconstruct, reconstruct_points
 from tomomesh.errors import EmptyError, GeometryError, InternalCheckError
-from tomomesh.measure.intersections import Crossings
+from tomomesh.measure.intersections import CrossingFaces
 from tomomesh.measure.topology import check_promise
 from tomomesh.model.mesh import TriMesh
 
@@ -99,7 +99,7 @@ class TestClouds:
         check_promise(reconstruct_points(far, local_origin=True).mesh)
 
     def test_crossings_of_no_faces_are_none(self) -> None:
-        assert Crossings(1)(TriMesh(np.empty((0, 3)), np.empty((0, 3), np.int64))).shape == (0,)
+        assert CrossingFaces(1)(TriMesh(np.empty((0, 3)), np.empty((0, 3), np.int64))).shape == (0,)
 
 
 def refused(made: Callable[[], Surface]) -> Surface | None:

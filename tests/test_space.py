@@ -21,7 +21,7 @@ from tomomesh.cli import main
 from tomomesh.dynamics.subdivision import squares_of
 from tomomesh.errors import EmptyError, GeometryError, UsageError
 from tomomesh.measure.distance import distance_to_surface
-from tomomesh.measure.intersections import Crossings
+from tomomesh.measure.intersections import CrossingFaces
 from tomomesh.model.icosphere import icosphere
 from tomomesh.model.lattice import lattice
 from tomomesh.model.mesh import TriMesh
@@ -74,7 +74,7 @@ def assert_sound(made: Surface, genus: int) -> None:
     assert mesh.is_winding_consistent
     assert mesh.volume > 0
     assert mesh.euler_number == 2 - 2 * genus
-    assert not Crossings(0)(made.mesh).any()
+    assert not CrossingFaces(0)(made.mesh).any()
 
 
 @pytest.fixture(scope="module")
@@ -182,7 +182,7 @@ class TestSurface:
         made = reconstruct(volume_of(ellipsoid()), **asked, allow_leaks=True)
         assert_sound(made, genus=0)
         assert any("--signal boundary" in warning for warning in made.report["warnings"])
-        assert any("of what it should" in warning for warning in made.report["warnings"])
+        assert any("of the volume of its window" in warning for warning in made.report["warnings"])
 
     def test_faces_outward_from_a_mirrored_start(self) -> None:
         vertices, faces = icosphere(4)

@@ -27,7 +27,7 @@ class _Terminated(BaseException):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run ``tomomesh`` and return its exit code; every fault is one line on stderr, and nothing stays set otherwise."""
+    """Run ``tomomesh`` and return its exit code; every fault is one line on stderr, and all is put back."""
     with _terminated(), _printable(sys.stdout, sys.stderr):
         return _told(sys.argv[1:] if arguments is None else arguments)
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..som.region import TrainedNetwork
 
 FRAMES = 40
-"""Most looks at a network that is filmed."""
+"""Most frames of a network that is filmed."""
 
 
 def pictures(

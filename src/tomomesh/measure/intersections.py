@@ -55,7 +55,7 @@ def self_intersections(mesh: TriMesh, *, threads: int = 0, progress: Progress = 
     return marked_in(Tree.of_faces(mesh, threads=threads), threads=threads, progress=progress)
 
 
-class Crossings:
+class CrossingFaces:
     """Mark the faces that pass through others (see `self_intersections`), again and again as vertices move.
 
     Under `single` they are judged at positions of 32 bits, as STL holds them: sheets that nearly coincide are pushed

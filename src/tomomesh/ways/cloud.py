@@ -15,7 +15,7 @@ from ..dynamics.low_pass import OneRing
 from ..dynamics.moving_least_squares import SurfaceFit, fit_to_surface
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError
-from ..measure.intersections import Crossings
+from ..measure.intersections import CrossingFaces
 from ..model.columns import any_of
 from ..model.cubes import cells_of
 from ..model.mesh import QuadMesh, TriMesh
@@ -61,11 +61,11 @@ class Shell:
     lowest: Floats
     cubes: int
     spanned: Bridges
-    held: LeakTest
+    leak_test: LeakTest
 
     def taken(self, settings: Settings) -> NDArray[np.bool_]:
         """Tell of each surface whether it is kept."""
-        return self.held.faces.worth_keeping(largest=settings.cubes.largest)
+        return self.leak_test.faces.worth_keeping(largest=settings.cubes.largest)
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     kept, smoothed, ring = rough.value.faces, rough.value.mesh, rough.value.ring
     rest = measured("fit", _fitted, shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
     apart = measured(
-        "untangle", untangle, rest.value.mesh, smoothed.vertices, ring, Crossings(settings.run.threads),
+        "untangle", untangle, rest.value.mesh, smoothed.vertices, ring, CrossingFaces(settings.run.threads),
         rough.value.lattice,
     )  # fmt: skip
     mesh, taken_back, crossing = apart.value
@@ -117,7 +117,7 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
 def _close(points: Points, samples: Samples, settings: Settings, progress: Progress) -> Stage[Shell]:
     shell = _tightest(len(points.cloud), samples, settings, progress)
     return folded(
-        shell, shell_found(shell.held, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
+        shell, shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
     )  # fmt: skip
 
 
@@ -132,12 +132,12 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
         lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
         cells = cells_of(once_each(keys))
         steps = [k for k in tried if cubes.closing is not None or k * cell.min() <= reach]
-        held = close_leaks(
+        leak_test = close_leaks(
             cells, steps, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
         )  # fmt: skip
-        if best is None or held.two_sided >= SURE or held.is_better_than(best.held):
-            best = Shell(cell, lowest, len(cells), spanned, held)
-        if held.two_sided >= SURE:
+        if best is None or leak_test.two_sided >= SURE or leak_test.is_better_than(best.leak_test):
+            best = Shell(cell, lowest, len(cells), spanned, leak_test)
+        if leak_test.two_sided >= SURE:
             break
     assert best is not None
     return best
@@ -145,7 +145,7 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
 
 def _hollow(shell: Shell, settings: Settings) -> Enclosed:
     """Return the volume inside a shell without that of its cubes, which may be two walls with nothing between them."""
-    enclosed = int(shell.held.faces.volumes[shell.taken(settings)].sum())
+    enclosed = int(shell.leak_test.faces.volumes[shell.taken(settings)].sum())
     return Enclosed("samples", float(max(0, enclosed - shell.cubes) * shell.cell.prod()))
 
 
@@ -154,7 +154,7 @@ def _walls(shell: Shell, samples: Samples, origin: Floats, settings: Settings) -
 
     One of two is not fitted: both walls would rest on the same samples, and the mesh would fall flat.
     """
-    if shell.held.tight:
+    if shell.leak_test.tight:
         return walls_found(1)
     if is_flat(samples.positions, float(np.median(samples.spacing))):
         return walls_found(2, FLAT_SHELL)
@@ -177,7 +177,7 @@ def _place(place: Floats) -> str:
 
 
 def _smoothed(shell: Shell, settings: Settings) -> Rough:
-    faces = shell.held.faces.only(shell.taken(settings))
+    faces = shell.leak_test.faces.only(shell.taken(settings))
     ring = OneRing.of_quads(faces.quads, len(faces.corners), settings.run.threads)
     lattice = shell.lowest + faces.corners * shell.cell
     vertices = ring.smoothed(lattice, settings.cubes.smoothing)

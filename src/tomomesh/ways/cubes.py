@@ -14,7 +14,7 @@ from ..dynamics.low_pass import OneRing, low_pass
 from ..dynamics.mass_spring import Fit, fit
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError
-from ..measure.intersections import Crossings
+from ..measure.intersections import CrossingFaces
 from ..results import LEAST, Enclosed, Surface
 from ..stage import Stage, folded, measured, timed
 from .sections import FLAT_SHELL, LEAKY_SHELL, fit_found, shell_found, walls_found
@@ -38,13 +38,13 @@ class Shell:
     """Cubes that hold the points, and the faces around them; `taken` tells of each surface whether it is kept."""
 
     grid: CubeGrid
-    held: LeakTest
+    leak_test: LeakTest
     taken: NDArray[np.bool_]
 
     @property
     def volume(self) -> float:
         """Volume inside the surfaces that are kept."""
-        return float(self.held.faces.volumes[self.taken].sum() * self.grid.cell_mm.prod())
+        return float(self.leak_test.faces.volumes[self.taken].sum() * self.grid.cell_mm.prod())
 
     @property
     def hollow(self) -> Enclosed:
@@ -110,13 +110,16 @@ def surface_on_cubes(
     cubes, cuberille, _ = tracked.value
     smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.smoothing)
     encloses = asked.or_more(shell.value.hollow)
-    rest = _fit(tracked.value, smoothed.value, points.positions, settings, progress, still=walls.value == 2)
+    drawn = tracked.value, smoothed.value, points.positions, settings, progress
+    # a study's millimeters fit 32 bits, in which most meshes are kept; a cloud may lie anywhere
+    tangled = CrossingFaces(settings.run.threads, single=asked.mask is not None)
+    rest = _fit(*drawn, tangled, still=walls.value == 2)
     if settings.cubes.allow_leaks and walls.value == 1 and encloses.share(rest.value.mesh) < LEAST:
         walls = walls_found(2, LEAKY_SHELL)  # found out by the fit alone: it goes back to where it began
-        rest = _fit(tracked.value, smoothed.value, points.positions, settings, progress, still=True)
+        rest = _fit(*drawn, tangled, still=True)
     made = Surface(
         points, cuberille, smoothed.value, rest.value.mesh, rest.value.fit.nearest, cubes, rest.value.fit.trace,
-        cavities=int((shell.value.held.faces.inward & shell.value.taken).sum()), crossing=rest.value.crossing,
+        cavities=int((shell.value.leak_test.faces.inward & shell.value.taken).sum()), crossing=rest.value.crossing,
         encloses=encloses if walls.value == 1 else None,
     )  # fmt: skip
     return folded(made, shell, tracked, walls, smoothed, rest)
@@ -127,12 +130,12 @@ def _close(positions: Floats, spacing: float, settings: Settings, progress: Prog
     asked, threads = settings.cubes, settings.run.threads
     grid = partition(positions, _cell(spacing, settings))
     closings = CLOSINGS if asked.closing is None else (asked.closing,)
-    held = close_leaks(
+    leak_test = close_leaks(
         grid.cells, closings, cavities=asked.surface == "all", tracking=asked.tracking, threads=threads,
         progress=progress,
     )  # fmt: skip
-    taken = held.faces.worth_keeping(largest=asked.largest)
-    return folded(Shell(grid, held, taken), shell_found(held, taken, grid.cell_mm, len(grid.keys)))
+    taken = leak_test.faces.worth_keeping(largest=asked.largest)
+    return folded(Shell(grid, leak_test, taken), shell_found(leak_test, taken, grid.cell_mm, len(grid.keys)))
 
 
 def _cell(spacing: float, settings: Settings) -> Floats:
@@ -142,7 +145,7 @@ def _cell(spacing: float, settings: Settings) -> Floats:
 
 
 def _track(shell: Shell) -> Tracked:
-    return shell.held.faces.only(shell.taken).over(shell.grid)
+    return shell.leak_test.faces.only(shell.taken).over(shell.grid)
 
 
 def _walls(shell: Shell, positions: Floats, settings: Settings, asked: Inside) -> Stage[int]:
@@ -151,7 +154,7 @@ def _walls(shell: Shell, positions: Floats, settings: Settings, asked: Inside) -
     One of two is not fitted: both walls would rest on the same points, and the mesh would fall flat.
     """
     cell, rings_mm3 = float(shell.grid.cell_mm.min()), asked.rings_mm3
-    if shell.volume >= LEAST * rings_mm3 if rings_mm3 else shell.held.tight:
+    if shell.volume >= LEAST * rings_mm3 if rings_mm3 else shell.leak_test.tight:
         return walls_found(1)
     if is_flat(positions, cell) and asked.may_be_flat:
         return walls_found(2, FLAT_SHELL)
@@ -172,8 +175,9 @@ def _smoothed(cuberille: QuadMesh, passes: int) -> TriMesh:
 
 @timed("fit")
 def _fit(
-    tracked: Tracked, smoothed: TriMesh, positions: Floats, settings: Settings, progress: Progress, *, still: bool
-) -> Stage[Rest]:
+    tracked: Tracked, smoothed: TriMesh, positions: Floats, settings: Settings, progress: Progress,
+    tangled: CrossingFaces, *, still: bool,
+) -> Stage[Rest]:  # fmt: skip
     """Draw the mesh to the points, unless it is to stay as it is."""
     (cubes, cuberille, origins), threads = tracked, settings.run.threads
     asked = replace(settings.fit, max_steps=0) if still else settings.fit
@@ -184,7 +188,6 @@ def _fit(
     )  # fmt: skip
     mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))
     ring = OneRing.of_quads(cuberille.quads.astype(np.int32), len(mesh.vertices), threads)
-    tangled = Crossings(threads, single=True)
     mesh, taken_back, crossing = untangle(mesh, smoothed.vertices, ring, tangled, cuberille.vertices)
     told = fit_found(None if still else rest.trace, len(mesh.vertices), collapsed=collapsed, taken_back=taken_back)
     return folded(Rest(rest, mesh, crossing), told)

@@ -59,10 +59,10 @@ def missed(slices: NDArray[np.int32], mask: NDArray[np.bool_]) -> tuple[list[int
 
 
 def shell_found(
-    held: LeakTest, taken: NDArray[np.bool_], cell: NDArray[np.float64], cubes: int, bridged: int = 0
+    leak_test: LeakTest, taken: NDArray[np.bool_], cell: NDArray[np.float64], cubes: int, bridged: int = 0
 ) -> Stage[None]:
     """Tell of the cubes, the closing that made them tight, and which surfaces were taken."""
-    shell, faces = held.shell, held.faces
+    shell, faces = leak_test.shell, leak_test.faces
     stats: dict[str, dict[str, Any]] = {
         "cubes": {
             "cell_mm": cell.tolist(),
@@ -70,8 +70,8 @@ def shell_found(
             "bridge_places": bridged,
             "closing": shell.closing,
             "added_for_composition": shell.added,
-            "two_sided": held.two_sided,
-            "tight": held.tight,
+            "two_sided": leak_test.two_sided,
+            "tight": leak_test.tight,
         },
         "surface": {
             "found": faces.count,
@@ -83,7 +83,7 @@ def shell_found(
         },
     }
     made_up = f"gaps up to {2 * shell.closing} cubes wide were closed: the surface is made up there"
-    return Stage(None, stats, (made_up,) if held.tight and shell.closing > WIDE else ())
+    return Stage(None, stats, (made_up,) if leak_test.tight and shell.closing > WIDE else ())
 
 
 def walls_found(count: int, *warnings: str) -> Stage[int]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..measure.intersections import Crossings
+from ..measure.intersections import CrossingFaces
 from ..model.mesh import QuadMesh
 from ..opensurface.sheet import OpenSheet, open_sheet
 from ..pointcloud.bridges import bridges
@@ -45,7 +45,7 @@ def surface_of_sheet(points: Points, settings: Settings, progress: Progress) -> 
 def _lay(samples: Samples, settings: Settings, progress: Progress) -> Stage[OpenSheet]:
     cell, threads = cell_edges(samples, settings)[0], settings.run.threads
     spanned = bridges(samples, float(cell.min()), threads=threads, progress=progress)
-    made = open_sheet(samples, spanned, cell, settings, Crossings(threads), progress)
+    made = open_sheet(samples, spanned, cell, settings, CrossingFaces(threads), progress)
     every = np.ones(made.leak_test.faces.count, bool)
     return folded(made, shell_found(made.leak_test, every, cell, made.cubes, len(spanned.places)), walls_found(1))
 

@@ -16,7 +16,7 @@ from ..dynamics.subdivision import squares_of
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError, UsageError
 from ..isosurface.voxels import boundary
-from ..measure.intersections import Crossings
+from ..measure.intersections import CrossingFaces
 from ..model.columns import any_of
 from ..model.mesh import QuadMesh, TriMesh
 from ..model.points import PointSet
@@ -184,7 +184,7 @@ def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progre
     rough = faces.value
     ring = OneRing.of_quads(rough.quads.astype(np.int32), len(rough.vertices), threads)
     rest = measured("fit", _fitted, rough, ring, found.source, settings, progress)
-    mesh = measured("untangle", untangle, rest.value.mesh, rough.vertices, ring, Crossings(threads, single=True))
+    mesh = measured("untangle", untangle, rest.value.mesh, rough.vertices, ring, CrossingFaces(threads, single=True))
     made, taken_back, crossing = mesh.value
     _require_volume(made, len(found.source.network.lattice))
     surface = Surface(
@@ -224,7 +224,7 @@ def _untangled(network: SpaceNetwork, threads: int) -> tuple[TriMesh, int]:
     """Return a network as a mesh that faces outward and does not pass through itself, if smoothing can help it."""
     mesh = TriMesh(network.codebook, network.lattice.faces)
     ring = OneRing.of_edges(mesh.edges, len(mesh.vertices), threads)
-    mesh, moved, _ = untangle(mesh, mesh.vertices, ring, Crossings(threads, single=True))
+    mesh, moved, _ = untangle(mesh, mesh.vertices, ring, CrossingFaces(threads, single=True))
     outward = mesh.face_volumes.sum() > 0
     return mesh if outward else replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1])), moved
 
