@@ -220,4 +220,4 @@ def test_a_block_is_left_over_the_side_where_it_is_reached(column: int, step: tu
         reached = blocks.bitmask_of(np.array([cell]))
         leaves = any(not 0 <= at + by < 8 for at, by in zip(cell, step, strict=True))
         [block] = np.flatnonzero(blocks.count(reached).any(axis=1))
-        assert touches(reached, block, column) == leaves
+        assert touches(reached, int(block), column) == leaves
