@@ -72,6 +72,10 @@ class Enclosed:
         """Return the volume of the voxels of a window, mm^3."""
         return cls("window", np.count_nonzero(found.mask) * found.volume.voxel_mm3)
 
+    def or_more(self, other: Enclosed) -> Enclosed:
+        """Return the larger of two."""
+        return max(self, other, key=lambda one: one.volume)
+
     def share(self, mesh: TriMesh) -> float:
         """Return how much of it a mesh encloses; 1 where there is nothing to enclose."""
         return float(mesh.face_volumes.sum()) / self.volume if self.volume > 0 else 1.0

@@ -22,11 +22,11 @@ from ..model.mesh import QuadMesh, TriMesh
 from ..opensurface.gaps import gaps
 from ..pointcloud.bridges import bridges
 from ..pointcloud.forecast import require_room
-from ..results import Enclosed, Surface
+from ..results import Surface
 from ..stage import Stage, folded, measured, timed
 from .points import place_found
 from .samples import cell_edges, lowest_corner, settle
-from .sections import FLAT_SHELL, LEAKY_SHELL, body_of_cubes, fit_found, shell_found, walls_found
+from .sections import body_of_cubes, count_walls, fit_found, hollow, shell_found
 from .way import CUBES, POINTS, Way, on_input, parameters
 
 if TYPE_CHECKING:
@@ -103,11 +103,12 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     mesh, taken_back, crossing = apart.value
     cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64))
     trace = None if rest.value.fitted is None else rest.value.fitted.trace
+    enclosed = hollow(shell.value.leak_test, shell.value.taken(settings), shell.value.cubes, shell.value.cell)
     surface = Surface(
         points.cloud, cuberille, smoothed.moved(smoothed.vertices + origin),
         mesh.moved(mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=rest.value.filled,
         cavities=int(kept.inward.sum()), crossing=crossing,
-        encloses=_hollow(shell.value, settings) if walls.value == 1 else None,
+        encloses=enclosed if walls.value == 1 else None,
     )  # fmt: skip
     fitted = fit_found(trace, len(smoothed.vertices), taken_back=taken_back, filled=rest.value.filled)
     return folded(surface, settled, shell, walls, rough, rest, apart, fitted, place_found(points))
@@ -143,23 +144,19 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
     return best
 
 
-def _hollow(shell: Shell, settings: Settings) -> Enclosed:
-    """Return the volume inside a shell without that of its cubes, which may be two walls with nothing between them."""
-    enclosed = int(shell.leak_test.faces.volumes[shell.taken(settings)].sum())
-    return Enclosed("samples", float(max(0, enclosed - shell.cubes) * shell.cell.prod()))
-
-
 def _walls(shell: Shell, samples: Samples, origin: Floats, settings: Settings) -> Stage[int]:
-    """Count the walls of a shell; refuse one that leaks, unless that was allowed or the points are flat.
+    """Count the walls of a shell.
 
-    One of two is not fitted: both walls would rest on the same samples, and the mesh would fall flat.
+    Raises
+    ------
+    GeometryError
+        Where the outside leaks in; names the widest gap.
     """
-    if shell.leak_test.tight:
-        return walls_found(1)
-    if is_flat(samples.positions, float(np.median(samples.spacing))):
-        return walls_found(2, FLAT_SHELL)
-    if settings.cubes.allow_leaks:
-        return walls_found(2, LEAKY_SHELL)
+    tight = shell.leak_test.tight
+    flat = not tight and is_flat(samples.positions, float(np.median(samples.spacing)))
+    walls = count_walls(settings, tight=tight, flat=flat)
+    if walls is not None:
+        return walls
     cell = float(shell.cell.min())
     found = gaps(samples, cell, threads=settings.run.threads)
     where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]

@@ -11,10 +11,10 @@ from ..errors import EmptyError
 from ..measure.rings import assess_contours
 from ..results import Enclosed, Segmentation
 from ..segmentation.contours.train import train_contours
-from ..segmentation.sample import Sampling, sample_contours
+from ..segmentation.sample import sample_contours
 from ..segmentation.training import regions
-from ..stage import Stage, folded, measured, timed
-from .sections import missed, points_found
+from ..stage import Stage, folded, measured
+from .sections import missed, networks_on_slices, sampling_found
 from .stack import body_of_stack, surface_of_slices
 from .way import POINTS, TRAINING, Way, parameters
 
@@ -37,19 +37,21 @@ def segment_by_contours(kept: Selected, settings: Settings, progress: Progress) 
         progress=progress,
     )  # fmt: skip
     labels = measured("regions", regions, mask, trained.value, pixel_mm=pixel_mm, threads=run.threads)
-    placed = _place(kept, trained.value)
+    placed = measured("points", sample_contours, trained.value, study)
     sampling = placed.value
     found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value)
-    return folded(found, trained, labels, _contours_found(trained.value, kept, settings), placed)
+    return folded(
+        found, trained, labels, _contours_found(trained.value, kept, settings), placed, sampling_found(placed.value)
+    )
 
 
 def surface_by_contours(found: Segmentation[Contours], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Close the contours of all slices."""
-    inside = Enclosed("rings", found.sampling.volume_mm3), Enclosed.window(found)
+    encloses = Enclosed("rings", found.sampling.volume_mm3).or_more(Enclosed.window(found))
     finest, sampling = min(found.volume.spacing_mm[:2]), found.sampling
     return surface_of_slices(
         found.points, slices_of_rings(found.points), settings, progress, finest=finest, bridged=sampling.bridged,
-        encloses=max(inside, key=lambda one: one.volume),
+        encloses=encloses,
     )  # fmt: skip
 
 
@@ -66,12 +68,6 @@ def slices_of_rings(points: PointSet) -> Slices:
         found = f"{len(np.unique(points.slices))} slice"
         raise EmptyError("contours on one slice enclose no volume", found=found, expected="at least two slices")
     return slices
-
-
-@timed("points")
-def _place(kept: Selected, contours: Contours) -> Stage[Sampling]:
-    sampling = sample_contours(contours, kept.study)
-    return folded(sampling, points_found(sampling.points, sampling.spacing_mm, bridged=sampling.bridged))
 
 
 def _contours_found(contours: Contours, kept: Selected, settings: Settings) -> Stage[None]:
@@ -108,10 +104,6 @@ def _of_networks(report: dict[str, Any]) -> list[str]:
     ]
 
 
-def _pictures(found: Segmentation[Contours]) -> dict[str, Any]:
-    return {"networks": found.source, "labels": found.labels}
-
-
 WAY = Way(
     applies=lambda settings, input: input not in POINTS and settings.network.contours != "one",
     because=lambda settings, input: f"with --contours {settings.network.contours}",
@@ -120,5 +112,5 @@ WAY = Way(
     surface=surface_by_contours,
     of_networks=_of_networks,
     of_body=body_of_stack,
-    pictures=_pictures,
+    pictures=networks_on_slices,
 )

@@ -17,7 +17,7 @@ from ..errors import GeometryError
 from ..measure.intersections import CrossingFaces
 from ..results import LEAST, Enclosed, Surface
 from ..stage import Stage, folded, measured, timed
-from .sections import FLAT_SHELL, LEAKY_SHELL, fit_found, shell_found, walls_found
+from .sections import LEAKY_SHELL, count_walls, fit_found, hollow, shell_found, walls_found
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,11 +46,6 @@ class Shell:
         """Volume inside the surfaces that are kept."""
         return float(self.leak_test.faces.volumes[self.taken].sum() * self.grid.cell_mm.prod())
 
-    @property
-    def hollow(self) -> Enclosed:
-        """The same without the cubes themselves, which may be two walls with nothing between them."""
-        return Enclosed("samples", max(0.0, self.volume - float(len(self.grid.keys) * self.grid.cell_mm.prod())))
-
 
 @dataclass(frozen=True)
 class Inside:
@@ -68,7 +63,7 @@ class Inside:
     def or_more(self, hollow: Enclosed) -> Enclosed:
         """Return the largest that is known; what a shell of cubes is hollow by counts where there are no rings."""
         rings = Enclosed("rings", self.rings_mm3) if self.rings_mm3 else hollow
-        return max(rings, Enclosed("window", self.window_mm3), key=lambda one: one.volume)
+        return rings.or_more(Enclosed("window", self.window_mm3))
 
 
 ANYTHING = Inside()
@@ -109,7 +104,8 @@ def surface_on_cubes(
     walls = _walls(shell.value, points.positions, settings, asked)
     cubes, cuberille, _ = tracked.value
     smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.smoothing)
-    encloses = asked.or_more(shell.value.hollow)
+    grid, taken = shell.value.grid, shell.value.taken
+    encloses = asked.or_more(hollow(shell.value.leak_test, taken, len(grid.keys), grid.cell_mm))
     drawn = tracked.value, smoothed.value, points.positions, settings, progress
     # a study's millimeters fit 32 bits, in which most meshes are kept; a cloud may lie anywhere
     tangled = CrossingFaces(settings.run.threads, single=asked.mask is not None)
@@ -119,7 +115,7 @@ def surface_on_cubes(
         rest = _fit(*drawn, tangled, still=True)
     made = Surface(
         points, cuberille, smoothed.value, rest.value.mesh, rest.value.fit.nearest, cubes, rest.value.fit.trace,
-        cavities=int((shell.value.leak_test.faces.inward & shell.value.taken).sum()), crossing=rest.value.crossing,
+        cavities=int((shell.value.leak_test.faces.inward & taken).sum()), crossing=rest.value.crossing,
         encloses=encloses if walls.value == 1 else None,
     )  # fmt: skip
     return folded(made, shell, tracked, walls, smoothed, rest)
@@ -149,17 +145,18 @@ def _track(shell: Shell) -> Tracked:
 
 
 def _walls(shell: Shell, positions: Floats, settings: Settings, asked: Inside) -> Stage[int]:
-    """Count the walls of a shell; refuse one that leaks, unless that was allowed or the points are flat.
+    """Count the walls of a shell.
 
-    One of two is not fitted: both walls would rest on the same points, and the mesh would fall flat.
+    Raises
+    ------
+    GeometryError
+        Where the outside leaks in.
     """
     cell, rings_mm3 = float(shell.grid.cell_mm.min()), asked.rings_mm3
-    if shell.volume >= LEAST * rings_mm3 if rings_mm3 else shell.leak_test.tight:
-        return walls_found(1)
-    if is_flat(positions, cell) and asked.may_be_flat:
-        return walls_found(2, FLAT_SHELL)
-    if settings.cubes.allow_leaks:
-        return walls_found(2, LEAKY_SHELL)
+    tight = shell.volume >= LEAST * rings_mm3 if rings_mm3 else shell.leak_test.tight
+    walls = count_walls(settings, tight=tight, flat=not tight and is_flat(positions, cell) and asked.may_be_flat)
+    if walls is not None:
+        return walls
     raise GeometryError(
         "the outside leaks into the shell of cubes, so its surface would have two walls",
         found=f"cell = {cell:.4g}",

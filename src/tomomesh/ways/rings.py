@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 from ..measure.rings import assess_contours
 from ..results import Enclosed, Segmentation
 from ..segmentation.contours.inputs import share_of_holes, slices_with_several
-from ..segmentation.sample import Sampling, sample
+from ..segmentation.sample import sample
 from ..segmentation.training import regions, train_study
 from ..segmentation.window import by_layer
 from ..som.schedules import schedule_warning
-from ..stage import Stage, folded, measured, timed
+from ..stage import Stage, folded, measured
 from .cubes import Inside, surface_on_cubes
-from .sections import body_of_cubes, missed, points_found
+from .sections import body_of_cubes, missed, networks_on_slices, sampling_found
 from .way import CUBES, POINTS, SPRINGS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
@@ -42,10 +42,15 @@ def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> 
         pixel_mm=study.spacing_mm[:2], seed=run.seed, threads=run.threads, progress=progress,
     )  # fmt: skip
     labels = measured("regions", regions, mask, trained.value, pixel_mm=study.spacing_mm[:2], threads=run.threads)
-    placed = _place(kept, trained.value, settings)
+    placed = measured(
+        "points", sample, trained.value, study, caps=settings.cubes.caps, bridge=settings.network.bridge,
+        cell_from=settings.cubes.cell_from,
+    )  # fmt: skip
     sampling = placed.value
     found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value)
-    return folded(found, trained, labels, _networks_found(trained.value, kept, settings), placed)
+    return folded(
+        found, trained, labels, _networks_found(trained.value, kept, settings), placed, sampling_found(placed.value)
+    )
 
 
 def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress: Progress) -> Stage[Surface]:
@@ -61,15 +66,6 @@ def _layers(kept: Selected, settings: Settings) -> NDArray[np.bool_] | None:
     if chosen.volume.layers == 1 or settings.network.inputs != "layers":
         return None
     return by_layer(chosen.volume, lower=chosen.lower, upper=chosen.upper) & chosen.mask[..., None]
-
-
-@timed("points")
-def _place(kept: Selected, networks: Networks, settings: Settings) -> Stage[Sampling]:
-    cubes = settings.cubes
-    sampling = sample(
-        networks, kept.study, caps=cubes.caps, bridge=settings.network.bridge, cell_from=cubes.cell_from
-    )  # fmt: skip
-    return folded(sampling, points_found(sampling.points, sampling.spacing_mm, bridged=sampling.bridged))
 
 
 def _networks_found(networks: Networks, kept: Selected, settings: Settings) -> Stage[None]:
@@ -115,10 +111,6 @@ def _of_networks(report: dict[str, Any]) -> list[str]:
     ]
 
 
-def _pictures(found: Segmentation[Networks]) -> dict[str, Any]:
-    return {"networks": found.source, "labels": found.labels}
-
-
 WAY = Way(
     applies=lambda settings, input: input not in POINTS,
     because=lambda settings, input: "on networks of slices",
@@ -127,5 +119,5 @@ WAY = Way(
     surface=surface_by_rings,
     of_networks=_of_networks,
     of_body=body_of_cubes,
-    pictures=_pictures,
+    pictures=networks_on_slices,
 )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.points import BRIDGE, CAP, NEURON
+from ..results import Enclosed
 from ..stage import Stage
 
 if TYPE_CHECKING:
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from ..isosurface.voxels import Boundary, VoxelSurface
     from ..model.points import PointSet
     from ..model.trace import Trace
+    from ..results import Segmentation
+    from ..segmentation.sample import Sampling
+    from ..settings import Settings
 
 DRAWN = 0.9
 """Share of the vertices that must have a point near them, else a result is warned of. A warning's threshold, chosen: no
@@ -84,6 +88,34 @@ def shell_found(
     }
     made_up = f"gaps up to {2 * shell.closing} cubes wide were closed: the surface is made up there"
     return Stage(None, stats, (made_up,) if leak_test.tight and shell.closing > WIDE else ())
+
+
+def sampling_found(sampling: Sampling) -> Stage[None]:
+    """Tell of the points that networks on slices were placed as."""
+    return points_found(sampling.points, sampling.spacing_mm, bridged=sampling.bridged)
+
+
+def networks_on_slices(found: Segmentation[Any]) -> dict[str, Any]:
+    """Give the networks of slices and their regions to the pictures."""
+    return {"networks": found.source, "labels": found.labels}
+
+
+def hollow(leak_test: LeakTest, taken: NDArray[np.bool_], cubes: int, cell: NDArray[np.float64]) -> Enclosed:
+    """Return the volume inside a shell without that of its cubes, which may be two walls with nothing between them."""
+    enclosed = int(leak_test.faces.volumes[taken].sum())
+    return Enclosed("samples", float(max(0, enclosed - cubes) * cell.prod()))
+
+
+def count_walls(settings: Settings, *, tight: bool, flat: bool) -> Stage[int] | None:
+    """Count the walls of a shell; None for one that leaks, unless that was allowed or the points are flat.
+
+    One of two is not fitted: both walls would rest on the same points, and the mesh would fall flat.
+    """
+    if tight:
+        return walls_found(1)
+    if flat:
+        return walls_found(2, FLAT_SHELL)
+    return walls_found(2, LEAKY_SHELL) if settings.cubes.allow_leaks else None
 
 
 def walls_found(count: int, *warnings: str) -> Stage[int]:

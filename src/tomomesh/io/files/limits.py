@@ -38,13 +38,14 @@ def require_bytes(promised: int, found: int, *, file: str) -> None:
         Where `found` is below `promised`.
     """
     if found < promised:
-        raise FormatError(
-            "the file is cut off",
-            file=file,
-            found=f"data = {found} bytes",
-            expected=f"{promised} bytes, as its header promises",
-            hint="a fresh copy of the file",
-        )
+        raise _cut_off(f"data = {found} bytes", f"{promised} bytes", file)
+
+
+def _cut_off(found: str, promised: str, file: str) -> FormatError:
+    hint = "a fresh copy of the file"
+    return FormatError(
+        "the file is cut off", file=file, found=found, expected=f"{promised}, as its header promises", hint=hint
+    )
 
 
 def require_rows(promised: int, found: int, what: str, *, file: str) -> None:
@@ -56,13 +57,7 @@ def require_rows(promised: int, found: int, what: str, *, file: str) -> None:
         Where `found` is below `promised`.
     """
     if found < promised:
-        raise FormatError(
-            "the file is cut off",
-            file=file,
-            found=f"{what} = {found}",
-            expected=f"{promised}, as its header promises",
-            hint="a fresh copy of the file",
-        )
+        raise _cut_off(f"{what} = {found}", f"{promised}", file)
 
 
 def physical_memory() -> int:
