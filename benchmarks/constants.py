@@ -233,7 +233,7 @@ def recompile(modules: list[Any], name: str) -> None:
             if isinstance(found, Dispatcher) and found.py_func.__module__ == module.__name__:
                 used = set(found.py_func.__code__.co_names)
                 if used & stale or (name in used and module in modules):
-                    found._cache = NullCache()  # type: ignore[attr-defined]
+                    vars(found)["_cache"] = NullCache()
                     found.recompile()
                     stale.add(key)
 

@@ -135,11 +135,11 @@ class TestFlatFrames:
     def test_by_the_shortest_axis(self, axis: int, length: float, refused: bool) -> None:
         affine = affine_of((2, 0, 1), (1, -1, 1))
         affine[:3, axis] *= length / SPACING[axis]
-        check = check_affine, check_spacing
-        given = (affine,), (np.where(np.arange(3) == axis, length, SPACING), "xyz")
-        for refuse, values in zip(check, given, strict=True):
-            with pytest.raises(GeometryError) if refused else nullcontext():
-                refuse(*values, file="a.nii", hint="--spacing x y z")  # type: ignore[operator]
+        spacing, asked = np.where(np.arange(3) == axis, length, SPACING).tolist(), "--spacing x y z"
+        with pytest.raises(GeometryError) if refused else nullcontext():
+            check_affine(affine, file="a.nii", hint=asked)
+        with pytest.raises(GeometryError) if refused else nullcontext():
+            check_spacing(spacing, "xyz", file="a.nii", hint=asked)
 
     @pytest.mark.parametrize(("share", "refused"), [(0.99e-3, True), (1.01e-3, False)])
     def test_by_their_volume(self, share: float, refused: bool) -> None:
