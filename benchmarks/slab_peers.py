@@ -93,11 +93,16 @@ def _signed(slabs: Volume, level: float) -> Floats:
 
 
 def sinc(slabs: Volume, level: float, thick: int) -> TriMesh:
-    """March, then smooth by VTK's windowed sinc as 3D Slicer does at its default smoothing factor of 0.5."""
+    """March, then smooth as 3D Slicer does, which itself marches on the mask alone."""
+    return smoothed(cubes(slabs, level, thick))
+
+
+def smoothed(mesh: TriMesh) -> TriMesh:
+    """Smooth by VTK's windowed sinc as 3D Slicer does at its default smoothing factor of 0.5."""
     from vtkmodules.vtkFiltersCore import vtkWindowedSincPolyDataFilter
 
     smooth = vtkWindowedSincPolyDataFilter()
-    smooth.SetInputData(_polydata(cubes(slabs, level, thick)))
+    smooth.SetInputData(_polydata(mesh))
     smooth.SetNumberOfIterations(20)
     smooth.SetPassBand(10 ** (-4 * 0.5))
     smooth.BoundarySmoothingOff()
