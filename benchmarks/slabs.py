@@ -112,7 +112,7 @@ def case(told: str, study: Thin, true: Truth, thick: int, data: str) -> None:
     best = min(peers, key=lambda name: peers[name]["mean"])
     note(f"{told}: the best peer", f"{best}, {peers[best]['mean']:.3f} mm")
     for name, changes in WAYS.items():
-        found = timed(told, f"ours, {name}", _ours(changes, data), slabs, level, thick, true)
+        found = timed(told, f"ours, {name}", ours(changes, data), slabs, level, thick, true)
         at_most(
             f"{told}: ours, {name}: mean of both ways over the best peer's", found["mean"] / peers[best]["mean"], SHARE
         )
@@ -223,7 +223,7 @@ def _thicker(volume: Volume, voxels: Floats, thick: int) -> Volume:
     return Volume.from_stored(voxels, affine)
 
 
-def _ours(changes: dict[str, Any], data: str) -> Peer:
+def ours(changes: dict[str, Any], data: str) -> Peer:
     def run(slabs: Volume, level: float, thick: int) -> TriMesh:
         chosen: dict[str, Any] = {"select": (1,)} if data == "labels" else {"lower": level}
         return reconstruct(slabs, **chosen, **changes).mesh
