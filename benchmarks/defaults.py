@@ -7,24 +7,22 @@ from __future__ import annotations
 
 import argparse
 import time
-from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench import SHARED, at_least, at_most, header, holds, note
+from bench import SHARED, at_least, at_most, header, holds, judged, note
 from labels import STRUCTURES, STUDY, marched
 from pieces import DUST, pieces_of_mesh, pieces_of_voxels
 from slab_peers import cubes, smoothed
 from tomomesh import Settings, Volume, phantom, read_points, read_volume, reconstruct, reconstruct_points
-from tomomesh.errors import TomomeshError
 from tomomesh.measure.report import compare
 from tomomesh.measure.shape import triangle_shapes
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
@@ -65,15 +63,6 @@ def shared(path: str) -> bool:
     if not found:
         note(path, "not measured: the shared data are not here")
     return found
-
-
-@contextmanager
-def judged(told: str) -> Iterator[None]:
-    """Go on where a run is refused, and count it as lost."""
-    try:
-        yield
-    except TomomeshError as error:
-        holds(f"{told}: not refused ({error})", False)
 
 
 def timed(told: str, run: Callable[[], Surface]) -> Surface:
