@@ -14,7 +14,7 @@ import numpy as np
 
 from bench import SHARED, at_least, at_most, header, holds, judged, note
 from labels import STRUCTURES, STUDY, marched
-from pieces import DUST, pieces_of_mesh, pieces_of_voxels
+from pieces import DUST, pieces_of_labels, pieces_of_mesh
 from slab_peers import cubes, smoothed
 from tomomesh import Settings, Volume, phantom, read_points, read_volume, reconstruct, reconstruct_points
 from tomomesh.measure.report import compare
@@ -99,11 +99,9 @@ def full(told: str, mesh: TriMesh, volume_mm3: float, percent: float) -> None:
 
 
 def whole(told: str, mesh: TriMesh, mask: Mask, volume: Volume) -> None:
-    """Compare pieces and handles with those of the voxels, read with and without contacts at edges and corners."""
-    ours = pieces_of_mesh(mesh, DUST * volume.voxel_mm3)
-    tight, loose = (pieces_of_voxels(mask, links=links) for links in (1, 3))
-    for what, found, *both in zip(("pieces", "handles"), ours, tight, loose, strict=True):
-        low, high = sorted(both)
+    """Compare pieces and handles with those of the voxels, dust left out of both."""
+    ours, voxels = pieces_of_mesh(mesh, DUST * volume.voxel_mm3), pieces_of_labels(mask)
+    for what, found, (low, high) in zip(("pieces", "handles"), ours, voxels, strict=True):
         holds(f"{told}: {what}, found {found}, of the voxels {low} to {high}", low <= found <= high)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import generate_binary_structure, label
+from scipy.ndimage import binary_closing, generate_binary_structure, label
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -30,6 +30,17 @@ def pieces_of_mesh(mesh: TriMesh, dust_mm3: float) -> tuple[int, int]:
     corners, sides, faces = (np.bincount(which, minlength=count) for which in (part, part[mesh.edges[:, 0]], of_face))
     kept = np.abs(volumes) >= dust_mm3
     return int((kept & (volumes > 0)).sum()), int((1 - (corners - sides + faces)[kept] // 2).sum())
+
+
+def pieces_of_labels(mask: Mask) -> list[tuple[int, int]]:
+    """Return the fewest and the most pieces and handles that a mask may be said to have.
+
+    Voxels hang together through faces alone, or through edges and corners too; and holes through it that are at most
+    two pixels wide in their slice, which a closing by one pixel fills, are dust or not.
+    """
+    closed = binary_closing(np.pad(mask, 2), np.ones((1, 3, 3)))
+    counts = [pieces_of_voxels(solid, links=links) for solid in (mask, closed) for links in (1, 3)]
+    return [(min(each), max(each)) for each in zip(*counts, strict=True)]
 
 
 def pieces_of_voxels(mask: Mask, *, links: int) -> tuple[int, int]:
