@@ -148,7 +148,7 @@ def marched(volume: Volume, mask: NDArray[np.bool_]) -> TriMesh:
     from skimage.measure import marching_cubes
 
     places, faces, _, _ = marching_cubes(np.pad(mask, 1).astype(np.float32), 0.5)
-    return TriMesh(volume.to_mm(places[:, ::-1] - 1.0), faces[:, ::-1].astype(np.int64))
+    return TriMesh(volume.to_mm(places[:, ::-1] - 1.0), faces.astype(np.int64))
 
 
 if __name__ == "__main__":

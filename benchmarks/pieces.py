@@ -38,7 +38,7 @@ def pieces_of_labels(mask: Mask) -> list[tuple[int, int]]:
     Voxels hang together through faces alone, or through edges and corners too; and holes through it that are at most
     two pixels wide in their slice, which a closing by one pixel fills, are dust or not.
     """
-    closed = binary_closing(np.pad(mask, 2), np.ones((1, 3, 3)))
+    closed = binary_closing(np.pad(mask, 2), np.ones((1, 3, 3), bool))
     counts = [pieces_of_voxels(solid, links=links) for solid in (mask, closed) for links in (1, 3)]
     return [(min(each), max(each)) for each in zip(*counts, strict=True)]
 
