@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
 HEADS = [name for name, (_, labels) in STUDIES.items() if labels]
 """Studies of labels alone: no picture of a patient is drawn."""
-COLORS = 64
-"""Of the file: a sixth of the bytes of all. Chosen: half of it shows bands, twice is no better."""
 
 
 def main() -> None:
@@ -46,7 +44,7 @@ def main() -> None:
         panels.append((name, f"{found['mean']:.2f} mm from the true surface, faces turn by {found['turn']:.1f}°", mesh))
     picture = BytesIO()
     save(pair(panels), picture)
-    Image.open(picture).convert("RGB").quantize(COLORS, dither=Image.Dither.NONE).save(asked.file, optimize=True)
+    Image.open(picture).convert("RGB").quantize(dither=Image.Dither.NONE).save(asked.file, optimize=True)
 
 
 @styled
