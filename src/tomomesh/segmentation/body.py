@@ -27,9 +27,9 @@ CELL, CELLS = 3.0, 160
 """Edge in mm of the coarse voxels in which thickness is measured, half of `THICK`, and the fewest of them along the
 longest side. Chosen: half and twice of both change nothing on that CT and those heads."""
 RIM, RIM_VOXELS = 2.0, 3
-"""Millimeters, and voxels, the fewer of both, around a holder that it fills in part, and that are cut away with it where
-it touches the patient: edges are blurred over so much. Measured on a head's CT: half of it leaves 0.07 % more in the
-skin, shreds of the holder, twice takes 0.14 % more, of the ears too."""
+"""Millimeters, and voxels, the fewer of both, around a holder that it fills in part, and that are cut away with it
+where it touches the patient: edges are blurred over so much. Measured on a head's CT: half of it leaves 0.07 % more in
+the skin, shreds of the holder, twice takes 0.14 % more, of the ears too."""
 SPECK, SMALL = 27, 0.001
 """Voxels, and share of the largest component, under both of which a component is a speck, and an enclosed hole a pore.
 In fewer than 3 x 3 x 3 voxels none has neighbors of its own kind all around: no shape can be told. Measured: half of 27
@@ -86,11 +86,15 @@ def components_of_body(mask: NDArray[np.bool_], volume: Volume) -> Components:
 
 
 def _holders(volume: Volume, body: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return what is as dense as bone and lies in no body, with its rim; found in voxels as wide as that."""
+    """Return what is denser than the least bone, lies in no body and is larger than its ball, with its rim.
+
+    It is found in voxels as wide as the rim. What is smaller may be a bit of bone in a thin part of the patient.
+    """
     every, spacing = _coarse(volume, RIM)
     steps = tuple(slice(None, None, step) for step in every)
     dense = volume.voxels[steps] > PRESETS_HU["spongy-bone"][0]
-    foreign = dense & ~_in_body(dense, body[steps]).mask
+    labels, sizes = _components(dense & ~_in_body(dense, body[steps]).mask)
+    foreign = (sizes * np.prod(spacing) > 4 / 3 * np.pi * THICK**3)[labels]
     if foreign.any():
         reach = max(float(spacing.min()), min(RIM, RIM_VOXELS * min(volume.spacing_mm)))
         foreign = ndimage.distance_transform_edt(~foreign, spacing) <= reach

@@ -60,19 +60,19 @@ def otsu_levels(levels: NDArray[Any], classes: int, *, bins: int = 256) -> tuple
     low, high = float(levels.min()), float(levels.max())
     if low == high:
         return (low,)
-    counts, middles = _telling(levels, low, high, bins)
+    counts, middles = _over_bulk(levels, low, high, bins)
     classes = min(classes, int(np.count_nonzero(counts)))
     ends = _last_bins(counts, middles, classes)
     return tuple(_between(counts, middles, ends, n) for n in range(classes - 1))
 
 
 def two_classes(levels: NDArray[Any], *, bins: int = 256) -> bool:
-    """Tell whether levels split into two classes better than one class does, in the bulk of their range."""
+    """Tell whether levels split into two classes better than one class does, without one pair of tails or the other."""
     low, high = float(levels.min()), float(levels.max())
-    return any(_split(*found) > ONE_CLASS for found in list(_histograms(levels, low, high, bins))[:1])
+    return any(_split(*found) > ONE_CLASS for found in _histograms(levels, low, high, bins))
 
 
-def _telling(levels: NDArray[Any], low: float, high: float, bins: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _over_bulk(levels: NDArray[Any], low: float, high: float, bins: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return counts and middles of bins over the bulk of the levels; over more of them where that is one class."""
     found = None
     for found in _histograms(levels, low, high, bins):

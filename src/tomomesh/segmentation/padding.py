@@ -46,27 +46,32 @@ def padding(voxels: NDArray[Any]) -> NDArray[np.bool_] | None:
         return None
     for level in np.unique([voxels[corner] for corner in product((0, -1), repeat=3)]):
         held = np.asarray(voxels == level)
-        if LEAST <= held.mean() <= MOST and _stands_out(float(level), held, voxels[~held]):
-            return held
+        if LEAST <= held.mean() <= MOST:
+            found = _standing_out(float(level), held, voxels[~held])
+            if found is not None:
+                return found
     return None
 
 
-def _stands_out(level: float, held: NDArray[np.bool_], rest: NDArray[Any]) -> bool:
-    """Tell whether a level is padding by its distance from the rest, its place, and what the rest is without it."""
+def _standing_out(level: float, held: NDArray[np.bool_], rest: NDArray[Any]) -> NDArray[np.bool_] | None:
+    """Return what of a level is padding by its distance from the rest, its place, and what the rest is without it."""
     low, high = bulk(rest)
     span = high - low
-    within = low + APART * span < level < high - APART * span
+    among = low + APART * span < level < high - APART * span
     gap = max(float(rest.min()) - level, level - float(rest.max()))
-    placed = within or gap > APART * span
-    return bool(
-        placed and span > 0 and (gap > FAR * span or _in_lines(held)) and not _drawn(rest) and two_classes(rest)
-    )
+    if not (among or gap > APART * span) or span == 0 or _drawn(rest) or not two_classes(rest):
+        return None
+    lines = _lines(held)
+    if np.count_nonzero(lines) < IN_LINES * np.count_nonzero(held) and gap <= FAR * span:
+        return None
+    return lines if among else held
 
 
-def _in_lines(held: NDArray[np.bool_]) -> bool:
-    """Tell whether nearly all voxels of a level lie in lines of it from end to end."""
-    within: int = max(int(held.all(axis=axis).sum()) * held.shape[axis] for axis in range(3))
-    return bool(within >= IN_LINES * np.count_nonzero(held))
+def _lines(held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the voxels of a level that lie in lines of it from end to end, along the axis with the most of them."""
+    full = [held.all(axis=axis, keepdims=True) for axis in range(3)]
+    best = max(range(3), key=lambda axis: int(np.count_nonzero(full[axis])) * held.shape[axis])
+    return np.broadcast_to(full[best], held.shape)
 
 
 def _drawn(rest: NDArray[Any]) -> bool:
