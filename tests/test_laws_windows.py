@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds
-from studies import shared
+from studies import AFFINES, sampled, shared, write_series
 from tomomesh import Volume, phantom, read_volume, segment
 from tomomesh.segmentation.otsu import otsu_threshold
 from tomomesh.segmentation.padding import padding
@@ -19,7 +19,10 @@ from tomomesh.segmentation.window import otsu_thresholds
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
+    from pydicom.dataset import Dataset
 
     Levels = NDArray[np.float64]
 
@@ -199,8 +202,52 @@ class TestStudies:
         assert padding(voxels) is None
         assert (voxels > found).sum() == pytest.approx((voxels > plain).sum(), rel=0.005)
 
-    def test_a_head_s_ct_has_padding_of_minus_1500(self) -> None:
-        study = read_volume(shared("dcm_qa_ct/In/GE"), settings=ReadSettings(resample_slices=True)).voxels[::8]
-        found = padding(study)
+    def test_a_head_s_ct_has_padding_of_minus_1500_and_says_so(self) -> None:
+        study = read_volume(shared("dcm_qa_ct/In/GE"), settings=ReadSettings(resample_slices=True))
+        assert study.padding == (-1500, -1500)
+        levels = study.voxels[::8]
+        found = padding(levels)
         assert found is not None
-        np.testing.assert_array_equal(found, study == -1500)
+        np.testing.assert_array_equal(found, levels == -1500)
+
+
+class TestHeader:
+    """A DICOM header names padding, which then is background whatever the window; its level may be any."""
+
+    @pytest.mark.parametrize(
+        ("signed", "written", "limit", "scale", "wanted"),
+        [
+            (1, -2000, None, (1, -1024), (-3024, -3024)),
+            (1, 63536, None, (1, -1024), (-3024, -3024)),
+            (0, 7, None, (1, 0), (7, 7)),
+            (0, 7, 9, (-2, 1), (-17, -13)),
+        ],
+    )
+    def test_its_levels_are_scaled(
+        self,
+        tmp_path: Path,
+        signed: int,
+        written: int,
+        limit: int | None,
+        scale: tuple[int, int],
+        wanted: tuple[float, float],
+    ) -> None:
+        def named(dataset: Dataset, k: int) -> None:
+            dataset.PixelRepresentation = signed
+            dataset.RescaleSlope, dataset.RescaleIntercept = scale
+            dataset.add_new((0x0028, 0x0120), "SS" if signed and written < 0 else "US", written)
+            if limit is not None:
+                dataset.add_new((0x0028, 0x0121), "US", limit)
+
+        affine = AFFINES["axial"]
+        assert read_volume(write_series(tmp_path, sampled(affine), affine, named)).padding == wanted
+
+    def test_it_is_background_also_of_a_window_by_hand(self) -> None:
+        levels = np.where((rows - 14) ** 2 + (columns - 14) ** 2 < 100, 40, -900).astype(np.int16)
+        levels[PLACES["slab"]] = 30
+        study = replace(Volume.from_stored(levels, np.eye(4), unit="HU"), padding=(30, 30))
+        for asked in ({"lower": 0.0}, {"preset": "soft-tissue"}, {}):
+            found = segment(study, network="none", keep="all", **asked)
+            np.testing.assert_array_equal(found.mask, levels == 40)
+            window = found.report["window"]
+            assert window["padding_voxels"] == window["named_padding_voxels"] == PLACES["slab"].sum()

@@ -72,7 +72,9 @@ def two_classes(levels: NDArray[Any], *, bins: int = 256) -> bool:
     return any(_split(*found) > ONE_CLASS for found in _histograms(levels, low, high, bins))
 
 
-def _over_bulk(levels: NDArray[Any], low: float, high: float, bins: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _over_bulk(
+    levels: NDArray[Any], low: float, high: float, bins: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return counts and middles of bins over the bulk of the levels; over more of them where that is one class."""
     found = None
     for found in _histograms(levels, low, high, bins):

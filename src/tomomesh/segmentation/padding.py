@@ -12,6 +12,8 @@ from .otsu import bulk, two_classes
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..model.volume import Volume
+
 LEAST, MOST = 0.01, 0.9
 """Shares of the voxels that padding takes. Below the first the range of Otsu's histogram leaves it out by itself; above
 the second too little is left to tell an object from its background."""
@@ -51,6 +53,15 @@ def padding(voxels: NDArray[Any]) -> NDArray[np.bool_] | None:
             if found is not None:
                 return found
     return None
+
+
+def named_padding(volume: Volume) -> NDArray[np.bool_] | None:
+    """Return the voxels that a file's header calls padding; None where it names none, or all of them."""
+    if volume.padding is None:
+        return None
+    low, high = volume.padding
+    held = np.asarray((volume.voxels >= low) & (volume.voxels <= high))
+    return held if held.any() and not held.all() else None
 
 
 def _standing_out(level: float, held: NDArray[np.bool_], rest: NDArray[Any]) -> NDArray[np.bool_] | None:

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import EmptyError, UsageError
 from .body import Cleaned, components_of_body, is_dense, largest_component, solid, thick_components, without_specks
 from .labels import select
-from .padding import padding
+from .padding import named_padding, padding
 from .window import PRESETS_HU, choose_window, window
 
 if TYPE_CHECKING:
@@ -28,8 +28,8 @@ class Counts:
 
     Attributes
     ----------
-    padding : int
-        Voxels of the study that are padding, and were given its lowest other level.
+    padding, named_padding : int
+        Voxels of the study that are padding, and were given its lowest other level; those of which its header says so.
     window : int
         Voxels within the bounds, or of the labels, in the box that was asked for.
     room : int
@@ -44,6 +44,7 @@ class Counts:
     """
 
     padding: int = 0
+    named_padding: int = 0
     window: int = 0
     room: int = 0
     components: int = 0
@@ -114,15 +115,23 @@ def _of_labels(stack: Volume, labels: Volume | None, asked: WindowSettings) -> C
 
 
 def _of_levels(stack: Volume, asked: WindowSettings) -> Chosen:
-    """Window a study; where the bounds were not given by hand, padding becomes background before."""
+    """Window a study whose padding is background: what its header names, and what is found where no window is given."""
     given = asked.lower is not None or asked.upper is not None
-    padded = None if given else padding(stack.voxels)
-    lower, upper = choose_window(stack, asked, padded)
-    if padded is not None:
-        lowest = stack.voxels.min(where=~padded, initial=stack.voxels.max())
-        stack = replace(stack, voxels=np.where(padded, lowest, stack.voxels))
+    found = None if given else padding(stack.voxels)
+    stack, named = _as_background(stack, named_padding(stack))
+    stack, guessed = _as_background(stack, found)
+    lower, upper = choose_window(stack, asked, found)
     mask = window(stack, lower=lower, upper=upper, layers=asked.layers)
-    return Chosen(stack, mask, lower, upper, Counts(0 if padded is None else int(np.count_nonzero(padded))))
+    return Chosen(stack, mask, lower, upper, Counts(padding=named + guessed, named_padding=named))
+
+
+def _as_background(stack: Volume, padded: NDArray[np.bool_] | None) -> tuple[Volume, int]:
+    """Give padding the lowest of the other levels; return also how many voxels had another."""
+    if padded is None:
+        return stack, 0
+    lowest = stack.voxels.min(where=~padded, initial=stack.voxels.max())
+    changed = int(np.count_nonzero(stack.voxels[padded] != lowest))
+    return replace(stack, voxels=np.where(padded, lowest, stack.voxels)), changed
 
 
 def _within(mask: NDArray[np.bool_], inside: NDArray[np.bool_]) -> NDArray[np.bool_]:

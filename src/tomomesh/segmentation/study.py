@@ -164,6 +164,7 @@ def _became(counts: Counts, cleaned: Cleaned) -> dict[str, Any]:
     """Tell what of the window was left out, and what was filled."""
     return {
         "padding_voxels": counts.padding,
+        "named_padding_voxels": counts.named_padding,
         "window_voxels": counts.window,
         "room_voxels": counts.room,
         "components": counts.components or None,

@@ -42,7 +42,7 @@ class WindowSettings(Group):
         "auto",
         "what is kept of the window: the patient's body, without the scanner's table; the largest component; or all. "
         "auto is body for what is dense in CT, and everything elsewhere and for labels. But under all, specks are left "
-        "out and pores filled: under 27 voxels, and under a thousandth of the largest component",
+        "out and pores filled: under 8 voxels, and under a thousandth of the largest component",
         choices=("auto", "body", "largest", "all"),
     )
 
