@@ -204,7 +204,7 @@ class TestStudies:
 
     def test_a_head_s_ct_has_padding_of_minus_1500_and_says_so(self) -> None:
         study = read_volume(shared("dcm_qa_ct/In/GE"), settings=ReadSettings(resample_slices=True))
-        assert study.padding == (-1500, -1500)
+        assert set(study.padding or ()) == {-1500}
         levels = study.voxels[::8]
         found = padding(levels)
         assert found is not None
