@@ -104,8 +104,9 @@ class TestAuto:
     def test_a_window_of_air_is_kept(self, bubble: bool, upper: float) -> None:
         study = lungs(bubble=bubble)
         found = segment(study, lower=-950.0, upper=upper, network="none")
-        assert np.array_equal(found.mask, study.voxels == LUNG)
+        assert np.array_equal(found.mask, lungs(bubble=False).voxels == LUNG)
         assert found.report["window"]["components"] is None
+        assert found.report["window"]["speck_voxels"] == bubble
 
     def test_body_is_taken_at_its_word(self) -> None:
         found = segment(lungs(), lower=-950.0, upper=-500.0, network="none", keep="body")

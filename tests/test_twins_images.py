@@ -44,42 +44,39 @@ def volume(levels: NDArray[Any]) -> Volume:
     return Volume.from_stored(levels, np.eye(4))
 
 
+def between(levels: NDArray[Any], *thresholds: float) -> float:
+    """Return the variance between the classes that thresholds make of levels."""
+    values = levels.astype(np.float64).ravel()
+    classes = [values[np.searchsorted(thresholds, values) == n] for n in range(len(thresholds) + 1)]
+    return float(sum(one.size * (one.mean() - values.mean()) ** 2 for one in classes if one.size) / values.size)
+
+
 class TestOtsu:
     @law(80)
     @given(levels=grays())
-    def test_is_scikit_image_s_within_a_bin(self, levels: NDArray[Any]) -> None:
+    def test_splits_the_classes_as_scikit_image_s(self, levels: NDArray[Any]) -> None:
+        """Ours leaves the tails out and goes to the middle of what is empty, so levels may differ; the classes not."""
         wanted = threshold_otsu(np.asarray(levels, np.float64), nbins=256)
-        one_bin = np.ptp(np.asarray(levels, np.float64)) / 256
-        assert otsu_threshold(levels) == pytest.approx(wanted, abs=one_bin * 1.001)
+        found = otsu_threshold(levels)
+        assert between(levels, found) > 0.99 * between(levels, wanted)
 
     @pytest.mark.parametrize("classes", [3, 4])
     @pytest.mark.parametrize("seed", range(5))
     def test_of_several_classes_is_scikit_image_s(self, classes: int, seed: int) -> None:
         draw = np.random.default_rng(seed)
         levels = np.concatenate([draw.normal(at, draw.uniform(1, 30), 3000) for at in draw.uniform(-500, 500, 4)])
-        wanted = threshold_multiotsu(levels, classes, nbins=64)
-        assert otsu_levels(levels, classes, bins=64) == pytest.approx(tuple(wanted))
+        wanted = threshold_multiotsu(levels, classes, nbins=256)
+        assert between(levels, *otsu_levels(levels, classes)) > 0.995 * between(levels, *wanted)
 
     def test_has_no_more_classes_than_levels(self) -> None:
-        assert otsu_levels(np.array([1, 1, 5, 9]), 6) == pytest.approx((1, 5), abs=0.05)
+        assert otsu_levels(np.array([1, 1, 5, 9]), 6) == pytest.approx((3, 7), abs=0.05)
 
     @law(60)
     @given(levels=grays())
     def test_splits_the_classes_best(self, levels: NDArray[Any]) -> None:
         """Try each threshold, and weigh the classes that it makes."""
-
-        def between(threshold: float) -> float:
-            below = bins <= threshold
-            if below.all() or not below.any():
-                return 0.0
-            apart = bins[below].mean() - bins[~below].mean()
-            return float(below.mean() * (~below).mean() * apart**2)
-
-        values = levels.astype(np.float64).ravel()
-        low, wide = values.min(), np.ptp(values)
-        bins = low + (np.minimum((values - low) * 256 // wide, 255) + 0.5) * wide / 256
-        best = max(between(threshold) for threshold in np.unique(bins))
-        assert between(otsu_threshold(levels) + 1e-6 * wide) == pytest.approx(best, rel=1e-3)
+        best = max(between(levels, threshold) for threshold in np.unique(levels))
+        assert between(levels, otsu_threshold(levels)) > 0.99 * best
 
     @pytest.mark.parametrize("kind", TYPES)
     def test_of_two_levels_lies_between_them(self, kind: str) -> None:

@@ -171,7 +171,19 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
     if window["chosen_by"] == "labels":
         select = ", ".join(map(str, report["settings"]["window"]["select"]))
         lines[-1] = f"window    label(s) {select}, {100 * window['share']:.1f} % of the voxels"
-    return [*lines, *way_of(report["way"]["name"]).of_networks(report)]
+    return [*lines, *_of_kept(window), *way_of(report["way"]["name"]).of_networks(report)]
+
+
+def _of_kept(window: dict[str, Any]) -> list[str]:
+    """Say what was left out of the window, and filled in it, in shares of its voxels."""
+    whole = window["window_voxels"]
+    left = {"no body": "dropped_voxels", "air of the room": "room_voxels"}
+    left |= {f"{window['specks']} speck(s)": "speck_voxels"}
+    filled = {f"{window['filled_pores']} pore(s)": "filled_pore_voxels", "what it encloses": "filled_lining_voxels"}
+    told = [f"{window[key] / whole:.2%} {name} left out" for name, key in left.items() if window[key]]
+    told += [f"{window[key] / whole:.2%} {name} filled" for name, key in filled.items() if window[key]]
+    told += [f"{window['padding_voxels']} voxels of padding made background"] if window["padding_voxels"] else []
+    return [f"kept      {window['voxels']} voxels: {', '.join(told)}"] if told else []
 
 
 def _of_fit(report: dict[str, Any]) -> str:

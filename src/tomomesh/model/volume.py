@@ -73,6 +73,8 @@ class Volume:
         ``"HU"`` for CT, else ``"stored"``.
     notes : tuple of str
         What the reader decided or dropped, one line each, without patient data.
+    padding : (lowest, highest) or None
+        Gray levels that stand for nothing measured, where the file names them.
 
     Examples
     --------
@@ -91,6 +93,7 @@ class Volume:
     grid: Grid
     unit: str = "stored"
     notes: tuple[str, ...] = ()
+    padding: tuple[float, float] | None = None
 
     def __repr__(self) -> str:
         k, j, i = self.shape

@@ -2,22 +2,56 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import EmptyError, UsageError
-from .body import Components, components_of_body, is_dense, largest_component
+from .body import Cleaned, components_of_body, is_dense, largest_component, solid, thick_components, without_specks
 from .labels import select
-from .window import choose_window, window
+from .padding import named_padding, padding
+from .window import PRESETS_HU, choose_window, window
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.volume import Volume
     from ..settings import Settings, WindowSettings
+    from .body import Components
     from .window import Limit
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What became of the voxels of a window.
+
+    Attributes
+    ----------
+    padding, named_padding : int
+        Voxels of the study that are padding, and were given its lowest other level; those of which its header says so.
+    window : int
+        Voxels within the bounds, or of the labels, in the box that was asked for.
+    room : int
+        Of them, those that lie in the air of the room.
+    components, dropped : int
+        Components of the window, and those that were left out as no part of the body; 0 where none were looked for.
+    dropped_voxels : int
+    spared_voxels : int
+        Voxels that lie in no body, and were kept for all that: for being all of the window, or on a guess most of it.
+    lining : int
+        Voxels outside of the bounds that were filled, for the outer surface alone to be left.
+    """
+
+    padding: int = 0
+    named_padding: int = 0
+    window: int = 0
+    room: int = 0
+    components: int = 0
+    dropped: int = 0
+    dropped_voxels: int = 0
+    spared_voxels: int = 0
+    lining: int = 0
 
 
 @dataclass(frozen=True)
@@ -31,21 +65,21 @@ class Chosen:
     mask : (K, J, I) bool array
     lower, upper : float or (L,) float array
         Bounds on the levels of `volume`.
-    found, dropped : int
-        Components of the window, and those that were left out; 0 where all were to be kept.
-    dropped_voxels : int
-    spared_voxels : int
-        Voxels that lie in no body, and were kept for all that: for being all of the window, or on a guess most of it.
+    counts : Counts
+    cleaned : Cleaned
+        Specks and pores.
     """
 
     volume: Volume
     mask: NDArray[np.bool_]
     lower: Limit
     upper: Limit
-    found: int = 0
-    dropped: int = 0
-    dropped_voxels: int = 0
-    spared_voxels: int = 0
+    counts: Counts = field(default_factory=Counts)
+    cleaned: Cleaned | None = None
+
+    def counted(self, mask: NDArray[np.bool_], **counts: int) -> Chosen:
+        """Return the same with another mask and some counts."""
+        return replace(self, mask=mask, counts=replace(self.counts, **counts))
 
 
 def choose(stack: Volume, labels: Volume | None, settings: Settings, inside: NDArray[np.bool_] | None = None) -> Chosen:
@@ -66,15 +100,38 @@ def choose(stack: Volume, labels: Volume | None, settings: Settings, inside: NDA
         As `window` and `select`.
     """
     asked = settings.window
-    if asked.select is None:
-        lower, upper = choose_window(stack, asked)
-        chosen = Chosen(stack, window(stack, lower=lower, upper=upper, layers=asked.layers), lower, upper)
-    else:
-        mask = select(stack if labels is None else labels, asked.select)
-        chosen = Chosen(replace(stack, voxels=mask.view(np.uint8)), mask, 0.5, np.inf)
-    if inside is not None:
-        chosen = replace(chosen, mask=_within(chosen.mask, inside))
-    return _some(chosen, _kept_components(chosen, stack, asked), guessed=asked.keep == "auto")
+    chosen = _of_labels(stack, labels, asked) if asked.select is not None else _of_levels(stack, asked)
+    mask = chosen.mask if inside is None else _within(chosen.mask, inside)
+    chosen = _parts(chosen.counted(mask, window=int(np.count_nonzero(mask))), stack, asked)
+    if asked.keep == "all":
+        return chosen
+    cleaned = without_specks(chosen.mask)
+    return replace(chosen, mask=cleaned.mask, cleaned=cleaned)
+
+
+def _of_labels(stack: Volume, labels: Volume | None, asked: WindowSettings) -> Chosen:
+    mask = select(stack if labels is None else labels, asked.select or ())
+    return Chosen(replace(stack, voxels=mask.view(np.uint8)), mask, 0.5, np.inf)
+
+
+def _of_levels(stack: Volume, asked: WindowSettings) -> Chosen:
+    """Window a study whose padding is background: what its header names, and what is found where no window is given."""
+    given = asked.lower is not None or asked.upper is not None
+    found = None if given else padding(stack.voxels)
+    stack, named = _as_background(stack, named_padding(stack))
+    stack, guessed = _as_background(stack, found)
+    lower, upper = choose_window(stack, asked, found)
+    mask = window(stack, lower=lower, upper=upper, layers=asked.layers)
+    return Chosen(stack, mask, lower, upper, Counts(padding=named + guessed, named_padding=named))
+
+
+def _as_background(stack: Volume, padded: NDArray[np.bool_] | None) -> tuple[Volume, int]:
+    """Give padding the lowest of the other levels; return also how many voxels had another."""
+    if padded is None:
+        return stack, 0
+    lowest = stack.voxels.min(where=~padded, initial=stack.voxels.max())
+    changed = int(np.count_nonzero(stack.voxels[padded] != lowest))
+    return replace(stack, voxels=np.where(padded, lowest, stack.voxels)), changed
 
 
 def _within(mask: NDArray[np.bool_], inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -84,32 +141,51 @@ def _within(mask: NDArray[np.bool_], inside: NDArray[np.bool_]) -> NDArray[np.bo
     return mask
 
 
-def _kept_components(chosen: Chosen, stack: Volume, asked: WindowSettings) -> Components | None:
-    """Return the components that are kept; None where all are."""
+def _parts(chosen: Chosen, stack: Volume, asked: WindowSettings) -> Chosen:
+    """Leave out components, and what is no body; where it is asked for, fill or look into the body."""
     ct = stack.layers == 1 and (stack.unit == "HU" or asked.preset is not None)
-    keep = asked.keep
-    if keep == "auto":
-        keep = "body" if ct and asked.select is None and is_dense(chosen.mask, stack) else "all"
-    if keep == "largest":
-        return largest_component(chosen.mask)
+    guessed, keep = asked.keep == "auto", asked.keep
     if keep == "all":
-        return None
-    if not ct:
+        return chosen
+    if asked.preset == "lung" and guessed:
+        return _inside_body(chosen)
+    if guessed:
+        keep = "body" if ct and asked.select is None and is_dense(chosen.mask, chosen.volume) else "all"
+    if keep == "body" and not ct:
         raise UsageError(
             "the body is found in Hounsfield units, which the study is not in", found="--keep = body",
             expected="a CT", hint="--keep largest",
         )  # fmt: skip
-    return components_of_body(chosen.mask, stack)
+    if keep != "all":
+        by_body = keep == "body"
+        kept = components_of_body(chosen.mask, chosen.volume) if by_body else largest_component(chosen.mask)
+        chosen = _some(chosen, kept, guessed=guessed)
+    return _filled(chosen) if asked.preset == "skin" else chosen
 
 
-def _some(chosen: Chosen, kept: Components | None, *, guessed: bool) -> Chosen:
+def _some(chosen: Chosen, kept: Components, *, guessed: bool) -> Chosen:
     """Leave components out; not all of them, where a study shows no body at all, nor most of a window on a guess."""
-    if kept is None:
-        return chosen
-    voxels = int(np.count_nonzero(chosen.mask))
-    dropped_voxels = voxels - int(np.count_nonzero(kept.mask))
-    if dropped_voxels == voxels or (guessed and 2 * dropped_voxels > voxels):
-        return replace(chosen, found=kept.found, spared_voxels=dropped_voxels)
-    return replace(
-        chosen, mask=kept.mask, found=kept.found, dropped=kept.dropped, dropped_voxels=dropped_voxels
-    )  # fmt: skip
+    voxels = chosen.counts.window
+    dropped = voxels - int(np.count_nonzero(kept.mask))
+    if dropped == voxels or (guessed and 2 * dropped > voxels):
+        return chosen.counted(chosen.mask, components=kept.found, spared_voxels=dropped)
+    return chosen.counted(kept.mask, components=kept.found, dropped=kept.dropped, dropped_voxels=dropped)
+
+
+def _filled(chosen: Chosen) -> Chosen:
+    """Fill what a skin encloses."""
+    filled = solid(chosen.mask, chosen.volume)
+    return chosen.counted(filled, lining=int(np.count_nonzero(filled) - np.count_nonzero(chosen.mask)))
+
+
+def _inside_body(chosen: Chosen) -> Chosen:
+    """Leave out the air of the room, and then what is nowhere thick; not where nothing would be left."""
+    volume, window = chosen.volume, chosen.counts.window
+    skin = volume.voxels > PRESETS_HU["skin"][0]
+    mask = chosen.mask & solid(components_of_body(skin, volume).mask, volume)
+    if not mask.any():
+        return chosen.counted(chosen.mask, spared_voxels=window)
+    inside = int(np.count_nonzero(mask))
+    found = replace(chosen, mask=mask, counts=replace(chosen.counts, window=inside))
+    kept = _some(found, thick_components(mask, volume), guessed=True)
+    return kept.counted(kept.mask, window=window, room=window - inside)

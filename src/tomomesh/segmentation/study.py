@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from ..model.volume import AXES, Volume, order_along
 from ..stage import Stage, folded, timed
+from .body import Cleaned
 from .crop import crop, inside_roi
 from .grid import onto_grid
 from .labels import doubted, labels_in
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..settings import Settings
+    from .selection import Counts
     from .window import Limit
 
 APART = 4
@@ -130,11 +132,11 @@ def _cropped(box: tuple[slice, ...], sizes: tuple[int, int, int]) -> dict[str, l
 
 def _dropped(chosen: Stage[Chosen], settings: Settings) -> tuple[str, ...]:
     """Say which components a guess has left out."""
-    found = chosen.value
+    found = chosen.value.counts
     if not found.dropped or settings.window.keep != "auto":
         return ()
     return (
-        f"{found.dropped} of {found.found} components of the window ({found.dropped_voxels} voxels) were "
+        f"{found.dropped} of {found.components} components of the window ({found.dropped_voxels} voxels) were "
         "left out, which lie in nothing that is 12 mm thick, as a scanner's table: --keep all keeps them",
     )
 
@@ -149,12 +151,31 @@ def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:
         "layers": layers,
         "joined_by": asked.layers if layers > 1 else None,
         "chosen_by": _chosen_by(settings),
+        "lower_from": _from("lower", lower, settings),
+        "upper_from": _from("upper", upper, settings),
         "voxels": int(mask.sum()),
         "share": float(mask.mean()),
         "touches_border": bool(any(_edges(mask))),
-        "components": chosen.found or None,
-        "dropped_components": chosen.dropped,
-        "dropped_voxels": chosen.dropped_voxels,
+        **_became(chosen.counts, chosen.cleaned or Cleaned(mask)),
+    }
+
+
+def _became(counts: Counts, cleaned: Cleaned) -> dict[str, Any]:
+    """Tell what of the window was left out, and what was filled."""
+    return {
+        "padding_voxels": counts.padding,
+        "named_padding_voxels": counts.named_padding,
+        "window_voxels": counts.window,
+        "room_voxels": counts.room,
+        "components": counts.components or None,
+        "dropped_components": counts.dropped,
+        "dropped_voxels": counts.dropped_voxels,
+        "specks": cleaned.specks,
+        "speck_voxels": cleaned.speck_voxels,
+        "largest_speck_voxels": cleaned.largest_speck,
+        "filled_pores": cleaned.pores,
+        "filled_pore_voxels": cleaned.pore_voxels,
+        "filled_lining_voxels": counts.lining,
     }
 
 
@@ -164,6 +185,12 @@ def _chosen_by(settings: Settings) -> str:
     return "labels" if asked.select else "preset" if asked.preset else "given" if given else "otsu"
 
 
+def _from(name: str, limit: Limit, settings: Settings) -> str | None:
+    """Say where a bound comes from; None where there is none."""
+    given = getattr(settings.window, name) is not None
+    return None if np.isinf(limit).all() else "given" if given else _chosen_by(settings)
+
+
 def _edges(mask: NDArray[np.bool_]) -> list[np.bool_]:
     """Tell of both sides of each axis whether a kept voxel lies on them."""
     return [np.take(mask, end, axis=axis).any() for axis in range(3) for end in (0, -1)]
@@ -171,12 +198,12 @@ def _edges(mask: NDArray[np.bool_]) -> list[np.bool_]:
 
 def _doubts(chosen: Chosen, settings: Settings) -> list[str]:
     """Say what about a window may not be as it was meant."""
-    warnings = []
-    if 0 < chosen.spared_voxels == int(chosen.mask.sum()):
+    warnings, counts = [], chosen.counts
+    if 0 < counts.spared_voxels == counts.window:
         warnings.append("nothing of the window lies in a body, 12 mm thick and denser than air: all of it was kept")
-    elif chosen.spared_voxels:
+    elif counts.spared_voxels:
         warnings.append(
-            f"most of the window ({chosen.spared_voxels} of {int(chosen.mask.sum())} voxels) lies in nothing that is "
+            f"most of the window ({counts.spared_voxels} of {counts.window} voxels) lies in nothing that is "
             "12 mm thick, and was kept for all that: --keep body leaves it out"
         )
     if _chosen_by(settings) == "otsu" and len(labels_in(chosen.volume.voxels[::APART])) > 1:

@@ -9,6 +9,7 @@ import numpy as np
 from ..model.volume import AXES
 from .labels import labels_in
 from .otsu import histogram, otsu_levels
+from .padding import padding
 from .window import PRESETS_HU, otsu_thresholds
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def survey(volume: Volume) -> dict[str, Any]:
         Size, spacing, frame, tilt, the range and histogram of the gray levels, suggested windows and the share of the
         voxels in each, the labels of a label map, the reader's notes, and remarks on what a mesh of it will show.
     """
-    voxels = volume.voxels
+    voxels, padded = volume.voxels, padding(volume.voxels)
     low, high = float(voxels.min()), float(voxels.max())
     return {
         "slices_rows_columns": list(volume.shape),
@@ -64,10 +65,10 @@ def survey(volume: Volume) -> dict[str, Any]:
         "lowest": low,
         "highest": high,
         "histogram": histogram(voxels, low, high, BARS).tolist() if high > low else [voxels.size],
-        "windows": _windows(volume, low),
+        "windows": _windows(volume, padded),
         "labels": labels_in(voxels),
         "notes": list(volume.notes),
-        "remarks": list(_remarks(volume)),
+        "remarks": list(_remarks(volume, padded)),
     }
 
 
@@ -79,24 +80,25 @@ def _tilt(volume: Volume) -> float:
     return float(np.degrees(np.arccos(min(1.0, cosine))))
 
 
-def _windows(volume: Volume, low: float) -> dict[str, dict[str, Any]]:
-    """Suggest lower limits: Otsu's, those between three and four classes, and for CT those of the presets."""
-    limits: dict[str, Any] = {"otsu": otsu_thresholds(volume)}
+def _windows(volume: Volume, padded: NDArray[np.bool_] | None) -> dict[str, dict[str, Any]]:
+    """Suggest windows: Otsu's, those above three and four classes, and for CT the presets."""
+    measured = volume.voxels if padded is None else volume.voxels[~padded]
+    limits: dict[str, Any] = {"otsu": otsu_thresholds(volume, padded)}
     if volume.layers == 1:
         for classes in (3, 4):
-            limit = otsu_levels(volume.voxels, classes)[-1]
+            limit = otsu_levels(measured, classes)[-1]
             limits |= {} if limit in limits.values() else {f"otsu of {classes}": limit}
-    if low < 0:
-        limits |= {name: lower for name, (lower, _) in PRESETS_HU.items()}
-    return {name: _window(volume.voxels, limit) for name, limit in limits.items()}
+    windows = {name: (limit, np.inf) for name, limit in limits.items()}
+    windows |= PRESETS_HU if volume.voxels.min() < 0 else {}
+    return {name: _window(volume.voxels, *bounds) for name, bounds in windows.items()}
 
 
-def _window(voxels: NDArray[Any], limit: Any) -> dict[str, Any]:
+def _window(voxels: NDArray[Any], lower: Any, upper: float) -> dict[str, Any]:
     """Say which share of the voxels a window takes, and at which ends of the study it is cut off."""
-    inside = voxels > limit
+    inside = (voxels > lower) & (voxels <= upper)
     ends = [(2 - n, end) for n in range(3) for end in (0, -1)]
     cut = [LETTERS[axis][end] for axis, end in ends if inside.take(end, 2 - axis).mean() > CUT_OFF]
-    return {"lower": _finite(limit), "share": float(np.mean(inside)), "cut_off_at": cut}
+    return {"lower": _finite(lower), "upper": _finite(upper), "share": float(np.mean(inside)), "cut_off_at": cut}
 
 
 def _finite(limit: Any) -> Any:
@@ -105,8 +107,11 @@ def _finite(limit: Any) -> Any:
     return found if np.ndim(limit) else found[0]
 
 
-def _remarks(volume: Volume) -> Iterator[str]:
+def _remarks(volume: Volume, padded: NDArray[np.bool_] | None) -> Iterator[str]:
     """Say what a mesh of the study will show that nobody may expect."""
+    if padded is not None:
+        level = volume.voxels[padded][0]
+        yield f"{padded.mean():.1%} of the voxels are padding, {level:g}: it counts as background"
     columns, rows, step = np.sqrt((volume.grid.affine[:3, :3] ** 2).sum(axis=0))
     if abs(columns - rows) > OBLONG * min(columns, rows):
         yield f"pixels are not square, {columns:.4g} x {rows:.4g} mm: the mesh keeps the distances"

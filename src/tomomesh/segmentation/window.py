@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import EmptyError, UsageError
+from .labels import labels_in
 from .otsu import otsu_threshold
 
 if TYPE_CHECKING:
@@ -17,9 +18,21 @@ if TYPE_CHECKING:
 
     Limit = float | NDArray[np.float64]
 
-PRESETS_HU = {"bone": (300.0, np.inf), "skin": (-300.0, np.inf)}
-"""Windows for CT, Hounsfield units. Usual values are air -1000, fat -100, soft tissue 20 to 80, bone 300 to 1900: bone
-is what is surely bone, and skin begins a third of the way from tissue to air, over foam and cloth."""
+PRESETS_HU = {
+    "bone": (300.0, np.inf),
+    "compact-bone": (661.0, 1988.0),
+    "spongy-bone": (147.0, 661.0),
+    "enamel": (1552.0, 2850.0),
+    "skin": (-300.0, np.inf),
+    "soft-tissue": (-300.0, 225.0),
+    "muscle": (-6.0, 135.0),
+    "fat": (-206.0, -51.0),
+    "lung": (-np.inf, -400.0),
+}
+"""Windows for CT, Hounsfield units: lower < k <= upper. Usual values are air -1000, lung -850, fat -100, soft tissue 20
+to 80, bone 300 to 1900. Bone is what is surely bone; skin begins a third of the way from tissue to air, over foam and
+cloth, as soft tissue does; lung ends half way from itself to tissue. The others, and the upper end of soft tissue, are
+those of adults in the table of presets in the manual of InVesalius 3."""
 
 
 def window(volume: Volume, *, lower: Limit = -np.inf, upper: Limit = np.inf, layers: str = "all") -> NDArray[np.bool_]:
@@ -96,10 +109,19 @@ def said(limit: Limit) -> str:
     return ", ".join(f"{value:g}" for value in np.ravel(limit))
 
 
-def choose_window(volume: Volume, settings: WindowSettings) -> tuple[Limit, Limit]:
+def choose_window(
+    volume: Volume, settings: WindowSettings, padded: NDArray[np.bool_] | None = None
+) -> tuple[Limit, Limit]:
     """Return the limits that the settings ask for; Otsu's threshold, in each layer its own, where they ask for none.
 
     A layer that has one level alone tells nothing, and is not limited.
+
+    Parameters
+    ----------
+    volume : Volume
+    settings : WindowSettings
+    padded : (K, J, I) bool array, optional
+        Voxels that have no say in Otsu's threshold.
 
     Raises
     ------
@@ -110,23 +132,30 @@ def choose_window(volume: Volume, settings: WindowSettings) -> tuple[Limit, Limi
         np.array(limit) if isinstance(limit, tuple) else limit for limit in (settings.lower, settings.upper)
     )
     if settings.preset is not None:
-        if volume.voxels.min() >= 0:
-            raise UsageError(
-                "the study is not in Hounsfield units",
-                found=f"--preset = {settings.preset}, lowest gray level = {volume.voxels.min():g}",
-                expected="a CT whose air lies below 0",
-                hint="--lower and --upper, in the study's own gray levels",
-            )
+        _check_ct(volume, settings.preset)
         return PRESETS_HU[settings.preset]
     if lower is None and upper is None:
-        lower = otsu_thresholds(volume)
+        lower = otsu_thresholds(volume, padded)
     return -np.inf if lower is None else lower, np.inf if upper is None else upper
 
 
-def otsu_thresholds(volume: Volume) -> Limit:
-    """Return Otsu's threshold of a gray volume, or those of the layers of a color one, (L,)."""
+def _check_ct(volume: Volume, preset: str) -> None:
+    lowest = volume.voxels.min()
+    if lowest < 0:
+        return
+    raise UsageError(
+        "the study is not in Hounsfield units",
+        found=f"--preset = {preset}, lowest gray level = {lowest:g}",
+        expected="a CT whose air lies below 0",
+        hint="--select, which chooses labels" if labels_in(volume.voxels)
+        else "--lower and --upper, in the study's own gray levels",
+    )  # fmt: skip
+
+
+def otsu_thresholds(volume: Volume, padded: NDArray[np.bool_] | None = None) -> Limit:
+    """Return Otsu's threshold of a gray volume, without its padding, or those of the layers of a color one, (L,)."""
     levels = volume.voxels
     if levels.ndim == 3:
-        return otsu_threshold(levels)
+        return otsu_threshold(levels if padded is None else levels[~padded])
     layers = [levels[..., n] for n in range(levels.shape[3])]
     return np.array([otsu_threshold(one) if one.min() < one.max() else -np.inf for one in layers])

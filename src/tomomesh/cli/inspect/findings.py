@@ -103,7 +103,14 @@ def _windows(windows: dict[str, Any]) -> str:
 def _window(window: dict[str, Any]) -> str:
     cut = window["cut_off_at"]
     where = "" if not cut else "; cut off on all sides" if len(cut) == SIDES else f"; cut off at {' '.join(cut)}"
-    return f"k > {limit_in_words(window['lower'])} ({window['share']:.1%}{where})"
+    return f"{_bounds(window['lower'], window['upper'])} ({window['share']:.1%}{where})"
+
+
+def _bounds(lower: Any, upper: float | None) -> str:
+    """Put a window into words; one without a lower bound has an upper."""
+    if upper is None:
+        return f"k > {limit_in_words(lower)}"
+    return f"k <= {upper:g}" if lower is None else f"{limit_in_words(lower)} < k <= {upper:g}"
 
 
 def _segments(segments: dict[int, str]) -> str:

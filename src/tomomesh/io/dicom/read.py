@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,7 +82,9 @@ def _read(files: list[Path], settings: ReadSettings, study: str, others: Counter
     turned = ("MONOCHROME1: gray levels were inverted" if unit != "HU" else "MONOCHROME1: HU were kept",)
     skipped = _left(stack) if broken or without else ()
     notes = left + broken + choice.notes + without + skipped + stack.notes + levels.notes + (turned if inverted else ())
-    return Volume.from_stored(levels.voxels, stack.affine, unit=unit, notes=notes)
+    study_read = Volume.from_stored(levels.voxels, stack.affine, unit=unit, notes=notes)
+    padded = {frame.padding for frame in choice.frames}
+    return replace(study_read, padding=padded.pop() if len(padded) == 1 else None)
 
 
 def _left(stack: Stack) -> tuple[str, ...]:

@@ -67,6 +67,22 @@ class ImageFrame:
     stack: str = ""
 
     @property
+    def padding(self) -> tuple[float, float] | None:
+        """Lowest and highest gray level that stand for nothing measured; None where the header does not tell."""
+        header = self.header
+        first = header.get("PixelPaddingValue")
+        last = header.get("PixelPaddingRangeLimit", first)
+        plain = header.get("PhotometricInterpretation") == "MONOCHROME2" and "ModalityLUTSequence" not in header
+        if not plain or not isinstance(first, int) or not isinstance(last, int):
+            return None
+        whole = 2 ** int(header.get("BitsAllocated") or 16)
+        lowest = -whole // 2 if header.get("PixelRepresentation") else 0
+        # some write the bits of a negative number as a positive one
+        ends = [(end - lowest) % whole + lowest for end in (first, last)]
+        low, high = sorted(end * self.scale[0] + self.scale[1] for end in ends)
+        return float(low), float(high)
+
+    @property
     def instance(self) -> int | None:
         """The number of the slice within its series, for files without positions."""
         value = numbers(self.header.get("InstanceNumber"), 1, "InstanceNumber", self.path.name)
