@@ -148,7 +148,7 @@ def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:
         "upper": _limits(upper),
         "layers": layers,
         "joined_by": asked.layers if layers > 1 else None,
-        "chosen_by": _chosen_by(settings),
+        "chosen_by": chosen_by(settings),
         "voxels": int(mask.sum()),
         "share": float(mask.mean()),
         "touches_border": bool(any(_edges(mask))),
@@ -158,7 +158,8 @@ def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:
     }
 
 
-def _chosen_by(settings: Settings) -> str:
+def chosen_by(settings: Settings) -> str:
+    """Name what chose the window: labels, preset, given or otsu."""
     asked = settings.window
     given = asked.lower is not None or asked.upper is not None
     return "labels" if asked.select else "preset" if asked.preset else "given" if given else "otsu"
@@ -179,7 +180,7 @@ def _doubts(chosen: Chosen, settings: Settings) -> list[str]:
             f"most of the window ({chosen.spared_voxels} of {int(chosen.mask.sum())} voxels) lies in nothing that is "
             "12 mm thick, and was kept for all that: --keep body leaves it out"
         )
-    if _chosen_by(settings) == "otsu" and len(labels_in(chosen.volume.voxels[::APART])) > 1:
+    if chosen_by(settings) == "otsu" and len(labels_in(chosen.volume.voxels[::APART])) > 1:
         warnings.append("labels of a label map were taken for gray levels: --select chooses labels")
     if any(_edges(chosen.mask)[2:]):
         warnings.append("the window touches the border of the slices: the surface is closed along it")
