@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from .signal import SOLID
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     Ints = NDArray[np.int64]
     Floats = NDArray[np.float64]
@@ -28,11 +28,11 @@ SIDES = np.pi / 4
 """Length of a line over that of the pixel sides along it, in the mean over all directions (Cauchy; Crofton 1868)."""
 
 DUST = 0.01
-"""Share of a slice's area that pieces beside the largest, and holes, may have without being seen. Chosen: see
-`tomomesh.ways.choice`, where half and twice of it change the way of none of the studies."""
+"""Share of a slice's area that pieces beside the largest, and holes, may have without being seen. Chosen: half and
+twice of it change the way of none of 38 windows, studies and shapes (docs/ways.md)."""
 WINDING = 1.25
-"""Length of an outline over that of the circle of the same area, over which a ring cuts across its bays. An ellipse
-three times as long as it is wide has 1.15."""
+"""Length of an outline over that of the circle of the same area, over which a ring cuts across its bays. Chosen: an
+ellipse three times as long as it is wide has 1.15, and goes with half of what 1.25 has over 1; twice changes none."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,14 @@ class Outlines:
 
     Attributes
     ----------
-    pieces, holes : (K,) int array
-        Pieces of the window, which touch at sides or corners, and places that it surrounds.
-    area, largest, hollow, largest_hole : (K,) float array
-        Pixels of the window, of its largest piece, and of its holes and the largest of them.
+    pieces : (K,) int array
+        Pieces of the window: pixels that touch at sides or corners.
+    area, largest : (K,) float array
+        Pixels of the window and of its largest piece.
+    holes : (K,) int array
+        Places that the window surrounds.
+    hollow, largest_hole : (K,) float array
+        Pixels of the holes and of the largest of them.
     length : (K,) float array
         Of all outlines, mm.
     ellipse : (K,) float array
@@ -53,26 +57,31 @@ class Outlines:
         Pixels that a slice shares with the next.
     bodies : int
         Pieces in space: what hangs together through the pixels that slices share.
+    largest_body : float
+        Share of the window's pixels that the largest of these has.
     forks : int
         Pieces that share pixels with several pieces of the next slice, or of the one before.
-    largest_body : float
-        Share of the window's pixels that the largest piece in space has.
     pixel_mm : (float, float)
     """
 
     pieces: Ints
-    holes: Ints
     area: Floats
     largest: Floats
+    holes: Ints
     hollow: Floats
     largest_hole: Floats
     length: Floats
     ellipse: Floats
     shared: Floats
     bodies: int
-    forks: int
     largest_body: float
+    forks: int
     pixel_mm: tuple[float, float]
+
+    @property
+    def pixel_mm2(self) -> float:
+        """Area of a pixel."""
+        return self.pixel_mm[0] * self.pixel_mm[1]
 
     @property
     def filled(self) -> NDArray[np.bool_]:
@@ -81,7 +90,7 @@ class Outlines:
 
     def share(self, slices: NDArray[np.bool_]) -> float:
         """Return the share that some (K,) have of the slices that hold something."""
-        return float(np.count_nonzero(slices) / max(np.count_nonzero(self.filled), 1))
+        return float(np.count_nonzero(slices)) / max(int(np.count_nonzero(self.filled)), 1)
 
     @property
     def wall(self) -> bool:
@@ -91,7 +100,7 @@ class Outlines:
     @property
     def thickness_mm(self) -> float:
         """Twice the area over the length of its outlines: how thick a wall is, and the radius of a disc."""
-        return float(2 * self.area.sum() * np.prod(self.pixel_mm) / max(self.length.sum(), np.finfo(float).tiny))
+        return float(2 * self.area.sum() * self.pixel_mm2 / max(self.length.sum(), np.finfo(float).tiny))
 
     @property
     def single(self) -> NDArray[np.bool_]:
@@ -108,7 +117,7 @@ class Outlines:
     @property
     def round(self) -> NDArray[np.bool_]:
         """The slices (K,) whose outline does not wind: no longer than `WINDING` times the circle of their area."""
-        circle = 2 * np.sqrt(np.pi * self.area * np.prod(self.pixel_mm))
+        circle = 2 * np.sqrt(np.pi * self.area * self.pixel_mm2)
         return (self.length <= WINDING * circle) & self.filled
 
     @property
@@ -143,6 +152,10 @@ class _Runs:
         within = np.arange(len(first)) - np.repeat(np.cumsum(count) - count, count)
         return first, low[first] + within
 
+    def of(self, held: NDArray[np.bool_]) -> _Runs:
+        """Return some of them."""
+        return _Runs(self.row[held], self.start[held], self.stop[held], self.slice[held], self.width)
+
     def joined(self, *pairs: tuple[Ints, Ints]) -> Ints:
         """Return the number of the part that each run belongs to."""
         one, other = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
@@ -163,26 +176,24 @@ def outlines_of(mask: NDArray[np.bool_], pixel_mm: tuple[float, float] = (1.0, 1
     count, rows = framed.shape[:2]
     inside, outside = _runs(framed), _runs(~framed)
     beside, above = inside.meeting(1, 1), inside.meeting(rows)
-    pieces, bodies = inside.joined(beside), np.bincount(inside.joined(beside, above), inside.size)
-    pieces_, largest = _parts(inside, pieces, count)
-    gaps = outside.joined(outside.meeting(1))
+    pieces, gaps = inside.joined(beside), outside.joined(outside.meeting(1))
     held = gaps != gaps[0]  # the outside of all slices is one, through their frames
-    holes, largest_hole = _parts(outside, gaps, count, held)
+    hollow = outside.of(held)
+    bodies = _sum(inside.joined(beside, above), inside.size)
     return Outlines(
-        pieces_, holes, _by_slice(inside, inside.size, count), largest,
-        _by_slice(outside, outside.size * held, count), largest_hole, _lengths(inside, beside, count, pixel_mm),
-        _ellipses(inside, rows, count), _by_slice(inside, _overlap(inside, above), count)[:-1],
-        len(bodies), _forks(pieces, above), float(bodies.max(initial=0) / max(bodies.sum(), 1)), pixel_mm,
+        *_parts(inside, pieces, count), *_parts(hollow, gaps[held], count), _lengths(inside, beside, count, pixel_mm),
+        _ellipses(inside, rows, count), _sum(inside.slice, _shared(inside, above), count)[:-1], len(bodies),
+        float(bodies.max(initial=0.0) / max(bodies.sum(), 1.0)), _forks(pieces, above), pixel_mm,
     )  # fmt: skip
 
 
 def _boxed(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Leave out the rows and columns that hold nothing of a window; all slices stay."""
-    seen = mask.any(axis=0)
-    return mask[:, _from_first_to_last(seen.any(axis=1)), _from_first_to_last(seen.any(axis=0))]
+    return mask[:, _reach(mask.any(axis=(0, 2))), _reach(mask.any(axis=(0, 1)))]
 
 
-def _from_first_to_last(held: NDArray[np.bool_]) -> slice:
+def _reach(held: ArrayLike) -> slice:
+    """Return the stretch from the first to the last that is true."""
     places = np.flatnonzero(held)
     return slice(int(places[0]), int(places[-1]) + 1) if len(places) else slice(0, 1)
 
@@ -197,32 +208,30 @@ def _runs(mask: NDArray[np.bool_]) -> _Runs:
     return _Runs(row, start, stop, row // rows, width)
 
 
-def _by_slice(runs: _Runs, values: NDArray[Any], count: int) -> Floats:
-    return np.bincount(runs.slice, values, count)
+def _sum(where: Ints, values: NDArray[Any], count: int = 0) -> Floats:
+    """Add up values by their places."""
+    return np.asarray(np.bincount(where, values, count), np.float64)
 
 
-def _parts(runs: _Runs, parts: Ints, count: int, held: NDArray[np.bool_] | None = None) -> tuple[Ints, Floats]:
-    """Count the parts of each slice, and the pixels of the largest; of runs that are held, where only some are."""
-    held = np.ones(len(parts), np.bool_) if held is None else held
-    numbers, first = np.unique(parts[held], return_index=True)
-    sizes = np.bincount(parts[held], runs.size[held])[numbers]
-    where = runs.slice[held][first]
-    largest = np.zeros(count)
-    np.maximum.at(largest, where, sizes)
-    return np.bincount(where, minlength=count), largest
+def _parts(runs: _Runs, parts: Ints, count: int) -> tuple[Ints, Floats, Floats]:
+    """Count the parts of each slice, their pixels, and those of the largest."""
+    numbers, first, own = np.unique(parts, return_index=True, return_inverse=True)
+    where, largest = runs.slice[first], np.zeros(count)
+    np.maximum.at(largest, where, _sum(own, runs.size, len(numbers)))
+    return np.bincount(where, minlength=count), _sum(runs.slice, runs.size, count), largest
 
 
-def _overlap(runs: _Runs, pairs: tuple[Ints, Ints]) -> Floats:
+def _shared(runs: _Runs, pairs: tuple[Ints, Ints]) -> Floats:
     """Return how many pixels each run shares with its partners, all together."""
     one, other = pairs
     shared = np.minimum(runs.stop[one], runs.stop[other]) - np.maximum(runs.start[one], runs.start[other])
-    return np.bincount(one, np.maximum(shared, 0), len(runs.row))
+    return _sum(one, np.maximum(shared, 0), len(runs.row))
 
 
 def _lengths(runs: _Runs, beside: tuple[Ints, Ints], count: int, pixel_mm: tuple[float, float]) -> Floats:
     """Return the length of all outlines of each slice: the sides of pixels, less what they have too much."""
-    along_rows = 2.0 * (runs.size - _overlap(runs, beside))
-    return SIDES * _by_slice(runs, along_rows * pixel_mm[0] + 2.0 * pixel_mm[1], count)
+    along_rows = 2.0 * (runs.size - _shared(runs, beside))
+    return SIDES * _sum(runs.slice, along_rows * pixel_mm[0] + 2.0 * pixel_mm[1], count)
 
 
 def _ellipses(runs: _Runs, rows: int, count: int) -> Floats:
@@ -230,7 +239,7 @@ def _ellipses(runs: _Runs, rows: int, count: int) -> Floats:
     n, y = runs.size.astype(np.float64), (runs.row % rows).astype(np.float64)
     x = (runs.start + runs.stop - 1) / 2
     moments = (n, n * x, n * y, n * (x * x + (n * n - 1) / 12), n * y * y, n * x * y)
-    area, *sums = (_by_slice(runs, moment, count) for moment in moments)
+    area, *sums = (_sum(runs.slice, moment, count) for moment in moments)
     mx, my, xx, yy, xy = (one / np.maximum(area, 1.0) for one in sums)
     spread = (xx - mx * mx + 1 / 12) * (yy - my * my + 1 / 12) - (xy - mx * my) ** 2
     return np.where(area > 0, 4 * np.pi * np.sqrt(spread), 0.0)
