@@ -29,7 +29,7 @@ SIDES = np.pi / 4
 
 DUST = 0.01
 """Share of a slice's area that pieces beside the largest, and holes, may have without being seen. Chosen: half and
-twice of it change the way of none of 38 windows, studies and shapes (docs/ways.md)."""
+twice of it change the way of none of 42 windows, studies and shapes (docs/ways.md)."""
 WINDING = 1.25
 """Length of an outline over that of the circle of the same area, over which a ring cuts across its bays. Chosen: an
 ellipse three times as long as it is wide has 1.15, and goes with half of what 1.25 has over 1; twice changes none."""

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 NEARLY = 0.95
 """Share of the slices that must be one outline for one ring a slice. Measured: 1.00 on the built-in head's skull and on
-plain solids, at most .83 on skins and skulls of studies; half and twice as many others change none of 38 windows."""
+plain solids, at most .83 on skins and skulls of studies; half and twice as many others change none of 42 windows."""
 JUMP = 0.02
 """Share of a solid's pixels by which two neighboring slices may differ, or that its first or last slice may have. Rings
 end half a slice inside. Chosen: a ball of 32 slices has .006 and its mesh 98.5 % of the volume, a cylinder .031 and
-96 %. Half changes none of 38 windows, twice lets cylinders pass, whose ring is .5 mm off where a ball's is .23."""
+96 %. Half changes none of 42 windows, twice lets cylinders pass, whose ring is .5 mm off where a ball's is .23."""
 ONE = "one outline a slice"
 OPEN = ("slices", "way", "network", "space", "contours")
 """Parameters of networks that ask for none."""
