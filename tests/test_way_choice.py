@@ -109,7 +109,7 @@ class TestTwin:
 def away(x: float = 0.0, y: float = 0.0, size: int = 64) -> NDArray[np.float64]:
     """Return the distance of each pixel of a slice from a place, counted from its middle."""
     row, column = np.indices((size, size)) - (size - 1) / 2
-    return np.hypot(column - x, row - y)
+    return np.asarray(np.hypot(column - x, row - y))
 
 
 def stack(*planes: Mask, times: int = 30) -> Mask:

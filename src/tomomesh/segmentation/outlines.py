@@ -174,7 +174,7 @@ def outlines_of(mask: NDArray[np.bool_], pixel_mm: tuple[float, float] = (1.0, 1
     """
     framed = np.pad(_boxed(mask), ((0, 0), (FRAME, FRAME), (FRAME, FRAME)))
     count, rows = framed.shape[:2]
-    inside, outside = _runs(framed), _runs(~framed)
+    inside, outside = _runs(framed)
     beside, above = inside.meeting(1, 1), inside.meeting(rows)
     pieces, gaps = inside.joined(beside), outside.joined(outside.meeting(1))
     held = gaps != gaps[0]  # the outside of all slices is one, through their frames
@@ -198,14 +198,19 @@ def _reach(held: ArrayLike) -> slice:
     return slice(int(places[0]), int(places[-1]) + 1) if len(places) else slice(0, 1)
 
 
-def _runs(mask: NDArray[np.bool_]) -> _Runs:
-    count, rows, columns = mask.shape
+def _runs(framed: NDArray[np.bool_]) -> tuple[_Runs, _Runs]:
+    """Part the rows of framed slices into what lies in the window and what lies outside, before and after each."""
+    count, rows, columns = framed.shape
+    flat = framed.ravel()
+    ends = np.flatnonzero(flat[1:] != flat[:-1]) + 1
+    row = ends[::2] // columns
+    start, stop = ends[::2] - row * columns, ends[1::2] - row * columns
+    gap = np.arange(len(row)) + row  # the stretch outside before each inside: every row has one more than insides
+    around = np.repeat(np.arange(count * rows), np.bincount(row, minlength=count * rows) + 1)
+    after, before = np.zeros_like(around), np.full_like(around, columns)
+    after[gap + 1], before[gap] = stop, start
     width = columns + 2 * FRAME
-    flat = np.zeros((count * rows, columns + 2), np.int8)
-    flat[:, 1:-1] = mask.reshape(-1, columns)
-    row, start = np.nonzero(np.diff(flat, axis=1) > 0)
-    stop = np.nonzero(np.diff(flat, axis=1) < 0)[1]
-    return _Runs(row, start, stop, row // rows, width)
+    return _Runs(row, start, stop, row // rows, width), _Runs(around, after, before, around // rows, width)
 
 
 def _sum(where: Ints, values: NDArray[Any], count: int = 0) -> Floats:
@@ -215,10 +220,12 @@ def _sum(where: Ints, values: NDArray[Any], count: int = 0) -> Floats:
 
 def _parts(runs: _Runs, parts: Ints, count: int) -> tuple[Ints, Floats, Floats]:
     """Count the parts of each slice, their pixels, and those of the largest."""
-    numbers, first, own = np.unique(parts, return_index=True, return_inverse=True)
-    where, largest = runs.slice[first], np.zeros(count)
-    np.maximum.at(largest, where, _sum(own, runs.size, len(numbers)))
-    return np.bincount(where, minlength=count), _sum(runs.slice, runs.size, count), largest
+    sizes, largest = _sum(parts, runs.size), np.zeros(count)
+    where = np.zeros(len(sizes), np.int64)
+    where[parts] = runs.slice
+    real = sizes > 0
+    np.maximum.at(largest, where[real], sizes[real])
+    return np.bincount(where[real], minlength=count), _sum(runs.slice, runs.size, count), largest
 
 
 def _shared(runs: _Runs, pairs: tuple[Ints, Ints]) -> Floats:
