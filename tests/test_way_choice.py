@@ -365,6 +365,50 @@ class TestEndToEnd:
         assert main([*line, "--way", "voxels"]) == 0
         assert "way    " not in capsys.readouterr().out
 
+    def test_paper_is_one_option_or_another(self, tmp_path: Path) -> None:
+        path, kept = tmp_path / "s.nii", [tmp_path / "a.toml", tmp_path / "b.toml"]
+        write_nifti(path, 100 * stack(BAND, times=4).astype(np.uint8), np.eye(4))
+        line = ["segment", str(path), "-o", str(tmp_path / "p.ply"), "--neurons", "20", "--epochs", "2"]
+        for option, toml in zip((["--paper"], ["--way", "paper"]), kept, strict=True):
+            assert main([*line, *option, "--save-settings", str(toml)]) == 0
+        assert kept[0].read_bytes() == kept[1].read_bytes()
+        assert 'way = "paper"' in kept[0].read_text()
+
+    def test_each_study_of_a_batch_goes_its_own_way(self, tmp_path: Path) -> None:
+        (tmp_path / "in").mkdir()
+        for name, mask in (("band", stack(BAND, times=8)), ("skull", skull())):
+            write_nifti(tmp_path / "in" / f"{name}.nii", 100 * mask.astype(np.uint8), np.eye(4))
+        line = ["reconstruct", str(tmp_path / "in"), "--each", "-o", str(tmp_path / "out"), "--lower", "50"]
+        assert main(line) == 0
+        told = {
+            path.name.split(".")[0]: json.loads(path.read_text())["way"]["name"] for path in tmp_path.rglob("*.json")
+        }
+        assert told == {"band": "rings", "skull": "voxels"}
+
+    @pytest.mark.parametrize("kind", ["band", "labels", "empty"])
+    def test_inspect_tells_the_way_of_the_command_that_it_names(
+        self, tmp_path: Path, capsys: CaptureFixture[str], kind: str
+    ) -> None:
+        path, voxels = (
+            tmp_path / "s.nii",
+            {"band": stack(BAND, times=8), "labels": skull()}.get(kind, np.zeros((4, 8, 8))),
+        )
+        levels = np.random.default_rng(0).normal(0, 0.05, voxels.shape) if kind == "band" else 0
+        write_nifti(path, (voxels + levels).astype(np.float32 if kind == "band" else np.uint8), np.eye(4))
+        assert main(["inspect", str(path), "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        if kind == "empty":
+            assert found["way"] is None
+            return
+        assert main(["inspect", str(path)]) == 0
+        said = capsys.readouterr().out.splitlines()
+        assert said[-2].split()[1] == {"band": "ring:", "labels": "voxels:"}[kind]
+        report = tmp_path / "r.json"
+        line = said[-1].removeprefix("next").split()[1:]
+        assert main([*line[:-1], str(tmp_path / "m.stl"), "--report", str(report)]) == 0
+        told = json.loads(report.read_text())["way"]
+        assert {key: value for key, value in told.items() if key != "name"} == found["way"]
+
 
 def test_the_figures_that_steer_are_those_that_are_told() -> None:
     found = segment(study(stack(BAND, times=8)), neurons=20)

@@ -53,7 +53,7 @@ def reconstruct(
         Called as ``progress(stage, done, total)``; raise in it to stop.
     **changes
         Parameters by their bare names, as ``neurons=80``; the report warns of those that have no effect beside the
-        others.
+        others. ``way`` is what the surface is made from, by default as the window needs it (docs/ways.md).
 
     Returns
     -------
