@@ -30,7 +30,7 @@ SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 STUDIES: dict[str, dict[str, Any]] = {
     "rings": {},
     "rings of 200": {"neurons": 200},
-    "rings online": {"training": "online"},
+    "rings online": {"way": "ring", "training": "online"},
     "rings, one component": {"surface": "all", "largest": True},
     "chain": {"network": "chain", "allow_leaks": True},
     "components": {"contours": "components"},
@@ -45,9 +45,9 @@ STUDIES: dict[str, dict[str, Any]] = {
     "to print": {"network": "none", "flat_base": 2.0},
 }
 REAL: dict[str, tuple[str, dict[str, Any]]] = {
-    "MR rings": ("derived/dev54_t1/dev54_t1.nii.gz", {}),
+    "MR rings": ("derived/dev54_t1/dev54_t1.nii.gz", {"way": "ring"}),
     "MR loops": ("derived/dev54_t1/dev54_t1.nii.gz", {"contours": "loops"}),
-    "CT bone": ("dicom2stl/ct_example.nii.gz", {"preset": "bone"}),
+    "CT bone": ("dicom2stl/ct_example.nii.gz", {"preset": "bone", "way": "ring"}),
     "CT bone, voxels": ("dicom2stl/ct_example.nii.gz", {"preset": "bone", "network": "none"}),
 }
 CLOUDS = {

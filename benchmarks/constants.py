@@ -56,8 +56,8 @@ CASES: dict[str, tuple[str, ...]] = {
 }
 """What the numbers of each folder are tried on; of one with several entries the longest counts."""
 STUDIES: dict[str, dict[str, Any]] = {
-    "rings": {"neurons": 60},
-    "online": {"neurons": 60, "training": "online"},
+    "rings": {"way": "ring", "neurons": 60},
+    "online": {"way": "ring", "neurons": 60, "training": "online"},
     "components": {"neurons": 60, "contours": "components"},
     "walls": {"neurons": 60, "contours": "walls"},
     "soft": {"network": "none"},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,14 +40,21 @@ SOMETIMES = {*MATTERS, *(name for way in TABLE for name in way_of(way).reads)}
 """Parameters that are read on some ways alone, or beside some values of others alone."""
 ALWAYS = {
     "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "level", "fill_chunks", "structure",
-    "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "keep", "slices", "network", "space",
-    "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow", "drain", "least_wall", "print_check",
-    "threads", "frame", "target_faces",
+    "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "keep", "slices", "way", "network",
+    "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow", "drain", "least_wall",
+    "print_check", "threads", "frame", "target_faces",
 }  # fmt: skip
 """Parameters that matter on every way, or that choose what is read, the way, or what becomes of the mesh."""
 STUDY: dict[str, dict[str, Any]] = {
-    "networks": {"neurons": 24},
-    "online": {"neurons": 24, "training": "online", "iterations": 300, "alpha_fall": "linear", "radius_fall": "linear"},
+    "networks": {"way": "ring", "neurons": 24},
+    "online": {
+        "way": "ring",
+        "neurons": 24,
+        "training": "online",
+        "iterations": 300,
+        "alpha_fall": "linear",
+        "radius_fall": "linear",
+    },
     "grid": {"neurons": 25, "network": "grid", "allow_leaks": True},
     "components": {"neurons": 24, "contours": "components"},
     "loops": {"neurons": 24, "contours": "loops"},
@@ -92,9 +100,17 @@ def stack() -> PointSet:
     return PointSet.from_positions(np.concatenate(rings))
 
 
+def settled(settings: dict[str, Any]) -> Settings:
+    """Return settings that leave nothing open about the way, a ring on every slice where they name none."""
+    asked = Settings().replace(**settings)
+    return replace(
+        asked, network=asked.network.taking(asked.network.detailed or asked.network.way.replace("auto", "ring"))
+    )
+
+
 def silent(settings: dict[str, Any], kind: str) -> list[str]:
     """Return the parameters that are said to have no effect."""
-    asked = Settings().replace(**settings)
+    asked = settled(settings)
     return [name for name in NAMES if name not in settings and without_effect(asked, [name], input=kind)]
 
 
@@ -119,10 +135,7 @@ class TestTable:
 
     @pytest.mark.parametrize("name", sorted(SOMETIMES))
     def test_what_is_in_it_matters_on_some_ways_and_not_on_others(self, name: str) -> None:
-        told = {
-            bool(without_effect(Settings().replace(**asked), [name], input=kind))
-            for kind, asked in [*WAYS, ("color", POWERS)]
-        }
+        told = {bool(without_effect(settled(asked), [name], input=kind)) for kind, asked in [*WAYS, ("color", POWERS)]}
         assert told == {True, False}
 
     def test_the_defaults_have_something_to_say_of_few(self) -> None:
@@ -165,7 +178,7 @@ class TestLargest:
         "asked", [{"network": "none"}, {"contours": "components"}, {"contours": "walls"}, {"network": "sphere"}]
     )
     def test_another_option_is_named_where_it_has_no_effect(self, asked: dict[str, Any]) -> None:
-        [told] = without_effect(Settings().replace(**asked), ["largest"], input="gray")
+        [told] = without_effect(settled(asked), ["largest"], input="gray")
         assert told.startswith("--largest has no effect with --")
         assert told.endswith(": --keep largest has")
 
@@ -192,7 +205,7 @@ class TestReport:
         write_nifti(study, (ball().voxels > 40).astype(np.uint8), np.eye(4))
         line = ["reconstruct", str(study), "-o", str(tmp_path / "m.ply"), "--report", str(tmp_path / "r.json")]
         assert main([*line, "--network", "none", "--closing", "2", "--save-settings", str(kept)]) == 0
-        said = "--closing has no effect with --network none"
+        said = "--closing has no effect with --way voxels"
         assert f"warning   {said}" in capsys.readouterr().out
         assert said in json.loads((tmp_path / "r.json").read_text())["warnings"]
         assert main([*line, "--settings", str(kept)]) == 0

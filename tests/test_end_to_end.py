@@ -218,7 +218,7 @@ class TestStudies:
     def test_a_slice_without_pixels_has_no_network(self) -> None:
         voxels = ball()
         voxels[20] = 0
-        found = reconstruct(stacked(voxels))
+        found = reconstruct(stacked(voxels), way="ring")
         assert 20 in found.report["networks"]["slices_without"]
         assert "20" in found.report["warnings"][0]
         assert judged(found).is_watertight
@@ -226,7 +226,7 @@ class TestStudies:
 
     def test_slices_with_fewer_pixels_than_neurons_are_left_out(self) -> None:
         with pytest.raises(EmptyError, match="fewer --neurons"):
-            segment(stacked(ball(radius=3.0)), neurons=500)
+            segment(stacked(ball(radius=3.0)), way="ring", neurons=500)
 
     def test_gantry_tilt_keeps_the_volume(self) -> None:
         affine = np.eye(4)
@@ -318,7 +318,7 @@ class TestRealStudies:
         ],
     )
     def test_closed_and_manifold_with_a_plausible_volume(self, name: str, options: dict[str, Any]) -> None:
-        found = reconstruct(tomomesh.read_volume(shared(name)), **options)
+        found = reconstruct(tomomesh.read_volume(shared(name)), way="ring", **options)
         mesh = judged(found)
         assert mesh.is_watertight
         assert mesh.is_winding_consistent
@@ -328,8 +328,24 @@ class TestRealStudies:
         assert advised or found.report["cubes"]["tight"]
         assert advised or 0.8 < found.report["quality"]["volume_over_rings"] < 1.25
 
+    @pytest.mark.parametrize(
+        ("name", "options"),
+        [
+            ("dicom2stl/ct_example.nii.gz", {"preset": "bone"}),
+            ("derived/dev54_synth_t1/dev54_synth_t1_labels.nii.gz", {"select": (515, 516)}),
+            ("derived/dev54_synth_t1/dev54_synth_t1_labels.nii.gz", {"select": (4, 43, 14, 15)}),
+        ],
+    )
+    def test_the_way_that_fits_keeps_the_volume_of_the_window(self, name: str, options: dict[str, Any]) -> None:
+        found = reconstruct(tomomesh.read_volume(shared(name)), **options)
+        assert found.way == "voxels"
+        assert found.segmentation is not None
+        assert judged(found).is_watertight
+        window = found.segmentation.mask.sum() * found.segmentation.volume.voxel_mm3
+        assert found.mesh.face_volumes.sum() == pytest.approx(window, rel=0.05)
+
     def test_a_vendors_slab_of_four_slices_is_closed(self) -> None:
-        found = reconstruct(tomomesh.read_volume(shared("dicom2nifti/siemens/anatomical/001")))
+        found = reconstruct(tomomesh.read_volume(shared("dicom2nifti/siemens/anatomical/001")), way="ring")
         assert judged(found).is_watertight
         assert found.report["quality"]["genus"] == 0
         assert 0.8 < found.report["quality"]["volume_over_rings"] < 1.2
@@ -340,14 +356,14 @@ class TestRealStudies:
         nifti = tomomesh.read_volume(shared("derived/dev54_t1/dev54_t1.nii.gz"))
         spacing = ReadSettings(spacing=nifti.spacing_mm)
         for folder in ("derived/dev54_t1/png", "derived/dev54_t1/tif"):
-            assert_same_but_for_the_place(nifti, tomomesh.read_volume(shared(folder), settings=spacing))
+            assert_same_but_for_the_place(nifti, tomomesh.read_volume(shared(folder), settings=spacing), way="ring")
         first, *others = (tomomesh.read_volume(p) for p in sorted(shared("niivue/nifti_space").iterdir())[:4])
         for other in others:
             assert_same_but_for_the_place(first, other)
 
 
-def assert_same_but_for_the_place(one: Volume, other: Volume) -> None:
-    first, second = reconstruct(one).mesh, reconstruct(other).mesh
+def assert_same_but_for_the_place(one: Volume, other: Volume, **changes: Any) -> None:
+    first, second = reconstruct(one, **changes).mesh, reconstruct(other, **changes).mesh
     assert first.faces.tobytes() == second.faces.tobytes()
     np.testing.assert_allclose(
         first.vertices - first.vertices.min(axis=0), second.vertices - second.vertices.min(axis=0), atol=1e-6

@@ -199,7 +199,7 @@ class TestWindows:
         voxels[5] = 0
         voxels[6] = 0
         voxels[6, 17, 22:26] = 100
-        mesh, report = reconstructed(self.study(tmp_path, voxels), tmp_path / "out", "--allow-leaks")
+        mesh, report = reconstructed(self.study(tmp_path, voxels), tmp_path / "out", "--way", "ring", "--allow-leaks")
         assert {5, 6} <= set(report["networks"]["slices_without"])
         assert np.isfinite(mesh.vertices).all()
 

@@ -24,6 +24,7 @@ ROWS = [
 DROPPED = sorted({word for row in ROWS for word in row[2].split(", ") if word})
 WALLS = {
     "model/contours.py", "segmentation/contours/walls.py", "segmentation/space.py",  # of tissue
+    "segmentation/outlines.py", "ways/choice.py",
     "measure/thickness.py", "settings/printing.py",  # of a solid
     "ways/cloud.py", "ways/cubes.py", "ways/sections.py",  # the report's *two walls*
 }  # fmt: skip

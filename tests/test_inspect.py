@@ -224,7 +224,7 @@ def test_no_patient_is_named(tmp_path: Path, capsys: CaptureFixture[str], number
     def edit(data: Dataset, k: int) -> None:
         private(data, k)
         as_ct(data, k)
-        data.SeriesDescription = "chosen"
+        data.SeriesDescription = "picked"
 
     for number in numbers:
         for path in write_series(tmp_path / str(number), STORED, AXIAL, edit).iterdir():
@@ -233,7 +233,7 @@ def test_no_patient_is_named(tmp_path: Path, capsys: CaptureFixture[str], number
             data.save_as(path)
     words = (" ".join(told(tmp_path, capsys)) + json.dumps(found(tmp_path, capsys))).replace(str(tmp_path), "")
     assert "CT" in words
-    assert ("chosen" in words) == (len(numbers) > 1)
+    assert ("picked" in words) == (len(numbers) > 1)
     for secret in ("zorro", "secret", "1901", *PRIVATE.values()):
         assert secret.lower() not in words.lower()
 

@@ -106,7 +106,7 @@ class TestShapes:
 
     def test_one_ring_over_two_legs_is_warned_of(self) -> None:
         apart = legs()[:4]
-        warned = reconstruct(study(apart), allow_leaks=True).report["warnings"]
+        warned = reconstruct(study(apart), way="ring", allow_leaks=True).report["warnings"]
         assert any("--contours components" in warning for warning in warned)
         two = reconstruct(study(apart), contours="components")
         assert (two.report["quality"]["components"], two.report["quality"]["genus"]) == (2, 0)
@@ -235,7 +235,7 @@ class TestReport:
         assert json.loads(json.dumps(rings)) == rings
 
     def test_one_ring_is_measured_too(self) -> None:
-        rings = reconstruct(study(shell())).report["rings"]
+        rings = reconstruct(study(shell()), way="ring").report["rings"]
         assert (rings["kind"], rings["count"], rings["tracks"]) == ("one", 14, 1)
         assert rings["self_crossings"] == 0
 

@@ -123,7 +123,7 @@ class TestSolids:
     def test_one_slice_may_be_flat(self) -> None:
         disk = np.zeros((5, 24, 24), np.float32)
         disk[2] = 100 * (np.hypot(*(np.indices((24, 24)) - 11.5)) < 9)
-        made = reconstruct(Volume.from_stored(disk, np.eye(4)), lower=50.0, signal="region", neurons=24)
+        made = reconstruct(Volume.from_stored(disk, np.eye(4)), lower=50.0, way="ring", signal="region", neurons=24)
         assert made.report["fit"]["converged"] is None
         assert any("lie in a plane" in warning for warning in made.report["warnings"])
 
@@ -206,4 +206,4 @@ class TestPromise:
 @pytest.mark.skipif(not COMPILED, reason="a real study, minutes without the compiler")
 def test_a_real_head_without_caps_is_refused() -> None:
     volume = read_volume(SHARED / "derived" / "dev54_t1" / "dev54_t1.nii.gz")
-    assert share_or_refusal(volume, Settings().replace(caps=False)) is None
+    assert share_or_refusal(volume, Settings().replace(way="ring", caps=False)) is None

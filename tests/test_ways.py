@@ -101,7 +101,8 @@ class TestToy:
 
     def test_is_seen_in_report_and_warnings(self) -> None:
         found = reconstruct(ball(), lower=20.0, network="grid", neurons=9, stiffness=0.5)
-        assert found.report["way"] == {"name": "hull", "because": "with the toy"}
+        assert found.report["way"]["name"] == "hull"
+        assert found.report["way"]["because"] == "asked for by --network grid"
         assert found.report["toy"]["corners"] == len(found.mesh.vertices)
         sections = list(found.report)
         assert sections.index("points") < sections.index("toy") < sections.index("quality")

@@ -1,4 +1,4 @@
-"""The whole way, one arrow a line: read -> select -> way -> finish."""
+"""The whole way, one arrow a line: read -> select -> choose the way -> way -> finish."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from .segmentation.study import select_study
 from .settings import Settings
 from .stage import Stage, folded
 from .ways import choose_way, way_of
+from .ways.choice import take_way
 from .ways.effect import without_effect
 from .ways.points import take_points
 
@@ -52,7 +53,7 @@ def reconstruct(
         Called as ``progress(stage, done, total)``; raise in it to stop.
     **changes
         Parameters by their bare names, as ``neurons=80``; the report warns of those that have no effect beside the
-        others.
+        others. ``way`` is what the surface is made from, by default as the window needs it (docs/ways.md).
 
     Returns
     -------
@@ -72,10 +73,9 @@ def reconstruct(
     (True, 0)
     """
     settings = _settled(settings, changes)
-    begun = _begin(settings, changes, input=_input_of(volume))
-    begun.value.require(settings)
-    found = _segmented(volume, labels, settings, begun, progress)
-    made = begun.value.surface(found, settings, progress)
+    way_of(choose_way(settings, _input_of(volume))).require(settings)
+    found, way, taken = _segmented(volume, labels, settings, changes, progress)
+    made = way.surface(found, taken, progress)
     done, later = finish(replace(made.value, segmentation=found), settings, progress)
     known = () if truth is None else (compare_with(done.value, truth),)
     return replace(done.value, way=found.way, settings=settings, stages=(*found.stages, made, done, *known, *later))
@@ -102,7 +102,7 @@ def segment(
     12
     """
     settings = _settled(settings, changes)
-    return _segmented(volume, labels, settings, _begin(settings, changes, input=_input_of(volume)), progress)
+    return _segmented(volume, labels, settings, changes, progress)[0]
 
 
 def reconstruct_points(
@@ -168,10 +168,14 @@ def _begin(settings: Settings, given: Collection[str], *, input: str) -> Stage[W
 
 
 def _segmented(
-    volume: Volume, labels: Volume | None, settings: Settings, begun: Stage[Way], progress: Progress
-) -> Segmentation[Any]:
-    """Run stage one."""
+    volume: Volume, labels: Volume | None, settings: Settings, given: Collection[str], progress: Progress
+) -> tuple[Segmentation[Any], Way, Settings]:
+    """Run stage one; return also the way that it takes, and the settings with nothing about that left open."""
     kept = select_study(volume, labels, settings)
-    assert begun.value.segment is not None
-    found = begun.value.segment(kept.value, settings, progress)
-    return replace(found.value, way=begun.value.name, settings=settings, stages=(folded(None, begun, kept, found),))
+    taken = take_way(kept.value, settings)
+    begun = _begin(taken.value, given, input=_input_of(volume))
+    way = begun.value
+    assert way.segment is not None
+    found = way.segment(kept.value, taken.value, progress)
+    stages = (folded(None, begun, taken, kept, found),)
+    return replace(found.value, way=way.name, settings=settings, stages=stages), way, taken.value

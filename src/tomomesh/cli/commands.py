@@ -46,7 +46,8 @@ def run(chosen: Namespace) -> None:
 
 def settings_of(chosen: Namespace) -> Settings:
     """Build the settings: the defaults or the paper's, then a file's, then the options given."""
-    settings = Settings.for_paper() if getattr(chosen, "paper", False) else Settings()
+    paper = getattr(chosen, "paper", False) or getattr(chosen, "way", "") == "paper"
+    settings = Settings.for_paper() if paper else Settings()
     if getattr(chosen, "settings", None):
         settings = io.read_settings(chosen.settings, base=settings)
     given = given_of(chosen)
@@ -141,6 +142,7 @@ def _surface(chosen: Namespace) -> None:
 
 def _network(chosen: Namespace) -> None:
     settings = settings_of(chosen)
+    settings = replace(settings, network=settings.network.taking(settings.network.detailed or "ring"))
     folder = check_folder(chosen.output)
     check_files(chosen)
     from ..som.region import train_region

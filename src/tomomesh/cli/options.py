@@ -109,7 +109,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_settings(
         network,
         ("window", "network", "run"),
-        without=("slices", "signal", "contours", "space", "select", "keep", "units", *MESH_ONLY, *STUDY_ONLY),
+        without=("slices", "way", "signal", "contours", "space", "select", "keep", "units", *MESH_ONLY, *STUDY_ONLY),
     )
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")

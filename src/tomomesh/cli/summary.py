@@ -171,7 +171,7 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
     if window["chosen_by"] == "labels":
         select = ", ".join(map(str, report["settings"]["window"]["select"]))
         lines[-1] = f"window    label(s) {select}, {100 * window['share']:.1f} % of the voxels"
-    return [*lines, *_of_kept(window), *way_of(report["way"]["name"]).of_networks(report)]
+    return [*lines, *_of_kept(window), *of_way(report["way"]), *way_of(report["way"]["name"]).of_networks(report)]
 
 
 def _of_kept(window: dict[str, Any]) -> list[str]:
@@ -184,6 +184,14 @@ def _of_kept(window: dict[str, Any]) -> list[str]:
     told += [f"{window[key] / whole:.2%} {name} filled" for name, key in filled.items() if window[key]]
     told += [f"{window['padding_voxels']} voxels of padding made background"] if window["padding_voxels"] else []
     return [f"kept      {window['voxels']} voxels: {', '.join(told)}"] if told else []
+
+
+def of_way(way: dict[str, Any]) -> list[str]:
+    """Say which way was chosen for a window, why, and how to get another."""
+    if not way["chosen"]:
+        return []
+    _, name = way["option"].split()
+    return [f"way       {name}: {way['because']} (--way {'|'.join(way['others'])} for another)"]
 
 
 def _of_fit(report: dict[str, Any]) -> str:

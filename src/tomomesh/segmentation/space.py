@@ -73,7 +73,7 @@ def train_space(
     EmptyError
         With fewer inputs than neurons.
     """
-    graph = lattice(settings.network, settings.neuron_count)
+    graph = lattice(settings.topology, settings.neuron_count)
     if len(inputs) < len(graph):
         raise EmptyError(
             "the window has fewer places than the network has neurons", found=f"{len(inputs)} places",
@@ -81,7 +81,7 @@ def train_space(
         )  # fmt: skip
     shown = inputs[:: -(-len(inputs) // MOST)]
     shown = shown if len(shown) >= len(graph) else inputs
-    start = "axes" if (settings.network, settings.start) == ("torus", "ellipse") else settings.start
+    start = "axes" if (settings.topology, settings.start) == ("torus", "ellipse") else settings.start
     asked = replace(settings, start=start, trim=0.0 if outlined else settings.trim)
     origin = shown.mean(axis=0)
     fitted = fit(shown - origin, graph, asked, np.random.default_rng(seed))

@@ -150,7 +150,7 @@ def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:
         "upper": _limits(upper),
         "layers": layers,
         "joined_by": asked.layers if layers > 1 else None,
-        "chosen_by": _chosen_by(settings),
+        "chosen_by": chosen_by(settings),
         "lower_from": _from("lower", lower, settings),
         "upper_from": _from("upper", upper, settings),
         "voxels": int(mask.sum()),
@@ -179,7 +179,8 @@ def _became(counts: Counts, cleaned: Cleaned) -> dict[str, Any]:
     }
 
 
-def _chosen_by(settings: Settings) -> str:
+def chosen_by(settings: Settings) -> str:
+    """Name what chose the window: labels, preset, given or otsu."""
     asked = settings.window
     given = asked.lower is not None or asked.upper is not None
     return "labels" if asked.select else "preset" if asked.preset else "given" if given else "otsu"
@@ -188,7 +189,7 @@ def _chosen_by(settings: Settings) -> str:
 def _from(name: str, limit: Limit, settings: Settings) -> str | None:
     """Say where a bound comes from; None where there is none."""
     given = getattr(settings.window, name) is not None
-    return None if np.isinf(limit).all() else "given" if given else _chosen_by(settings)
+    return None if np.isinf(limit).all() else "given" if given else chosen_by(settings)
 
 
 def _edges(mask: NDArray[np.bool_]) -> list[np.bool_]:
@@ -206,7 +207,7 @@ def _doubts(chosen: Chosen, settings: Settings) -> list[str]:
             f"most of the window ({counts.spared_voxels} of {counts.window} voxels) lies in nothing that is "
             "12 mm thick, and was kept for all that: --keep body leaves it out"
         )
-    if _chosen_by(settings) == "otsu" and len(labels_in(chosen.volume.voxels[::APART])) > 1:
+    if chosen_by(settings) == "otsu" and len(labels_in(chosen.volume.voxels[::APART])) > 1:
         warnings.append("labels of a label map were taken for gray levels: --select chooses labels")
     if any(_edges(chosen.mask)[2:]):
         warnings.append("the window touches the border of the slices: the surface is closed along it")

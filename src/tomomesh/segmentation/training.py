@@ -73,7 +73,7 @@ def train_study(
     EmptyError
         Where no slice has pixels enough.
     """
-    graph = lattice(settings.network, settings.neuron_count)
+    graph = lattice(settings.topology, settings.neuron_count)
     solid = settings.signal == "auto" and graph.name != "grid" and fills_most(mask)
     outlined = settings.signal == "boundary" or solid
     count = len(mask)

@@ -15,7 +15,7 @@ from .crop import CropSettings
 from .cubes import CubeSettings
 from .fit import FitSettings
 from .matters import MATTERS
-from .network import FALLS, IN_SLICE, IN_SPACE, SURFACES, NetworkSettings
+from .network import FALLS, IN_SLICE, IN_SPACE, OF_STUDIES, SURFACES, NetworkSettings
 from .parameter import LAYERS, MANY, UNSET, asked_by, limits_of, option_of
 from .printing import PrintSettings
 from .read import ReadSettings
@@ -30,6 +30,7 @@ __all__ = [
     "LAYERS",
     "MANY",
     "MATTERS",
+    "OF_STUDIES",
     "SURFACES",
     "UNSET",
     "CloudSettings",
@@ -76,8 +77,12 @@ class Settings:
     @classmethod
     def for_paper(cls) -> Settings:
         """Return the paper's own choices."""
-        groups = {entry.name: getattr(cls(), entry.name) for entry in fields(cls)}
-        return cls(**{name: replace(group, **group.paper()) for name, group in groups.items()})
+        return cls().by_the_paper()
+
+    def by_the_paper(self) -> Settings:
+        """Return the paper's choice wherever a parameter stands at its default."""
+        groups = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return Settings(**{name: replace(group, **group.paper()) for name, group in groups.items()})
 
     @classmethod
     def from_dict(cls, sections: Mapping[str, Any], *, base: Settings | None = None, file: str = "") -> Settings:
@@ -88,7 +93,11 @@ class Settings:
         UsageError
             For a section or a key that there is not, or a value outside its limits.
         """
-        known = {entry.name: getattr(base or cls(), entry.name) for entry in fields(cls)}
+        base = base or cls()
+        network = sections.get("network")
+        if isinstance(network, Mapping) and network.get("way") == "paper":
+            base = base.by_the_paper()
+        known = {entry.name: getattr(base, entry.name) for entry in fields(cls)}
         for name, values in sections.items():
             keys = {f.name for f in fields(known[name])} if name in known else set()
             unknown = [key for key in values if key not in keys] if isinstance(values, Mapping) else [name]
@@ -110,7 +119,8 @@ class Settings:
         UsageError
             For a name that there is not, or a value outside its limits.
         """
-        groups = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        base = self.by_the_paper() if values.get("way") == "paper" != self.network.way else self
+        groups = {entry.name: getattr(base, entry.name) for entry in fields(self)}
         for name, group in groups.items():
             own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
             groups[name] = replace(group, **own)

@@ -10,13 +10,15 @@ hops, 4 bytes for each two, larger than 67 MB.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..errors import UsageError
 from .parameter import Group, param
 
 SURFACES = ("sphere", "torus")
 """Networks with faces: closed surfaces, which live in space."""
+OF_STUDIES = ("ring", "contours", "voxels", "sphere")
+"""Ways from a study to a mesh, as they are asked for: one network a slice, several, none, or one in space."""
 IN_SLICE, IN_SPACE = 58, 2562
 """Neurons where none are asked for: the paper's of a slice, and those of an icosahedron with edges divided 16-fold:
 10 x 16^2 + 2."""
@@ -28,6 +30,14 @@ FALLS = ("linear", "power", "exponential", "inverse")
 class NetworkSettings(Group):
     """Self-organising maps (eq. 1, 2; Fig. 1), one a slice."""
 
+    way: str = param(
+        "auto",
+        "what the surface is made from: a network on every slice (ring), one on every outline of a slice (contours), "
+        "the boundary of the window's own voxels (voxels), or one network in space (sphere); paper is --paper; auto "
+        "chooses from the pieces, holes and thickness of the window, and says so",
+        choices=("auto", *OF_STUDIES, "paper"),
+        paper="paper",
+    )
     slices: str = param(
         "auto",
         "plane of the slices; auto is across the thickest spacing, axial where equal; a slab keeps its few slices",
@@ -42,10 +52,10 @@ class NetworkSettings(Group):
         paper="region",
     )
     network: str = param(
-        "ring",
-        "topology of the network; none takes the window's boundary itself as the surface, at the places between the "
-        "voxels where the gray levels cross the window's bounds",
-        choices=("chain", "ring", "grid", "hexagonal", "cylinder", "torus", "sphere", "none"),
+        "auto",
+        "topology of the network, by default a ring, or a sphere in space; none takes the window's boundary itself as "
+        "the surface, at the places between the voxels where the gray levels cross the window's bounds (--way voxels)",
+        choices=("auto", "chain", "ring", "grid", "hexagonal", "cylinder", "torus", "sphere", "none"),
     )
     space: str = param(
         "slice",
@@ -54,10 +64,11 @@ class NetworkSettings(Group):
         choices=("slice", "volume"),
     )
     contours: str = param(
-        "one",
+        "auto",
         "networks of a slice: one; a ring for each connected component of the window; two rings on the two sides of "
-        "each wall; or a ring for every closed outline, holes included (loops). Several share the neurons by length",
-        choices=("one", "components", "walls", "loops"),
+        "each wall; or a ring for every closed outline, holes included (loops), as --way contours has. Several share "
+        "the neurons by length",
+        choices=("auto", "one", "components", "walls", "loops"),
     )
     inputs: str = param(
         "pixels",
@@ -133,12 +144,17 @@ class NetworkSettings(Group):
                 "there is no network to be in space", found="--space = volume, --network = none",
                 expected="a network, or --space slice",
             )  # fmt: skip
-        if self.contours != "one" and (self.network != "ring" or self.in_space):
+        if self.contours not in ("auto", "one") and (self.network not in ("auto", "ring") or self.in_space):
             raise UsageError(
                 "several contours are rings",
                 found=f"--contours = {self.contours}, --network = {self.network}, --space = {self.space}",
                 expected="--network ring in slices, or --contours one",
             )
+        if self.way in OF_STUDIES and self.detailed not in ("", self.way):
+            raise UsageError(
+                "a way and its details are at odds", found=f"--way = {self.way}, {self.details}",
+                expected=f"--way {self.detailed}, or no {self.details.split()[0]}",
+            )  # fmt: skip
 
     @property
     def in_space(self) -> bool:
@@ -146,6 +162,36 @@ class NetworkSettings(Group):
         return self.space == "volume" or self.network in SURFACES
 
     @property
+    def topology(self) -> str:
+        """The network that is trained: as asked, or a ring in each slice, or a sphere in space."""
+        return ("sphere" if self.in_space else "ring") if self.network == "auto" else self.network
+
+    @property
     def neuron_count(self) -> int:
         """Neurons of a network: as asked, or enough for a slice or for a surface."""
         return self.neurons or (IN_SPACE if self.in_space else IN_SLICE)
+
+    @property
+    def detailed(self) -> str:
+        """The way that the details ask for, one of `OF_STUDIES`; "" where they leave it open."""
+        if self.in_space:
+            return "sphere"
+        if self.network == "none":
+            return "voxels"
+        if self.contours not in ("auto", "one") or (self.network, self.way) == ("ring", "contours"):
+            return "contours"
+        return "ring" if (self.network, self.contours) != ("auto", "auto") else ""
+
+    @property
+    def details(self) -> str:
+        """The details that are not left open, as options."""
+        chosen = {"--network": self.network, "--contours": self.contours} | (
+            {"--space": "volume"} if self.space == "volume" else {}
+        )
+        return ", ".join(f"{name} {value}" for name, value in chosen.items() if value != "auto")
+
+    def taking(self, way: str) -> NetworkSettings:
+        """Return these settings with a way, one of `OF_STUDIES`, and nothing about it left open."""
+        network = {"voxels": "none", "sphere": "sphere"}.get(way, "ring") if self.network == "auto" else self.network
+        several = self.contours if way == "contours" and self.contours not in ("auto", "one") else "loops"
+        return replace(self, way=way, network=network, contours=several if way == "contours" else "one")

@@ -67,8 +67,9 @@ class Group:
                 _check(entry, value)
 
     def paper(self) -> Mapping[str, Any]:
-        """Return the values that the paper has in place of the defaults."""
-        return {f.name: f.metadata["paper"] for f in fields(self) if f.metadata["paper"] is not UNSET}
+        """Return the values that the paper has, of parameters that stand at their defaults."""
+        known = [entry for entry in fields(self) if entry.metadata["paper"] is not UNSET]
+        return {entry.name: entry.metadata["paper"] for entry in known if getattr(self, entry.name) == entry.default}
 
 
 def _check(entry: Field[Any], value: Any) -> None:

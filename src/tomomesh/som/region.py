@@ -73,7 +73,7 @@ def train_region(
     """
     if inputs.ndim != 2 or inputs.shape[1] < 1:
         raise UsageError("inputs are rows of numbers", found=f"shape = {inputs.shape}", expected="(n, d)")
-    graph = lattice(settings.network, settings.neurons or IN_SLICE)
+    graph = lattice(settings.topology, settings.neurons or IN_SLICE)
     if len(inputs) < len(graph):
         raise EmptyError(
             "the region has fewer inputs than the network has neurons",

@@ -105,8 +105,8 @@ def _of_networks(report: dict[str, Any]) -> list[str]:
 
 
 WAY = Way(
-    applies=lambda settings, input: input not in POINTS and settings.network.contours != "one",
-    because=lambda settings, input: f"with --contours {settings.network.contours}",
+    applies=lambda settings, input: input not in POINTS and settings.network.contours not in ("auto", "one"),
+    because=lambda settings, input: "with --way contours",
     reads=TRAINING | parameters("bridge", "even", "cell_mm", "cell_factor", "stiffness", "allow_leaks"),
     segment=segment_by_contours,
     surface=surface_by_contours,

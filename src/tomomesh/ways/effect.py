@@ -18,7 +18,7 @@ GROUPS = ("network", "cubes", "fit")
 """Groups of parameters that a way must read for them to change anything."""
 BESIDE = ("seed",)
 """Parameters of other groups of which the same is true."""
-ALWAYS = ("network", "space", "contours", "slices", "tolerance", "max_steps")
+ALWAYS = ("way", "network", "space", "contours", "slices", "tolerance", "max_steps")
 """Parameters of those groups that choose the way or matter on each."""
 INSTEAD = {"largest": "--keep largest"}
 """Parameter to what does the same on the voxels of a study, whichever way it goes."""

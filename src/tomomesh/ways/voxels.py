@@ -58,7 +58,7 @@ def _pictures(found: Segmentation[Boundary]) -> dict[str, Any]:
 
 WAY = Way(
     applies=lambda settings, input: input not in POINTS and settings.network.network == "none",
-    because=lambda settings, input: "with --network none",
+    because=lambda settings, input: "with --way voxels",
     reads=parameters("surface", "stiffness"),
     segment=segment_by_voxels,
     surface=surface_by_voxels,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Any
 
-from ..summary import limit_in_words
+from ..summary import limit_in_words, of_way
 from .series_table import TILTED, table_of
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def of_study(found: dict[str, Any]) -> list[str]:
         *_of_series(found),
         *(_told("segments", _segments(found["segments"])) if refused and found["segments"] else []),
         *(_of_voxels(found) if not refused else _told("refused", _in_words(refused))),
+        *(of_way(found["way"]) if last and found.get("way") else []),
         *([f"{'next':<{INDENT}}{last}"] if last else []),
     ]
 

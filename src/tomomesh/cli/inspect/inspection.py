@@ -6,11 +6,12 @@ import shlex
 from typing import TYPE_CHECKING, Any
 
 from ... import io
-from ...errors import FormatError, GeometryError, ResourceError, TomomeshError, UnreadableError
-from .next_step import next_step
+from ...errors import EmptyError, FormatError, GeometryError, ResourceError, TomomeshError, UnreadableError
+from .next_step import first_try, next_step
 
 if TYPE_CHECKING:
     from ...io import Listing, Series
+    from ...model.volume import Volume
     from ...settings import Settings
 
 REFUSALS = (FormatError, GeometryError, ResourceError, UnreadableError)
@@ -70,7 +71,19 @@ def _surveyed(study: str, settings: Settings, listing: Listing) -> tuple[dict[st
         if listing.files > 1 or (listing.files and isinstance(fault, GeometryError)):
             return {}, fault
         raise
-    return survey(crop(volume, settings.crop, volume.thickest_axis())[0]), None
+    found = survey(crop(volume, settings.crop, volume.thickest_axis())[0])
+    return found | {"way": _way(volume, settings.replace(**first_try(found)))}, None
+
+
+def _way(volume: Volume, settings: Settings) -> dict[str, Any] | None:
+    """Return the way that the next command takes, as the report has it; None where nothing lies in its window."""
+    from ...segmentation.study import select_study
+    from ...ways.choice import take_way
+
+    try:
+        return dict(take_way(select_study(volume, None, settings).value, settings).stats["way"])
+    except EmptyError:
+        return None
 
 
 def _series(series: Series, *, alone: bool) -> dict[str, Any]:

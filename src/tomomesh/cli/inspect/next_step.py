@@ -37,7 +37,9 @@ def next_step(
     """
     given = list(_given(settings))
     if fault is None:
-        return " ".join(["tomomesh reconstruct", _first_try(found, study), *given, "-o mesh.stl"])
+        first = list(_given(Settings().replace(**first_try(found))))
+        named = f"--labels-in {study}" if found["labels"] else study
+        return " ".join(["tomomesh reconstruct", named, *first, *given, "-o mesh.stl"])
     if SELECT in fault.flags:
         chosen = f"--labels-in {study} {SELECT} {min(found['segments'], default='N')}"
         return " ".join(["tomomesh reconstruct", chosen, *given, "-o mesh.stl"])
@@ -45,13 +47,13 @@ def next_step(
     return " ".join(["tomomesh inspect", study, *given, *helping]) if helping else None
 
 
-def _first_try(found: dict[str, Any], study: str) -> str:
-    """Name the study, and its largest label, bone, or nothing for Otsu's window."""
+def first_try(found: dict[str, Any]) -> dict[str, Any]:
+    """Return the window of a first mesh: the largest label, bone, or nothing for Otsu's."""
     labels = found["labels"]
     if labels:
-        return f"--labels-in {study} --select {max(labels, key=lambda label: labels[label])}"
+        return {"select": (int(max(labels, key=lambda label: labels[label])),)}
     bone = found["windows"].get("bone", {"share": 0})
-    return f"{study} --preset bone" if bone["share"] else study
+    return {"preset": "bone"} if bone["share"] else {}
 
 
 def _given(settings: Settings) -> Iterator[str]:
@@ -61,7 +63,9 @@ def _given(settings: Settings) -> Iterator[str]:
         value = sections[section].get(entry.name)
         if value not in (None, defaults[section].get(entry.name)):
             values = value if isinstance(value, list) else [] if value is True else [value]
-            yield " ".join([option_of(entry.name), *(f"{one:.10g}" for one in values)])
+            yield " ".join(
+                [option_of(entry.name), *(f"{one:.10g}" if isinstance(one, float) else f"{one}" for one in values)]
+            )
 
 
 def _helping(fault: TomomeshError, series: Sequence[Series]) -> Iterator[str]:
