@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import EmptyError
+from ..kernels.som.neighborhoods import GAUSSIAN
 from ..kernels.threads import in_blocks
+from ..measure.polygon import side_lengths
 from ..model.lattice import lattice
 from ..model.networks import Networks
 from ..progress import Progress, silent
 from ..som.even_spacing import bridged_edges, even_spacing
-from ..som.fit import fit, match, radii
+from ..som.fit import fit, match, radii, shape_of
+from ..som.shrinking import unshrunk
+from .contours.curved import evened
 from .signal import fills_most, outline, pixels_of
 
 if TYPE_CHECKING:
@@ -91,7 +95,7 @@ def train_study(
             if len(shown) >= len(graph):
                 fitted = _fitted(shown, graph, settings, np.random.default_rng([seed, first + k]), pixel_mm, below)
                 below = fitted.codebook if followed else None
-                codebooks[k], bridged[k] = _spaced(fitted.codebook[:, :2], graph, settings, pixel_mm)
+                codebooks[k], bridged[k] = _spaced(fitted, graph, settings, pixel_mm)
                 strays[k] = (~fitted.kept).sum()
 
     workers = 1 if followed else threads
@@ -135,14 +139,23 @@ def _fitted(
 
 
 def _spaced(
-    codebook: NDArray[np.float64], graph: Lattice, settings: NetworkSettings, pixel_mm: tuple[float, float]
+    fitted: Fitted, graph: Lattice, settings: NetworkSettings, pixel_mm: tuple[float, float]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the neurons in pixels, evenly spaced where that is asked for, and which edges bridge gaps."""
-    codebook = np.ascontiguousarray(codebook)
+    """Return the neurons in pixels, and which edges bridge gaps; rings unshrunk, lines evenly spaced if asked for."""
+    codebook = np.ascontiguousarray(fitted.codebook[:, :2])
     gaps = bridged_edges(codebook, graph, settings.bridge)
+    ring = graph.name == "ring"
+    if ring and settings.training == "batch" and shape_of(settings) == GAUSSIAN:
+        codebook = unshrunk(codebook, gaps, fitted.radius, _half_width(fitted, gaps, pixel_mm))
     if settings.even:
-        codebook, gaps = even_spacing(codebook, graph, gaps)
+        codebook, gaps = evened(codebook, gaps) if ring else even_spacing(codebook, graph, gaps)
     return codebook / pixel_mm, gaps
+
+
+def _half_width(fitted: Fitted, gaps: NDArray[np.bool_], pixel_mm: tuple[float, float]) -> float:
+    """Return half the width of the band that the inputs of a ring fill: their area over the ring's length."""
+    length = float(side_lengths(fitted.codebook[:, :2])[~gaps].sum())
+    return float(fitted.kept.sum()) * pixel_mm[0] * pixel_mm[1] / (2 * max(length, 1e-300))
 
 
 def regions(
