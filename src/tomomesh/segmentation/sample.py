@@ -154,7 +154,7 @@ def _place(indices: NDArray[np.float64], slices: NDArray[Any], volume: Volume) -
     return volume.to_mm(np.column_stack([indices, slices]))
 
 
-def _made(indices: NDArray[np.float64], heights: NDArray[np.float64], volume: Volume, kind: int) -> PointSet:
+def _made(indices: NDArray[np.float64], heights: NDArray[Any], volume: Volume, kind: int) -> PointSet:
     """Return points that are no neurons; each counts to the slice that is nearest to it."""
     none, slices = np.full(len(heights), -1, np.int32), np.rint(heights).astype(np.int32)
     return PointSet(_place(indices, heights, volume), slices, none, np.full(len(slices), kind, np.uint8))
@@ -236,14 +236,14 @@ def _caps(networks: Networks, volume: Volume, spacing: float) -> PointSet:
     found = [_none(volume)]
     for n, ring in enumerate(rings):
         lattice = lattice_inside(ring, spacing)
-        own = distance(ring, lattice)
-        lattice, own = lattice[own > spacing / 4], own[own > spacing / 4]
         beside = [m for m in (n - 1, n + 1) if 0 <= m < len(rings) and abs(slices[m] - slices[n]) <= REACH]
         if len(beside) < 2:
-            found.append(_made(lattice / pixel, np.full(len(lattice), slices[n]), volume, CAP))
+            flat = lattice[distance(ring, lattice) > spacing / 4]
+            found.append(_made(flat / pixel, np.full(len(flat), slices[n]), volume, CAP))
         for m in beside:
-            away = np.where(inside(rings[m], lattice), 0.0, distance(rings[m], lattice))
-            bare = away > spacing / 2
-            height = slices[n] + (slices[m] - slices[n]) * own[bare] / (own[bare] + away[bare])
-            found.append(_made(lattice[bare] / pixel, height, volume, BRIDGE))
+            bare = lattice[~inside(rings[m], lattice)]
+            own, away = distance(ring, bare), distance(rings[m], bare)
+            far = (own > spacing / 4) & (away > spacing / 2)
+            height = slices[n] + (slices[m] - slices[n]) * own[far] / (own[far] + away[far])
+            found.append(_made(bare[far] / pixel, height, volume, BRIDGE))
     return reduce(PointSet.joined, found)

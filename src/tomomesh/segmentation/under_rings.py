@@ -151,7 +151,8 @@ class _Steps:
         beside = np.clip(np.arange(len(self.vectors)) + self.way, 0, len(self.vectors) - 1)[:, None]
         further = self.vectors[beside, self.nearest]
         near, far = self.lengths[..., None], (self.lengths + self.lengths[beside, self.nearest])[..., None]
-        return self.vectors * far**2 - (self.vectors + further) * np.where(far > near, near, 0.0) ** 2
+        bend = (self.vectors + further) * np.where(far > near, near, 0.0) ** 2
+        return np.asarray(self.vectors * far**2 - bend)
 
 
 def _across(up: _Steps, down: _Steps) -> Floats:

@@ -67,8 +67,9 @@ class NetworkSettings(Group):
         paper="layers",
     )
     neurons: int | None = param(
-        None, "neurons a slice, by default 58; of a network in space 2562", kind=int, low=3, high=4_096
-    )
+        None, "neurons a slice; auto is what the length and the curvature of the outlines want for a ring in batch, "
+        "58 for others, and 2562 in space", kind=int, low=3, high=4_096, auto=True,
+    )  # fmt: skip
     training: str = param(
         "batch", "one presentation at a time, or all at once", choices=("online", "batch"), paper="online"
     )
@@ -144,6 +145,11 @@ class NetworkSettings(Group):
     def in_space(self) -> bool:
         """Whether one network is trained in space, and not one a slice."""
         return self.space == "volume" or self.network in SURFACES
+
+    @property
+    def neurons_follow(self) -> bool:
+        """Whether the number of neurons follows from the outlines; online, a ring's noise looks like curvature."""
+        return self.neurons is None and self.network == "ring" and not self.in_space and self.training == "batch"
 
     @property
     def neuron_count(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .cubes import surface_on_cubes
-from .rings import BETWEEN, inside_of, of_networks, segment_by_networks
+from .rings import BETWEEN, inside_of, of_networks, segment_by_rings
 from .sections import body_of_cubes, networks_on_slices
 from .way import CUBES, POINTS, SPRINGS, TRAINING, Way, parameters
 
@@ -26,7 +26,7 @@ WAY = Way(
     applies=lambda settings, input: input not in POINTS,
     because=lambda settings, input: "on networks whose neurons draw the mesh",
     reads=TRAINING | CUBES | SPRINGS | parameters(*BETWEEN),
-    segment=segment_by_networks,
+    segment=segment_by_rings,
     surface=surface_by_networks,
     of_networks=of_networks,
     of_body=body_of_cubes,

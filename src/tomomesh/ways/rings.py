@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..isosurface.crossings import Levels
 from ..measure.rings import assess_contours
 from ..results import Enclosed, Segmentation
 from ..segmentation.contours.inputs import share_of_holes, slices_with_several
@@ -37,12 +38,13 @@ HOLES = 0.15
 warning's threshold, chosen: no mesh depends on it."""
 
 
-def segment_by_networks(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Networks]]:
+def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Networks]]:
     """Train a network on every slice, and place its neurons in space."""
     study, mask, run = kept.study, kept.mask, settings.run
     trained = measured(
         "networks", train_study, mask, settings.network, layers=_layers(kept, settings),
-        pixel_mm=study.spacing_mm[:2], seed=run.seed, threads=run.threads, progress=progress,
+        levels=levels_of(kept, settings), pixel_mm=study.spacing_mm[:2], seed=run.seed, threads=run.threads,
+        progress=progress,
     )  # fmt: skip
     labels = measured("regions", regions, mask, trained.value, pixel_mm=study.spacing_mm[:2], threads=run.threads)
     placed = measured(
@@ -68,6 +70,12 @@ def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress
 def inside_of(found: Segmentation[Networks]) -> Inside:
     """Tell what is known of the inside of networks."""
     return Inside(found.sampling.volume_mm3, Enclosed.window(found).volume, found.mask)
+
+
+def levels_of(kept: Selected, settings: Settings) -> Levels:
+    """Return the gray levels of a study, with the window on them."""
+    chosen = kept.chosen
+    return Levels(chosen.volume.voxels, chosen.lower, chosen.upper, settings.window.layers)
 
 
 def _layers(kept: Selected, settings: Settings) -> NDArray[np.bool_] | None:
@@ -128,7 +136,7 @@ WAY = Way(
     ),
     because=lambda settings, input: "on a ring in each slice",
     reads=TRAINING | CUBES | parameters(*BETWEEN, "attraction", "damping", "step"),
-    segment=segment_by_networks,
+    segment=segment_by_rings,
     surface=surface_by_rings,
     of_networks=of_networks,
     of_body=body_of_cubes,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.som.neighborhoods import GAUSSIAN, weigh
+from ...kernels.som.neighborhoods import GAUSSIAN, weigh
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
