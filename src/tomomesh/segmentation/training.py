@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -178,6 +179,13 @@ class Slices:
         """Area that an input stands for, mm^2; 0 where the inputs are on a line."""
         return 0.0 if self.levels is not None else self.pixel_mm[0] * self.pixel_mm[1]
 
+    @cached_property
+    def times_shown(self) -> float:
+        """How often a pixel is shown: once, or for each of its layers."""
+        if self.outlined or self.layers is None:
+            return 1.0
+        return np.count_nonzero(self.layers) / max(np.count_nonzero(self.layers.any(axis=-1)), 1)
+
     def fitted(
         self, k: int, shown: NDArray[np.float64], graph: Lattice, below: NDArray[np.float64] | None = None
     ) -> Fitted:
@@ -213,7 +221,7 @@ class Slices:
     def _half_width(self, fitted: Fitted, gaps: NDArray[np.bool_]) -> float:
         """Return half the width of the band that the inputs of a ring fill: their area over the ring's length."""
         length = float(side_lengths(fitted.codebook[:, :2])[~gaps].sum())
-        return float(fitted.kept.sum()) * self.pixel_area / (2 * max(length, 1e-300))
+        return float(fitted.kept.sum()) * self.pixel_area / (2 * self.times_shown * max(length, 1e-300))
 
     def enough(self) -> int:
         """Return how many neurons a ring needs to follow the outlines of all slices; see `wanted`.

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 APART = 1.5
 """Distance of the places along a ring, in slice distances, over which a place is set between each two."""
+DENSEST = 3.0
+"""Places along an edge of a cube at most, as far as the fit is concerned: it looks for a vertex' samples as far as these
+are apart, and vertices start up to an edge away."""
 FINEST = 4
 """Most times that this is done: the neurons of a ring are then sixteen slice distances apart, and nothing is known
 between the slices that would be worth more places."""
@@ -60,7 +63,7 @@ def surface_under(networks: Networks, sampling: Sampling, volume: Volume) -> Sam
     normals = np.cross(along, _across(up, down))
     wide = np.maximum(up.lengths, down.lengths)
     kept = any_of((normals != 0).reshape(-1, 3)) & ~_alone(broken).ravel()
-    spacing = np.minimum(np.maximum(wide, apart), sampling.spacing_mm).ravel()
+    spacing = np.clip(np.maximum(wide, apart), sampling.spacing_mm / DENSEST, sampling.spacing_mm).ravel()
     caps = sampling.points.positions[sampling.points.kinds == CAP]
     facing = np.cross(volume.affine[:3, 0], volume.affine[:3, 1])
     return _samples(

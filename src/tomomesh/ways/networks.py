@@ -22,10 +22,12 @@ def surface_by_networks(found: Segmentation[Networks], settings: Settings, progr
     return surface_on_cubes(found.points, found.sampling.spacing_mm, settings, progress, inside_of(found))
 
 
+RINGS = {"network": ("ring",)}
+"""The network for which there is a choice of what draws the mesh."""
 WAY = Way(
     applies=lambda settings, input: input not in POINTS,
     because=lambda settings, input: "on networks whose neurons draw the mesh",
-    reads=TRAINING | CUBES | SPRINGS | parameters(*BETWEEN),
+    reads=TRAINING | CUBES | SPRINGS | parameters(*BETWEEN, attraction=RINGS),
     segment=segment_by_rings,
     surface=surface_by_networks,
     of_networks=of_networks,
