@@ -26,9 +26,8 @@ from tomomesh.model.icosphere import icosphere
 from tomomesh.model.lattice import lattice
 from tomomesh.model.mesh import TriMesh
 from tomomesh.model.networks import SpaceNetwork
-from tomomesh.segmentation.space import MOST, is_wall, pieces_of, train_space
+from tomomesh.segmentation.space import MOST, is_wall, pieces_of, train_space, untangled
 from tomomesh.settings import NetworkSettings
-from tomomesh.ways.space import _untangled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -187,7 +186,7 @@ class TestSurface:
     def test_faces_outward_from_a_mirrored_start(self) -> None:
         vertices, faces = icosphere(4)
         network = SpaceNetwork(replace(lattice("sphere", 162), faces=faces), -vertices, True, 162, 0)
-        mesh, moved = _untangled(network, 0)
+        mesh, moved = untangled(network, -vertices)
         assert moved == 0
         assert mesh.face_volumes.sum() == pytest.approx(trimesh.Trimesh(vertices, faces).volume)
 

@@ -184,7 +184,7 @@ class Slices:
         """How often a pixel is shown: once, or for each of its layers."""
         if self.outlined or self.layers is None:
             return 1.0
-        return np.count_nonzero(self.layers) / max(np.count_nonzero(self.layers.any(axis=-1)), 1)
+        return float(self.layers.sum()) / max(float(self.layers.any(axis=-1).sum()), 1.0)
 
     def fitted(
         self, k: int, shown: NDArray[np.float64], graph: Lattice, below: NDArray[np.float64] | None = None

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 APART = 1.5
 """Distance of the places along a ring, in slice distances, over which a place is set between each two."""
 DENSEST = 3.0
-"""Places along an edge of a cube at most, as far as the fit is concerned: it looks for a vertex' samples as far as these
-are apart, and vertices start up to an edge away."""
+"""Places along an edge of a cube at most, as far as the fit is told: it looks for a vertex' samples no farther than a
+few times their distance, and vertices start up to an edge away."""
 FINEST = 4
 """Most times that this is done: the neurons of a ring are then sixteen slice distances apart, and nothing is known
 between the slices that would be worth more places."""

@@ -23,9 +23,8 @@ from ..model.points import PointSet
 from ..pointcloud.samples import settle_points
 from ..results import Enclosed, Segmentation, Surface
 from ..segmentation.sample import Sampling
-from ..segmentation.space import is_wall, pieces_of, regions_in_space, train_space
+from ..segmentation.space import is_wall, pieces_of, regions_in_space, train_space, untangled
 from ..settings import SURFACES
-from ..som.starts import start_positions
 from ..stage import Stage, folded, measured, timed
 from .sections import fit_found, points_found
 from .way import POINTS, TRAINING, Way, parameters
@@ -178,13 +177,14 @@ class _Rest:
 def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Make a network's own faces a closed surface that rests on the boundary of the window."""
     threads = settings.run.threads
-    apart = measured("untangle", _untangled, found.source, threads)
+    apart = measured("untangle", untangled, found.source.network, found.source.places, threads)
     faces = _divide(*apart.value)
     rough = faces.value
     ring = OneRing.of_quads(rough.quads.astype(np.int32), len(rough.vertices), threads)
     rest = measured("fit", _fitted, rough, ring, found.source, settings, progress)
-    apart_again = rough.vertices, ring, CrossingFaces(threads, single=True), rough.vertices
-    mesh = measured("untangle", untangle, rest.value.mesh, *apart_again)
+    mesh = measured(
+        "untangle", untangle, rest.value.mesh, rough.vertices, ring, CrossingFaces(threads, single=True), rough.vertices
+    )  # fmt: skip
     made, taken_back, crossing = mesh.value
     _require_volume(made, len(found.source.network.lattice))
     surface = Surface(
@@ -220,16 +220,6 @@ def _divide(network: TriMesh, moved: int) -> Stage[QuadMesh]:
     return Stage(rough, stats)
 
 
-def _untangled(found: SpaceFound, threads: int) -> tuple[TriMesh, int]:
-    """Return a network as a mesh that faces outward and does not pass through itself, as it does nowhere at rest."""
-    graph, rng = found.network.lattice, np.random.default_rng(0)
-    mesh, rest = TriMesh(found.network.codebook, graph.faces), start_positions(found.places, graph, "ellipse", rng)
-    ring = OneRing.of_edges(mesh.edges, len(mesh.vertices), threads)
-    mesh, moved, _ = untangle(mesh, rest, ring, CrossingFaces(threads, single=True), rest)
-    outward = mesh.face_volumes.sum() > 0
-    return mesh if outward else replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1])), moved
-
-
 def _fitted(rough: QuadMesh, ring: OneRing, found: SpaceFound, settings: Settings, progress: Progress) -> _Rest:
     """Draw the finer mesh to the boundary of the window; over a wall the network itself is the middle surface."""
     start, threads, origin = rough.triangulated(), settings.run.threads, found.places.min(axis=0)
@@ -241,9 +231,8 @@ def _fitted(rough: QuadMesh, ring: OneRing, found: SpaceFound, settings: Setting
         mesh, trace = _drawn_to_points(rough, found.places, edge, settings, progress)
         return _Rest(mesh, unfilled, trace)
     samples = settle_points(found.places - origin, threads=threads, progress=progress)
-    rest = fit_to_surface(
-        rough.vertices - origin, ring, samples, edge, settings.fit, threads=threads, progress=progress
-    )
+    vertices = rough.vertices - origin
+    rest = fit_to_surface(vertices, ring, samples, edge, settings.fit, threads=threads, progress=progress)
     mesh = TriMesh(rest.vertices + origin, rest.faces)
     return _Rest(mesh, any_of(rest.filled[rest.faces]), rest.trace)
 
