@@ -82,9 +82,7 @@ class TestDemo:
         assert len(surface.trace.speed) <= 30
 
     def test_the_neurons_themselves_draw_the_mesh_half_as_near(self, surface: Surface, head: Phantom) -> None:
-        nearest = reconstruct(
-            head.volume, truth=head.truth, lower=head.lower, upper=head.upper, attraction="nearest"
-        )
+        nearest = reconstruct(head.volume, truth=head.truth, lower=head.lower, upper=head.upper, attraction="nearest")
         assert nearest.report["way"]["name"] == "networks"
         assert surface.report["truth"]["p50_mm"] <= 0.4 * nearest.report["truth"]["p50_mm"]
 
