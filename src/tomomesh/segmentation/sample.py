@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from ..measure.polygon import area, distance, inside, lattice_inside, side_lengths
+from ..measure.polygon import area, distance, inside_lattice, lattice_over, side_lengths
 from ..model.points import BRIDGE, CAP, NEURON, RING, SIDE, TRACK, PointSet
 
 if TYPE_CHECKING:
@@ -235,15 +235,17 @@ def _caps(networks: Networks, volume: Volume, spacing: float) -> PointSet:
     rings, slices = networks.codebooks * pixel, networks.slices.astype(np.float64)
     found = [_none(volume)]
     for n, ring in enumerate(rings):
-        lattice = lattice_inside(ring, spacing)
+        x, y = lattice_over(ring, spacing)
+        own, lattice = inside_lattice(ring, x, y), np.stack(np.meshgrid(x, y), axis=-1)
         beside = [m for m in (n - 1, n + 1) if 0 <= m < len(rings) and abs(slices[m] - slices[n]) <= REACH]
         if len(beside) < 2:
-            flat = lattice[distance(ring, lattice) > spacing / 4]
+            flat = lattice[own]
+            flat = flat[distance(ring, flat) > spacing / 4]
             found.append(_made(flat / pixel, np.full(len(flat), slices[n]), volume, CAP))
         for m in beside:
-            bare = lattice[~inside(rings[m], lattice)]
-            own, away = distance(ring, bare), distance(rings[m], bare)
-            far = (own > spacing / 4) & (away > spacing / 2)
-            height = slices[n] + (slices[m] - slices[n]) * own[far] / (own[far] + away[far])
+            bare = lattice[own & ~inside_lattice(rings[m], x, y)]
+            near, away = distance(ring, bare), distance(rings[m], bare)
+            far = (near > spacing / 4) & (away > spacing / 2)
+            height = slices[n] + (slices[m] - slices[n]) * near[far] / (near[far] + away[far])
             found.append(_made(bare[far] / pixel, height, volume, BRIDGE))
     return reduce(PointSet.joined, found)
