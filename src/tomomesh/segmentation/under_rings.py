@@ -24,10 +24,12 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 APART = 1.5
-"""Distance of the places along a ring, in slice distances, over which a place is set between each two."""
+"""Distance of the places along a ring, in slice distances, over which a place is set between each two. Chosen:
+half of it changes the distance by +2.2 %, twice by -1.4 %."""
 DENSEST = 3.0
 """Places along an edge of a cube at most, as far as the fit is told: it looks for a vertex' samples no farther than a
-few times their distance, and vertices start up to an edge away."""
+few times their distance, and vertices start up to an edge away. Chosen: half of it changes the distance by -0.6 %,
+twice by +0.0 %; at 24 neurons, without it, a third of the faces have no sample near."""
 FINEST = 4
 """Most times that this is done: the neurons of a ring are then sixteen slice distances apart, and nothing is known
 between the slices that would be worth more places."""
