@@ -26,7 +26,7 @@ def main() -> None:
     images = np.stack([band.slice_image(seed=seed) for seed in range(SEEDS)])
     mask = (images > WINDOW[0]) & (images <= WINDOW[1])
     _measure(band, mask, "online, 10,000 presentations", ONLINE, mark=0.25)
-    _measure(band, mask, "batch, 10 epochs", BATCH, mark=0.09)
+    _measure(band, mask, "batch, 10 epochs", BATCH, mark=0.05)
     rings = rings_of(mask, PAPER)
     note("--paper: mean distance to the line", f"{_mean_distance(band, rings):.3f} px")
     note("--paper: slices with a tangle", f"{sum(crossings(ring) > 0 for ring in rings)} of {SEEDS}")

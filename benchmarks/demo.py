@@ -22,17 +22,20 @@ def main() -> None:
     default = _run(head, Settings())
     _judge("defaults", default)
     truth = default.report["truth"]
-    at_most("defaults: mean distance to the exact surface", truth["mean_mm"], 0.6, "mm")
-    at_most("defaults: 95 % of the distances", truth["p95_mm"], 1.5, "mm")
-    note("defaults: from the exact surface, mean and 95 %", _both(truth, "back_"))
+    at_most("defaults: mean distance to the exact surface", truth["mean_mm"], 0.15, "mm")
+    at_most("defaults: 95 % of the distances", truth["p95_mm"], 0.35, "mm")
+    at_most("defaults: mean distance from the exact surface", truth["back_mean_mm"], 0.15, "mm")
+    at_most("defaults: 95 % of these", truth["back_p95_mm"], 0.35, "mm")
+    note("defaults: neurons of a ring", str(default.report["networks"]["neurons"]))
     at_most("defaults: steps of the fit", default.report["fit"]["iterations"], 30)
     holds("defaults: at rest", default.report["fit"]["converged"])
     at_most("defaults: volume off the rings' volume", _volume_error(default), 10, "%")
-    finer = _finer(head)
-    at_most("200 neurons: mean distance, over half the mark", finer["mean_mm"] / 0.3, 1)
-    at_most("200 neurons: mean distance, over half the default's", finer["mean_mm"] / truth["mean_mm"] * 2, 1)
-    at_most("200 neurons: 95 %, over half the mark", finer["p95_mm"] / 0.75, 1)
-    at_most("200 neurons: 95 %, over half the default's", finer["p95_mm"] / truth["p95_mm"] * 2, 1)
+    for neurons in (58, 200):
+        finer = _with(head, neurons)
+        at_most(f"{neurons} neurons: mean distance to the exact surface", finer["mean_mm"], 0.15, "mm")
+        at_most(f"{neurons} neurons: 95 % of the distances", finer["p95_mm"], 0.35, "mm")
+    near = _run(head, Settings().replace(attraction="nearest")).report["truth"]
+    note("--attraction nearest: distance to the exact surface, mean and 95 %", _both(near))
     paper = _run(head, Settings.for_paper())
     _judge("--paper", paper)
     note("--paper: distance to the exact surface, mean and 95 %", _both(paper.report["truth"]))
@@ -59,16 +62,15 @@ def _judge(name: str, surface: Surface) -> None:
     holds(f"{name}: one component of genus 0", mesh.body_count == 1 and mesh.euler_number == 2)
 
 
-def _finer(head: Phantom) -> dict[str, float]:
-    surface = _run(head, Settings().replace(neurons=200))
-    _judge("200 neurons", surface)
+def _with(head: Phantom, neurons: int) -> dict[str, float]:
+    surface = _run(head, Settings().replace(neurons=neurons))
+    _judge(f"{neurons} neurons", surface)
     truth: dict[str, float] = surface.report["truth"]
-    note("200 neurons: distance to the exact surface, mean and 95 %", _both(truth))
     return truth
 
 
-def _both(truth: dict[str, float], prefix: str = "") -> str:
-    return f"{truth[f'{prefix}mean_mm']:.3f} mm, {truth[f'{prefix}p95_mm']:.3f} mm"
+def _both(truth: dict[str, float]) -> str:
+    return f"{truth['mean_mm']:.3f} mm, {truth['p95_mm']:.3f} mm"
 
 
 def _volume_error(surface: Surface) -> float:

@@ -326,10 +326,10 @@ class TestFaults:
         ]
         ready = tmp_path / "ready"
         program = (
-            "import sys, pathlib, signal, tomomesh.dynamics.mass_spring as d, tomomesh.cli as c\n"
+            "import sys, pathlib, signal, tomomesh.dynamics.moving_least_squares as d, tomomesh.cli as c\n"
             "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background jobs ignore it
             f"def slow(self, motion, count): pathlib.Path({str(ready)!r}).touch(); return False\n"
-            "d._NearestSteps.rested = slow\n"
+            "d._ProjectionSteps.rested = slow\n"
             f"sys.exit(c.main({line!r}))"
         )
         running = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.PIPE, env=os.environ)

@@ -47,6 +47,7 @@ ALWAYS = {
 """Parameters that matter on every way, or that choose what is read, the way, or what becomes of the mesh."""
 STUDY: dict[str, dict[str, Any]] = {
     "networks": {"way": "ring", "neurons": 24},
+    "nearest neurons": {"way": "ring", "neurons": 24, "attraction": "nearest"},
     "online": {
         "way": "ring",
         "neurons": 24,
@@ -165,7 +166,7 @@ class TestTruth:
 
     def test_what_has_an_effect_changes_the_mesh(self) -> None:
         before = vertices(STUDY["networks"], "gray")
-        for name in ("epochs", "radius", "even", "caps", "smoothing", "stiffness", "cell_mm"):
+        for name in ("epochs", "radius", "even", "caps", "smoothing", "step", "cell_mm"):
             assert name not in silent(STUDY["networks"], "gray")
             after = vertices(STUDY["networks"] | {name: OTHER[name]}, "gray")
             assert after.shape != before.shape or not np.array_equal(after, before), name

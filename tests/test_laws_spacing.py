@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from conftest import law, seeds
 from tomomesh.model.lattice import lattice
 from tomomesh.model.networks import Networks
-from tomomesh.model.points import CAP
 from tomomesh.model.volume import Volume
 from tomomesh.segmentation.sample import sample
 
@@ -57,28 +56,31 @@ def along(made: Stack) -> list[tuple[int, int]]:
 
 
 def to_next_slice(points: PointSet) -> list[float]:
-    """Return how far each point of a line is from the nearest of either slice beside it, or of a cap on its own."""
-    slices, kinds = points.slices.tolist(), points.kinds.tolist()
-    rows = list(zip(slices, kinds, points.positions.tolist(), strict=True))
-    used = sorted(set(slices))
+    """Return how far each point of a line is from the nearest of either slice beside it, or of what fills between."""
+    rows = list(zip(points.slices.tolist(), points.neurons.tolist(), points.positions.tolist(), strict=True))
+    used = sorted({at for at, neuron, _ in rows if neuron >= 0})
     pairs = {pair for low, high in pairwise(used) for pair in ((low, high), (high, low))}
     return [
-        min(math.dist(place, b) for there, other, b in rows if there == to or (there == here and other == CAP))
+        min(
+            math.dist(place, b)
+            for there, other, b in rows
+            if (other >= 0 and there == to) or (other < 0 and min(here, to) <= there <= max(here, to))
+        )
         for here, to in sorted(pairs)
-        for at, kind, place in rows
-        if at == here and kind != CAP
+        for at, neuron, place in rows
+        if at == here and neuron >= 0
     ]
 
 
 def to_nearest(points: PointSet) -> list[float]:
     """Return how far each neuron is from the one nearest to it."""
-    places = points.positions[points.kinds != CAP].tolist()
+    places = points.positions[points.neurons >= 0].tolist()
     return [min(math.dist(a, b) for m, b in enumerate(places) if m != n) for n, a in enumerate(places)]
 
 
 def cells(points: PointSet, edge: float) -> NDArray[np.int64]:
     """Return the cube of edge r of each neuron."""
-    return np.asarray(np.floor(points.positions[points.kinds != CAP] / edge * (1 - 1e-12)), np.int64)
+    return np.asarray(np.floor(points.positions[points.neurons >= 0] / edge * (1 - 1e-12)), np.int64)
 
 
 class TestAdjacent:

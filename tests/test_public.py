@@ -65,7 +65,7 @@ def test_what_is_no_study_is_refused() -> None:
 def test_a_picture_is_trained_as_its_slice_is() -> None:
     row, column = np.mgrid[:80, :80] - 39.5
     band = np.abs(np.hypot(row / 30, column / 25) - 1) < 0.1
-    settings = NetworkSettings(neurons=40, signal="region", even=False)
+    settings = NetworkSettings(neurons=40, signal="region", even=False, neighborhood="bubble")  # not unshrunk
     slices = train_study(band[None], settings)
     picture = train_region(pixels_of(band), settings)
     np.testing.assert_allclose(picture.codebook, slices.codebooks[0], atol=1e-9)

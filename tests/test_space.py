@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from skimage.measure import marching_cubes
 
+from conftest import law, seeds
 from studies import rotation
 from tomomesh import Volume, phantom, reconstruct, segment
 from tomomesh.cli import main
@@ -26,9 +27,8 @@ from tomomesh.model.icosphere import icosphere
 from tomomesh.model.lattice import lattice
 from tomomesh.model.mesh import TriMesh
 from tomomesh.model.networks import SpaceNetwork
-from tomomesh.segmentation.space import MOST, is_wall, pieces_of, train_space
+from tomomesh.segmentation.space import MOST, is_wall, pieces_of, train_space, untangled
 from tomomesh.settings import NetworkSettings
-from tomomesh.ways.space import _untangled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -184,10 +184,23 @@ class TestSurface:
         assert any("--signal boundary" in warning for warning in made.report["warnings"])
         assert any("of the volume of its window" in warning for warning in made.report["warnings"])
 
+    @law(20)
+    @given(seed=seeds, name=st.sampled_from(["sphere", "torus"]), noise=st.floats(0.1, 2.0))
+    def test_a_tangled_network_goes_back_to_where_it_passes_through_itself_nowhere(
+        self, seed: int, name: str, noise: float
+    ) -> None:
+        """Smoothing alone leaves some faces through others."""
+        graph, rng = lattice(name, 162), np.random.default_rng(seed)
+        shown = rng.normal(size=(500, 3)) * [9, 7, 5]
+        codebook = 8 * (graph.places + rng.normal(0, noise, graph.places.shape))
+        mesh, _ = untangled(SpaceNetwork(graph, codebook, True, 500, 0), shown)
+        assert not CrossingFaces(1)(mesh).any()
+        assert mesh.face_volumes.sum() > 0
+
     def test_faces_outward_from_a_mirrored_start(self) -> None:
         vertices, faces = icosphere(4)
         network = SpaceNetwork(replace(lattice("sphere", 162), faces=faces), -vertices, True, 162, 0)
-        mesh, moved = _untangled(network, 0)
+        mesh, moved = untangled(network, -vertices)
         assert moved == 0
         assert mesh.face_volumes.sum() == pytest.approx(trimesh.Trimesh(vertices, faces).volume)
 

@@ -41,13 +41,25 @@ def add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
     group.add_argument(
         *options,
         dest=name,
-        type=_numbers if one_or_three or listed else _whole_numbers if many else meta["kind"],
+        type=_numbers if one_or_three or listed else _whole_numbers if many else _kind(meta),
         nargs=several,
         choices=meta["choices"] or None,
         metavar=None if meta["choices"] else _metavar(name, meta),
         default=argparse.SUPPRESS,
         help=_help(entry),
     )
+
+
+def _kind(meta: Any) -> Any:
+    """Return what takes the text of one value; a word that a number may have in its place is left to the settings."""
+    if not meta["auto"]:
+        return meta["kind"]
+
+    def number(text: str) -> Any:
+        return text if text == "auto" else meta["kind"](text)
+
+    number.__name__ = meta["kind"].__name__
+    return number
 
 
 def _metavar(name: str, meta: Any) -> Any:

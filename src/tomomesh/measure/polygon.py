@@ -12,13 +12,34 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def lattice_inside(ring: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
-    """Return the points of a square lattice about the middle of a ring that lie inside it, (n, 2)."""
+def lattice_over(ring: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the columns x and the rows y of a square lattice about the middle of a ring, as far as it reaches."""
     low, high = ring.min(axis=0), ring.max(axis=0)
     half = ((high - low) // (2 * spacing)).astype(int)
     x, y = ((low[a] + high[a]) / 2 + spacing * np.arange(-half[a], half[a] + 1) for a in (0, 1))
-    lattice = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    return lattice[inside(ring, lattice)]
+    return x, y
+
+
+def inside_lattice(ring: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which places of a lattice lie inside a closed polygon (u, 2), (rows, columns).
+
+    Each side turns what is to the right of it over, in the rows that it crosses: cost grows with these, not with the
+    places.
+
+    Parameters
+    ----------
+    ring : (u, 2) float array
+    x, y : (columns,) and (rows,) float arrays
+        Rising.
+    """
+    onward = np.roll(ring, -1, axis=0)
+    first, last = (np.searchsorted(y, end(ring[:, 1], onward[:, 1])) for end in (np.minimum, np.maximum))
+    side = np.repeat(np.arange(len(ring)), last - first)
+    row = np.arange(len(side)) - np.repeat(np.cumsum(last - first) - last, last - first)
+    (ax, ay), (bx, by) = ring[side].T, onward[side].T
+    column = np.searchsorted(x, ax + (y[row] - ay) / (by - ay) * (bx - ax))
+    turned = np.bincount(row * (len(x) + 1) + column, minlength=len(y) * (len(x) + 1)).reshape(len(y), -1)
+    return np.asarray(np.cumsum(turned, axis=1)[:, :-1] % 2 == 1)
 
 
 def inside(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:

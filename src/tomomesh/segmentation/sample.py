@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from ..measure.polygon import area, distance, inside, lattice_inside, side_lengths
+from ..measure.polygon import area, distance, inside_lattice, lattice_over, side_lengths
 from ..model.points import BRIDGE, CAP, NEURON, RING, SIDE, TRACK, PointSet
 
 if TYPE_CHECKING:
@@ -87,10 +88,10 @@ def sample(
     is_ring = networks.lattice.name == "ring"
     adjacent = max(in_ring, _slice_step(networks, volume))
     spacing = adjacent if cell_from == "adjacent" else _to_nearest(points) or adjacent
-    if is_ring and caps:
-        points = points.joined(_caps(networks, volume, spacing))
+    fill = _caps(networks, volume, spacing) if is_ring and caps else _none(volume)
     if cell_from == "adjacent":
-        spacing = max(spacing, _across(points, bridge))
+        spacing = max(spacing, _across(points, fill, bridge))
+    points = points.joined(fill)
     pixel = volume.pixel_area_mm2
     areas = np.array([abs(area(ring)) for ring in networks.codebooks]) * pixel if is_ring else np.empty(0)
     return Sampling(
@@ -149,14 +150,18 @@ def _neurons(networks: Networks, volume: Volume) -> PointSet:
     return PointSet(positions, slices, numbers, np.full(len(slices), NEURON, np.uint8))
 
 
-def _place(indices: NDArray[np.float64], slices: NDArray[np.int32], volume: Volume) -> NDArray[np.float64]:
+def _place(indices: NDArray[np.float64], slices: NDArray[Any], volume: Volume) -> NDArray[np.float64]:
     return volume.to_mm(np.column_stack([indices, slices]))
 
 
-def _made(indices: NDArray[np.float64], slices: NDArray[np.int32], volume: Volume, kind: int) -> PointSet:
-    """Return points that are no neurons."""
-    none = np.full(len(slices), -1, np.int32)
-    return PointSet(_place(indices, slices, volume), slices, none, np.full(len(slices), kind, np.uint8))
+def _made(indices: NDArray[np.float64], heights: NDArray[Any], volume: Volume, kind: int) -> PointSet:
+    """Return points that are no neurons; each counts to the slice that is nearest to it."""
+    none, slices = np.full(len(heights), -1, np.int32), np.rint(heights).astype(np.int32)
+    return PointSet(_place(indices, heights, volume), slices, none, np.full(len(slices), kind, np.uint8))
+
+
+def _none(volume: Volume) -> PointSet:
+    return _made(np.empty((0, 2)), np.empty(0), volume, CAP)
 
 
 def _bridges(networks: Networks, volume: Volume) -> tuple[PointSet, float]:
@@ -194,52 +199,53 @@ def _to_nearest(points: PointSet) -> float:
     return float(distance.max())
 
 
-def _across(points: PointSet, limit: float) -> float:
-    """Return the widest gap from a ring to the next slice, or to a cap on its own slice where there is no next.
+def _across(points: PointSet, fill: PointSet, limit: float) -> float:
+    """Return the widest gap from a ring to the next slice, or to what fills the inside of either.
 
     Gaps over `limit` medians are left to the closing of the shell, as bridged edges are; 0 takes the widest.
     """
     order = np.argsort(points.slices, kind="stable")
     present, first = np.unique(points.slices[order], return_index=True)
-    groups = np.split(order, first[1:])
+    groups = np.split(points.positions[order], first[1:])
     gaps = []
     for (here, one), (there, other) in pairwise(zip(present, groups, strict=True)):
         if there - here <= REACH:
-            gaps += [_to_slice(points, one, other), _to_slice(points, other, one)]
+            near = fill.positions[(fill.slices >= here) & (fill.slices <= there)]
+            gaps += [_to_nearest_of(one, other, near), _to_nearest_of(other, one, near)]
     if not gaps:
         return 0.0
     widest = np.concatenate(gaps)
     return float(widest[widest <= limit * np.median(widest)].max(initial=0.0) if limit else widest.max())
 
 
-def _to_slice(points: PointSet, own: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the distance of each point of a ring to the nearest of another slice, or of a cap on its own."""
-    on_cap = points.kinds[own] == CAP
-    targets = np.concatenate([other, own[on_cap]])
-    apart = cdist(points.positions[own[~on_cap]], points.positions[targets])
-    return np.asarray(apart.min(axis=1, initial=np.inf))
+def _to_nearest_of(own: NDArray[np.float64], *others: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance of each point to the nearest of some others."""
+    return np.asarray(cdist(own, np.concatenate(others)).min(axis=1))
 
 
 def _caps(networks: Networks, volume: Volume, spacing: float) -> PointSet:
     """Fill what lies inside a ring but not inside the next ring above, or below, at the given spacing.
 
-    A ring is trusted to half a spacing, and a lattice meets it at half a spacing on average: so no point is set that
-    is outside of the next ring by less than a half, or nearer to its own than a quarter.
+    Where there is no next ring, the end is flat: a cap. Between two rings the surface rises from one to the other as
+    the distances from both say (Raya and Udupa 1990): a slant gets no steps, and counts as a gap that is bridged. A
+    ring is trusted to half a spacing, and a lattice meets it at half a spacing on average: so no point is set that is
+    outside of the next ring by less than a half, or nearer to its own than a quarter.
     """
     pixel = np.array(volume.spacing_mm[:2])
-    rings = networks.codebooks * pixel
-    found = []
+    rings, slices = networks.codebooks * pixel, networks.slices.astype(np.float64)
+    found = [_none(volume)]
     for n, ring in enumerate(rings):
-        lattice = lattice_inside(ring, spacing)
-        bare = np.zeros(len(lattice), bool)
-        for m in (n - 1, n + 1):
-            if 0 <= m < len(rings) and abs(networks.slices[m] - networks.slices[n]) <= REACH:
-                outside = ~inside(rings[m], lattice)
-                outside[outside] = distance(rings[m], lattice[outside]) > spacing / 2
-                bare |= outside
-            else:
-                bare |= True
-        bare[bare] = distance(ring, lattice[bare]) > spacing / 4
-        found.append(lattice[bare] / pixel)
-    slices = np.repeat(networks.slices, [len(f) for f in found])
-    return _made(np.concatenate(found), slices, volume, CAP)
+        x, y = lattice_over(ring, spacing)
+        own, lattice = inside_lattice(ring, x, y), np.stack(np.meshgrid(x, y), axis=-1)
+        beside = [m for m in (n - 1, n + 1) if 0 <= m < len(rings) and abs(slices[m] - slices[n]) <= REACH]
+        if len(beside) < 2:
+            flat = lattice[own]
+            flat = flat[distance(ring, flat) > spacing / 4]
+            found.append(_made(flat / pixel, np.full(len(flat), slices[n]), volume, CAP))
+        for m in beside:
+            bare = lattice[own & ~inside_lattice(rings[m], x, y)]
+            near, away = distance(ring, bare), distance(rings[m], bare)
+            far = (near > spacing / 4) & (away > spacing / 2)
+            height = slices[n] + (slices[m] - slices[n]) * near[far] / (near[far] + away[far])
+            found.append(_made(bare[far] / pixel, height, volume, BRIDGE))
+    return reduce(PointSet.joined, found)

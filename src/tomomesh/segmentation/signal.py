@@ -12,6 +12,8 @@ from ..som.starts import moments
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..isosurface.crossings import Levels
+
 SOLID = 0.4
 """Share of its ellipse that a window must fill to count as a solid, whose outline is taken.
 
@@ -19,6 +21,8 @@ An annulus of inner over outer radius q fills (1 - q^2) / (1 + q^2): measured, s
 heads 0.7 to 1.
 """
 
+STEPPED_ON = 8
+"""Slices at least on which the gray levels are looked at."""
 NARROW = 0.06
 """Width of the openings that the outside does not pass, over the square root of the window's area. Chosen: half of it
 changes the distance by +62.7 %, twice nothing."""
@@ -67,6 +71,61 @@ def outline(plane: NDArray[np.bool_]) -> NDArray[np.float64]:
     filled, _, margin = closed(plane)
     border = ndimage.binary_dilation(filled) & ~ndimage.binary_erosion(filled)
     return pixels_of(border) - margin
+
+
+def crossings_around(plane: NDArray[np.bool_], levels: Levels, k: int) -> NDArray[np.float64]:
+    """Return where the border of a filled window lies between its pixels, (n, 2) columns and rows.
+
+    As `outline`, below a pixel: between a pixel of the window and one that is not, where the gray levels cross a
+    bound; half way where an opening was closed, and at the edge of the image.
+
+    Parameters
+    ----------
+    plane : (J, I) bool array
+        Slice `k` of the window.
+    levels : Levels
+        The gray levels of the study.
+    k : int
+    """
+    filled, _, margin = closed(plane)
+    inner, steps = border_pairs(filled)
+    if len(inner) == 0:
+        return np.empty((0, 2))
+    inner = inner - margin
+    places = [np.column_stack([pixels, np.full(len(pixels), k)]).astype(np.int32) for pixels in (inner, inner + steps)]
+    inside, outside = (levels.inside(levels.at(one)) for one in places)
+    share = np.where(inside & ~outside, levels.crossed(*places), 0.5)
+    return np.asarray(inner + share[:, None] * steps)
+
+
+def is_stepped(mask: NDArray[np.bool_], levels: Levels) -> bool:
+    """Tell whether the gray levels at the border of a window are those of a mask, and so no finer than it."""
+    every = max(1, len(mask) // STEPPED_ON)
+    found = [(k, *border_pairs(np.pad(mask[k], 1))) for k in range(0, len(mask), every)]
+    inner = np.concatenate([np.column_stack([pixels - 1, np.full(len(pixels), k)]) for k, pixels, _ in found])
+    steps = np.concatenate([np.pad(step, ((0, 0), (0, 1))) for _, _, step in found])
+    return len(inner) > 0 and levels.stepped(inner.astype(np.int32), steps.astype(np.int32))
+
+
+def border_pairs(filled: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the pixels inside that have a neighbor outside, and the steps there, (n, 2) columns and rows twice.
+
+    Parameters
+    ----------
+    filled : (J, I) bool array
+        Nothing on its edge.
+    """
+    pairs = []
+    for axis, step in ((0, (0, 1)), (1, (1, 0))):
+        one, other = (np.take(filled, np.arange(a, filled.shape[axis] - 1 + a), axis) for a in (0, 1))
+        for inside, outside, sign in ((one, other, 1), (other, one, -1)):
+            row, column = np.nonzero(inside & ~outside)
+            shift = 0 if sign > 0 else 1
+            pairs.append((np.column_stack([column, row]) + shift * np.array(step), sign * np.array(step)))
+    return (
+        np.concatenate([pixels for pixels, _ in pairs]),
+        np.concatenate([np.broadcast_to(step, pixels.shape) for pixels, step in pairs]),
+    )
 
 
 def closed(plane: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_], int]:

@@ -9,10 +9,15 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from ..dynamics.low_pass import OneRing
+from ..dynamics.untangle import untangle
 from ..errors import EmptyError
+from ..measure.intersections import CrossingFaces
 from ..model.lattice import lattice
+from ..model.mesh import TriMesh
 from ..model.networks import SpaceNetwork
 from ..som.fit import fit
+from ..som.starts import start_positions
 from .signal import closed
 
 if TYPE_CHECKING:
@@ -96,3 +101,30 @@ def regions_in_space(
     _, winners = cKDTree(network.codebook).query(places, workers=threads or -1)
     labels[mask] = winners + 1
     return labels
+
+
+def untangled(network: SpaceNetwork, shown: NDArray[np.float64], threads: int = 0) -> tuple[TriMesh, int]:
+    """Return a network as a mesh that faces outward and does not pass through itself.
+
+    Where smoothing does not help, it goes back towards its start on the ellipsoid of what it was shown, where it lies
+    apart everywhere.
+
+    Parameters
+    ----------
+    network : SpaceNetwork
+        One with faces.
+    shown : (n, 3) float array
+    threads : int
+
+    Returns
+    -------
+    mesh : TriMesh
+    moved : int
+        Neurons that do not lie where the training had them.
+    """
+    mesh = TriMesh(network.codebook, network.lattice.faces)
+    ring = OneRing.of_edges(mesh.edges, len(mesh.vertices), threads)
+    start = start_positions(shown, network.lattice, "ellipse", np.random.default_rng(0))
+    mesh, moved, _ = untangle(mesh, start, ring, CrossingFaces(threads, single=True), start)
+    outward = mesh.face_volumes.sum() > 0
+    return mesh if outward else replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1])), moved

@@ -21,7 +21,7 @@ class FitSettings(Group):
     attraction: str = param(
         "auto",
         "what draws a vertex: the nearest point, or the surface that the points around it describe; "
-        "auto is the surface for clouds and the nearest point for networks",
+        "auto is the surface for clouds and rings, and the nearest point for other networks",
         choices=("auto", "nearest", "surface"),
         paper="nearest",
     )

@@ -78,8 +78,9 @@ class NetworkSettings(Group):
         paper="layers",
     )
     neurons: int | None = param(
-        None, "neurons a slice, by default 58; of a network in space 2562", kind=int, low=3, high=4_096
-    )
+        None, "neurons a slice; auto is what the length and the curvature of the outlines want for a ring in batch, "
+        "58 for others, and 2562 in space", kind=int, low=3, high=4_096, auto=True,
+    )  # fmt: skip
     training: str = param(
         "batch", "one presentation at a time, or all at once", choices=("online", "batch"), paper="online"
     )
@@ -165,6 +166,11 @@ class NetworkSettings(Group):
     def topology(self) -> str:
         """The network that is trained: as asked, or a ring in each slice, or a sphere in space."""
         return ("sphere" if self.in_space else "ring") if self.network == "auto" else self.network
+
+    @property
+    def neurons_follow(self) -> bool:
+        """Whether the number of neurons follows from the outlines; online, a ring's noise looks like curvature."""
+        return self.neurons is None and self.topology == "ring" and self.training == "batch"
 
     @property
     def neuron_count(self) -> int:

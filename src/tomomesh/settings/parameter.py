@@ -31,11 +31,12 @@ def param(
     length: tuple[int, ...] = (),
     paper: Any = UNSET,
     metavar: tuple[str, ...] = (),
+    auto: bool = False,
 ) -> Any:
     """Declare a parameter: ``low <= value <= high`` and ``value > above``; `length` where it takes several.
 
     `kind` is the type of one value; it follows from the default, except where that is None or a tuple. `metavar`
-    names each of several values.
+    names each of several values. With `auto`, the word may be said for a number that is not set.
     """
     kind = kind or (float if default is None or isinstance(default, tuple) else type(default))
     meta = {
@@ -49,6 +50,7 @@ def param(
         "length": length,
         "paper": paper,
         "metavar": metavar,
+        "auto": auto,
     }
     return field(default=default, metadata=meta)
 
@@ -62,6 +64,7 @@ class Group:
             value = getattr(self, entry.name)
             plain = value.tolist() if hasattr(value, "tolist") else value
             value = tuple(plain) if isinstance(plain, list) else plain
+            value = None if entry.metadata["auto"] and value == "auto" else value
             object.__setattr__(self, entry.name, value)
             if value is not None or entry.default is not None:
                 _check(entry, value)

@@ -38,6 +38,7 @@ def _parameter(entry: Field[Any]) -> dict[str, Any]:
     notes |= {"paper": meta["paper"]} if meta["paper"] is not UNSET else {}
     allowed = [_value(meta)] if 1 in (meta["length"] or (1,)) else []
     allowed += [_array(meta)] if meta["length"] else []
+    allowed += [{"enum": ["auto"]}] if meta["auto"] else []
     allowed += [{"type": "null"}] if default is None else []
     return notes | (allowed[0] if len(allowed) == 1 else {"anyOf": allowed})
 

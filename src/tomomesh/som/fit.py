@@ -49,11 +49,14 @@ class Fitted:
     kept : (n,) bool array
         False for inputs without weight, and for stray ones that the trimmed re-fit dropped.
     history : History
+    radius : float
+        The last of the training, hops.
     """
 
     codebook: NDArray[np.float64]
     kept: NDArray[np.bool_]
     history: History
+    radius: float
 
 
 def fit(
@@ -127,7 +130,7 @@ def fit(
     if weights is not None:
         kept = np.asarray(weights) > 0
         kept[kept] = near
-    return Fitted(np.ascontiguousarray(codebook[: shown.axes].T), kept, history)
+    return Fitted(np.ascontiguousarray(codebook[: shown.axes].T), kept, history, last)
 
 
 def shape_of(settings: NetworkSettings) -> int:

@@ -11,10 +11,13 @@ from ..cuberille.leak_test import CLOSINGS, close_leaks
 from ..cuberille.partition import is_flat, partition
 from ..dynamics.collapse import without_collapse
 from ..dynamics.low_pass import OneRing, low_pass
-from ..dynamics.mass_spring import Fit, fit
+from ..dynamics.mass_spring import fit
+from ..dynamics.moving_least_squares import fit_to_surface
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError
 from ..measure.intersections import CrossingFaces
+from ..model.columns import any_of
+from ..model.mesh import TriMesh
 from ..results import LEAST, Enclosed, Surface
 from ..stage import Stage, folded, measured, timed
 from .sections import LEAKY_SHELL, count_walls, fit_found, hollow, shell_found, walls_found
@@ -24,8 +27,10 @@ if TYPE_CHECKING:
 
     from ..cuberille.leak_test import LeakTest
     from ..model.cubes import CubeGrid
-    from ..model.mesh import QuadMesh, TriMesh
+    from ..model.mesh import QuadMesh
     from ..model.points import PointSet
+    from ..model.trace import Trace
+    from ..pointcloud.samples import Samples
     from ..progress import Progress
     from ..settings import Settings
 
@@ -71,18 +76,40 @@ ANYTHING = Inside()
 
 
 @dataclass(frozen=True)
-class Rest:
-    """A mesh at rest, its faces that pass through others, and the point that draws each vertex."""
+class Drawn:
+    """A mesh that was drawn to something.
 
-    fit: Fit
+    Attributes
+    ----------
+    mesh : TriMesh
+    trace : Trace or None
+        None where it was left as it is.
+    nearest : (n,) int32 array
+        The point that draws each vertex; empty where a surface does.
+    filled : (m,) bool array or None
+        Faces where there are no samples of that surface.
+    """
+
+    mesh: TriMesh
+    trace: Trace | None
+    nearest: NDArray[np.int32]
+    filled: NDArray[np.bool_] | None = None
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A mesh at rest, and its faces that pass through others."""
+
+    drawn: Drawn
     mesh: TriMesh
     crossing: NDArray[np.bool_]
 
 
 def surface_on_cubes(
-    points: PointSet, spacing: float, settings: Settings, progress: Progress, asked: Inside = ANYTHING
-) -> Stage[Surface]:
-    """Turn points into a closed surface that rests on them.
+    points: PointSet, spacing: float, settings: Settings, progress: Progress, asked: Inside = ANYTHING,
+    samples: Samples | None = None,
+) -> Stage[Surface]:  # fmt: skip
+    """Turn points into a closed surface that rests on them, or on what lies under them.
 
     Parameters
     ----------
@@ -93,6 +120,8 @@ def surface_on_cubes(
     progress : callable
     asked : Inside
         What is known of the inside.
+    samples : Samples, optional
+        Of the surface under the points, which draws the mesh in place of the nearest of them.
 
     Raises
     ------
@@ -106,15 +135,16 @@ def surface_on_cubes(
     smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.smoothing)
     grid, taken = shell.value.grid, shell.value.taken
     encloses = asked.or_more(hollow(shell.value.leak_test, taken, len(grid.keys), grid.cell_mm))
-    drawn = tracked.value, smoothed.value, points.positions, settings, progress
+    drawn = tracked.value, smoothed.value, points.positions, samples, settings, progress
     # a study's millimeters fit 32 bits, in which most meshes are kept; a cloud may lie anywhere
     tangled = CrossingFaces(settings.run.threads, single=asked.mask is not None)
     rest = _fit(*drawn, tangled, still=walls.value == 2)
     if settings.cubes.allow_leaks and walls.value == 1 and encloses.share(rest.value.mesh) < LEAST:
         walls = walls_found(2, LEAKY_SHELL)  # found out by the fit alone: it goes back to where it began
         rest = _fit(*drawn, tangled, still=True)
+    fitted = rest.value.drawn
     made = Surface(
-        points, cuberille, smoothed.value, rest.value.mesh, rest.value.fit.nearest, cubes, rest.value.fit.trace,
+        points, cuberille, smoothed.value, rest.value.mesh, fitted.nearest, cubes, fitted.trace, fitted.filled,
         cavities=int((shell.value.leak_test.faces.inward & taken).sum()), crossing=rest.value.crossing,
         encloses=encloses if walls.value == 1 else None,
     )  # fmt: skip
@@ -172,19 +202,47 @@ def _smoothed(cuberille: QuadMesh, passes: int) -> TriMesh:
 
 @timed("fit")
 def _fit(
-    tracked: Tracked, smoothed: TriMesh, positions: Floats, settings: Settings, progress: Progress,
-    tangled: CrossingFaces, *, still: bool,
+    tracked: Tracked, smoothed: TriMesh, positions: Floats, samples: Samples | None, settings: Settings,
+    progress: Progress, tangled: CrossingFaces, *, still: bool,
 ) -> Stage[Rest]:  # fmt: skip
-    """Draw the mesh to the points, unless it is to stay as it is."""
-    (cubes, cuberille, origins), threads = tracked, settings.run.threads
+    """Draw the mesh to the points or to the surface under them, unless it is to stay as it is."""
+    cuberille = tracked[1]
+    ring = OneRing.of_quads(cuberille.quads.astype(np.int32), len(smoothed.vertices), settings.run.threads)
+    if samples is None or still:
+        drawn = _to_points(tracked, smoothed, positions, settings, progress, still=still)
+    else:
+        drawn = _to_surface(tracked, smoothed, samples, ring, settings, progress)
+    mesh, collapsed = without_collapse(replace(drawn.mesh, vertices=smoothed.vertices), drawn.mesh)
+    mesh, taken_back, crossing = untangle(mesh, smoothed.vertices, ring, tangled, cuberille.vertices)
+    trace = None if still else drawn.trace
+    told = fit_found(
+        trace, len(mesh.vertices), collapsed=collapsed, taken_back=taken_back, filled=drawn.filled
+    )  # fmt: skip
+    return folded(Rest(drawn, mesh, crossing), told)
+
+
+def _to_points(
+    tracked: Tracked, smoothed: TriMesh, positions: Floats, settings: Settings, progress: Progress, *, still: bool
+) -> Drawn:
+    """Draw each vertex to the point that is nearest to it (the paper's attraction)."""
+    cubes, cuberille, origins = tracked
     asked = replace(settings.fit, max_steps=0) if still else settings.fit
     springs = cuberille.edges if settings.fit.springs == "quads" else smoothed.edges
     rest = fit(
         smoothed.vertices, springs, origins, positions, cubes, asked,
-        threads=threads, progress=progress,
+        threads=settings.run.threads, progress=progress,
     )  # fmt: skip
-    mesh, collapsed = without_collapse(smoothed, smoothed.moved(rest.vertices))
-    ring = OneRing.of_quads(cuberille.quads.astype(np.int32), len(mesh.vertices), threads)
-    mesh, taken_back, crossing = untangle(mesh, smoothed.vertices, ring, tangled, cuberille.vertices)
-    told = fit_found(None if still else rest.trace, len(mesh.vertices), collapsed=collapsed, taken_back=taken_back)
-    return folded(Rest(rest, mesh, crossing), told)
+    return Drawn(smoothed.moved(rest.vertices), rest.trace, rest.nearest)
+
+
+def _to_surface(
+    tracked: Tracked, smoothed: TriMesh, samples: Samples, ring: OneRing, settings: Settings, progress: Progress
+) -> Drawn:
+    """Draw each vertex to the surface under the points; positions count from the grid's origin."""
+    cubes, origin = tracked[0], tracked[0].origin
+    rest = fit_to_surface(
+        smoothed.vertices - origin, ring, replace(samples, positions=samples.positions - origin),
+        float(cubes.cell_mm.min()), settings.fit, threads=settings.run.threads, progress=progress,
+    )  # fmt: skip
+    mesh = TriMesh(rest.vertices + origin, rest.faces)
+    return Drawn(mesh, rest.trace, np.empty(0, np.int32), any_of(rest.filled[rest.faces]))

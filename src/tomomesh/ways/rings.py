@@ -1,20 +1,22 @@
-"""One network a slice (the paper's way): networks -> regions -> points -> cubes -> mesh."""
+"""One ring a slice: networks -> regions -> points -> cubes -> mesh that rests on the surface under the rings."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..isosurface.crossings import Levels
 from ..measure.rings import assess_contours
 from ..results import Enclosed, Segmentation
 from ..segmentation.contours.inputs import share_of_holes, slices_with_several
 from ..segmentation.sample import sample
 from ..segmentation.training import regions, train_study
+from ..segmentation.under_rings import surface_under
 from ..segmentation.window import by_layer
 from ..som.schedules import schedule_warning
 from ..stage import Stage, folded, measured
 from .cubes import Inside, surface_on_cubes
 from .sections import body_of_cubes, missed, networks_on_slices, sampling_found
-from .way import CUBES, POINTS, SPRINGS, TRAINING, Way, parameters
+from .way import CUBES, POINTS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 CROWDED = 0.25
 """Share of the slices with several components side by side over which one network a slice is warned of. A warning's
 threshold, chosen: no mesh depends on it."""
+BETWEEN = ("bridge", "even", "caps", "cell_from", "tracking")
+"""What is read, besides, of networks whose points are laid in cubes."""
 HOLES = 0.15
 """Area of the holes in the slices over that of the window from which an outline that fills them is warned of. A
 warning's threshold, chosen: no mesh depends on it."""
@@ -39,7 +43,8 @@ def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> 
     study, mask, run = kept.study, kept.mask, settings.run
     trained = measured(
         "networks", train_study, mask, settings.network, layers=_layers(kept, settings),
-        pixel_mm=study.spacing_mm[:2], seed=run.seed, threads=run.threads, progress=progress,
+        levels=levels_of(kept, settings), pixel_mm=study.spacing_mm[:2], seed=run.seed, threads=run.threads,
+        progress=progress,
     )  # fmt: skip
     labels = measured("regions", regions, mask, trained.value, pixel_mm=study.spacing_mm[:2], threads=run.threads)
     placed = measured(
@@ -54,10 +59,23 @@ def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> 
 
 
 def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress: Progress) -> Stage[Surface]:
-    """Turn the neurons of all slices into a closed surface."""
-    sampling, window = found.sampling, Enclosed.window(found)
-    inside = Inside(sampling.volume_mm3, window.volume, found.mask)
-    return surface_on_cubes(found.points, sampling.spacing_mm, settings, progress, inside)
+    """Turn the rings of all slices into a closed surface."""
+    under = measured("points", surface_under, found.source, found.sampling, found.volume)
+    made = surface_on_cubes(
+        found.points, found.sampling.spacing_mm, settings, progress, inside_of(found), under.value
+    )  # fmt: skip
+    return folded(made.value, under, made)
+
+
+def inside_of(found: Segmentation[Networks]) -> Inside:
+    """Tell what is known of the inside of networks."""
+    return Inside(found.sampling.volume_mm3, Enclosed.window(found).volume, found.mask)
+
+
+def levels_of(kept: Selected, settings: Settings) -> Levels:
+    """Return the gray levels of a study, with the window on them."""
+    chosen = kept.chosen
+    return Levels(chosen.volume.voxels, chosen.lower, chosen.upper, settings.window.layers)
 
 
 def _layers(kept: Selected, settings: Settings) -> NDArray[np.bool_] | None:
@@ -103,7 +121,8 @@ def _overlooked(networks: Networks, kept: Selected, settings: Settings) -> list[
     return warnings
 
 
-def _of_networks(report: dict[str, Any]) -> list[str]:
+def of_networks(report: dict[str, Any]) -> list[str]:
+    """Say what was trained."""
     networks = report["networks"]
     return [
         f"networks  {networks['trained']} {networks['topology']}s of {networks['neurons']} neurons on the window's "
@@ -112,12 +131,14 @@ def _of_networks(report: dict[str, Any]) -> list[str]:
 
 
 WAY = Way(
-    applies=lambda settings, input: input not in POINTS,
-    because=lambda settings, input: "on networks of slices",
-    reads=TRAINING | CUBES | SPRINGS | parameters("bridge", "even", "caps", "cell_from", "tracking"),
+    applies=lambda settings, input: (
+        input not in POINTS and settings.network.topology == "ring" and settings.fit.attraction != "nearest"
+    ),
+    because=lambda settings, input: "on a ring in each slice",
+    reads=TRAINING | CUBES | parameters(*BETWEEN, "attraction", "damping", "step"),
     segment=segment_by_rings,
     surface=surface_by_rings,
-    of_networks=_of_networks,
+    of_networks=of_networks,
     of_body=body_of_cubes,
     pictures=networks_on_slices,
 )

@@ -23,7 +23,7 @@ from ..model.points import PointSet
 from ..pointcloud.samples import settle_points
 from ..results import Enclosed, Segmentation, Surface
 from ..segmentation.sample import Sampling
-from ..segmentation.space import is_wall, pieces_of, regions_in_space, train_space
+from ..segmentation.space import is_wall, pieces_of, regions_in_space, train_space, untangled
 from ..settings import SURFACES
 from ..stage import Stage, folded, measured, timed
 from .sections import fit_found, points_found
@@ -40,15 +40,13 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-NOTHING = np.empty(0)
 REACH = 1.5
 """Most that a vertex moves in a step of the fit, sides of the finer mesh. Chosen: half of it changes the distance by
 +0.0 %, twice by +0.1 %."""
 FLAT = 1e-9
 """Least volume, in its area to the power of 1.5: a ball has .09, and what lies flat has rounding errors alone."""
 LEFT_OUT = 0.01
-"""Share of the window in small pieces over which a network in space is warned of. A warning's threshold, chosen: no
-mesh depends on it."""
+"""Share of the window in small pieces over which a network in space is warned of. Chosen: no mesh depends on it."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +162,7 @@ def _sampled(network: SpaceNetwork) -> Sampling:
     points = replace(
         PointSet.from_positions(network.codebook), neurons=np.arange(len(network.codebook), dtype=np.int32)
     )
-    return Sampling(points, spacing, 0, NOTHING, NOTHING)
+    return Sampling(points, spacing, 0, np.empty(0), np.empty(0))
 
 
 @dataclass(frozen=True)
@@ -179,12 +177,14 @@ class _Rest:
 def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Make a network's own faces a closed surface that rests on the boundary of the window."""
     threads = settings.run.threads
-    apart = measured("untangle", _untangled, found.source.network, threads)
+    apart = measured("untangle", untangled, found.source.network, found.source.places, threads)
     faces = _divide(*apart.value)
     rough = faces.value
     ring = OneRing.of_quads(rough.quads.astype(np.int32), len(rough.vertices), threads)
     rest = measured("fit", _fitted, rough, ring, found.source, settings, progress)
-    mesh = measured("untangle", untangle, rest.value.mesh, rough.vertices, ring, CrossingFaces(threads, single=True))
+    mesh = measured(
+        "untangle", untangle, rest.value.mesh, rough.vertices, ring, CrossingFaces(threads, single=True), rough.vertices
+    )  # fmt: skip
     made, taken_back, crossing = mesh.value
     _require_volume(made, len(found.source.network.lattice))
     surface = Surface(
@@ -218,15 +218,6 @@ def _divide(network: TriMesh, moved: int) -> Stage[QuadMesh]:
         },
     }  # fmt: skip
     return Stage(rough, stats)
-
-
-def _untangled(network: SpaceNetwork, threads: int) -> tuple[TriMesh, int]:
-    """Return a network as a mesh that faces outward and does not pass through itself, if smoothing can help it."""
-    mesh = TriMesh(network.codebook, network.lattice.faces)
-    ring = OneRing.of_edges(mesh.edges, len(mesh.vertices), threads)
-    mesh, moved, _ = untangle(mesh, mesh.vertices, ring, CrossingFaces(threads, single=True))
-    outward = mesh.face_volumes.sum() > 0
-    return mesh if outward else replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1])), moved
 
 
 def _fitted(rough: QuadMesh, ring: OneRing, found: SpaceFound, settings: Settings, progress: Progress) -> _Rest:

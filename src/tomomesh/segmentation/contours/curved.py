@@ -73,15 +73,16 @@ def unshrunk(
     return ring
 
 
-def evened(ring: Floats, gaps: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.bool_]]:
+def evened(ring: Floats, gaps: NDArray[np.bool_], count: int | None = None) -> tuple[Floats, NDArray[np.bool_]]:
     """Slide the neurons of a ring along its curve until they are equally far apart; see `tomomesh.som.even_spacing`.
 
-    Along the curve, and not along the sides as there: few neurons would cut off its bends.
+    Along the curve, and not along the sides as there: few neurons would cut off its bends. It gets `count` neurons, as
+    many as it has where not given.
     """
-    fine = finely(ring)
+    fine, count = finely(ring), len(ring) if count is None else count
     if not gaps.any():
         line = fine.reshape(-1, 2)
-        return evenly(np.concatenate([line, line[:1]]), len(ring) + 1)[:-1], gaps
+        return evenly(np.concatenate([line, line[:1]]), count + 1)[:-1], np.zeros(count, bool)
     shift = int(np.flatnonzero(gaps)[-1]) + 1
     fine, wide = np.roll(fine, -shift, axis=0), np.roll(gaps, -shift)
     ends = np.flatnonzero(wide)
@@ -89,5 +90,6 @@ def evened(ring: Floats, gaps: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.bo
     arcs = [np.concatenate([fine[a:b].reshape(-1, 2), fine[b, :1]]) for a, b in zip(starts, ends, strict=True)]
     if sum(along(arc)[-1] for arc in arcs) == 0:
         return ring, gaps
-    turned, inner = even_arcs(arcs, len(ring))
+    turned, inner = even_arcs(arcs, count)
+    shift = round(shift * count / len(ring))
     return np.roll(turned, shift, axis=0), np.roll(np.append(inner, True), shift)
