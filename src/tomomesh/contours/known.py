@@ -9,8 +9,9 @@ import numpy as np
 
 from ..measure.polygon import area, side_lengths
 from ..model.points import NEURON, RING, SIDE
+from .direction import FEWEST, axes_across, common_normal
 from .rings import holes
-from .slices import FEWEST, PARTED, Slices, axes_across, common_normal
+from .slices import PARTED, Slices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,7 +45,7 @@ def known_slices(points: PointSet) -> Slices | None:
         return None
     rings = [points.positions[one] for one in grouped]
     origin = np.mean([corner for one in rings for corner in (one.min(axis=0), one.max(axis=0))], axis=0)
-    labels = np.where(neuron, np.searchsorted(numbers, points.slices), -1).astype(np.int32)
+    labels = np.where(neuron, np.searchsorted(numbers, points.slices), -1).astype(np.int64)
     local = points.positions - origin
     normal = common_normal(local[order], labels[order], rings[-1].mean(axis=0) - rings[0].mean(axis=0))
     height = local[order] @ normal
@@ -54,7 +55,8 @@ def known_slices(points: PointSet) -> Slices | None:
         return None
     sides = np.concatenate([side_lengths(one) for one in rings])
     spacing = min(float(np.median(sides)), float(np.median(gaps)))
-    found = Slices(origin, axes_across(normal), heights, labels, spacing)
+    groups = np.zeros(len(heights), np.int64)
+    found = Slices(origin, axes_across(normal), heights, groups, labels, spacing, complete=True)
     return replace(found, rings=_oriented(points, grouped, found))
 
 

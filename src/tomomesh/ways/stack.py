@@ -61,7 +61,7 @@ def surface_of_slices(
     made = closed.value
     surface = Surface(
         cloud, made.boundary.cuberille, made.rest.smoothed, made.mesh, made.rest.nearest, filled=made.filled,
-        cavities=made.boundary.cavities, encloses=encloses or Enclosed("slices", made.encloses),
+        cavities=made.boundary.cavities, encloses=encloses or Enclosed("slices", made.stack.frusta),
     )  # fmt: skip
     spaced = points_found(cloud, slices.spacing, unit=unit, bridged=bridged)
     return folded(
@@ -75,13 +75,14 @@ def surface_of_slices(
 
 def _stack_found(made: ContourSurface, slices: Slices, *, of_study: bool) -> Stage[None]:
     """Tell of the slices, and the voxels between them."""
-    widest = float(np.diff(slices.heights).max())
+    gaps = made.stack.gaps
+    step, widest = made.stack.step, max((float(one.max()) for one in gaps.values()), default=made.stack.step)
     stats: dict[str, dict[str, Any]] = {
         "stack": {
             "slices": made.slices,
             "contours": made.contours,
             "open": made.open,
-            "slice_distance_mm": slices.distance,
+            "slice_distance_mm": step,
             "widest_slice_distance_mm": widest,
             "longest_gap": made.reach,
             "voxel_mm": made.edge,
@@ -90,8 +91,8 @@ def _stack_found(made: ContourSurface, slices: Slices, *, of_study: bool) -> Sta
         "fit": {"filled_faces": int(made.filled.sum())},
     }
     warnings = []
-    if not of_study and widest > APART * slices.distance:
-        warnings.append(f"slices lie up to {widest:.4g} apart, {slices.distance:.4g} as a rule: that is interpolated")
+    if not of_study and widest > APART * step:
+        warnings.append(f"slices lie up to {widest:.4g} apart, {step:.4g} as a rule: that is interpolated")
     if made.edge > made.asked_edge:
         warnings.append(f"voxels of {made.asked_edge:.4g} would not fit: they are {made.edge:.4g} wide")
     return Stage(None, stats, tuple(warnings))
