@@ -14,10 +14,11 @@ from conftest import sphere, torus
 from studies import shared
 from tomomesh.contours.curves import fine_curve, moments_of
 from tomomesh.contours.known import known_slices
+from tomomesh.contours.parts import Part
 from tomomesh.contours.rings import outline
 from tomomesh.contours.slices import find_slices
 from tomomesh.contours.stack import ContourSurface, contour_surface
-from tomomesh.contours.tracks import Part, link_parts
+from tomomesh.contours.tracks import link_parts
 from tomomesh.errors import EmptyError, GeometryError
 from tomomesh.measure.intersections import self_intersections
 from tomomesh.measure.topology import check_promise, topology

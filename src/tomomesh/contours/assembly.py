@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .tracks import Link, Part
+    from .parts import Part
+    from .tracks import Link
 
     Floats = NDArray[np.float64]
     Key = tuple[int, ...]
@@ -57,6 +58,11 @@ class Stack:
         graph = coo_array((np.ones(len(one)), (one, other)), shape=(len(self.parts),) * 2)
         return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
+    @property
+    def alone(self) -> list[Part]:
+        """The parts that are a body by themselves."""
+        return [part for part, count in zip(self.parts, np.bincount(self.body)[self.body], strict=True) if count == 1]
+
     @cached_property
     def before(self) -> dict[Key, Key]:
         """The parts that go on as those of a key."""
@@ -73,7 +79,7 @@ class Stack:
 
     def mean(self, key: Key) -> Floats:
         """Return the center (x, y) and the height of some parts, by their areas; (3,)."""
-        places = np.array([[*self.parts[n].moments.center, self.parts[n].height] for n in key])
+        places = np.array([self.parts[n].place for n in key])
         areas = np.array([self.parts[n].moments.area for n in key])
         return np.asarray((areas[:, None] * places).sum(axis=0) / areas.sum())
 

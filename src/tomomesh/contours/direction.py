@@ -100,4 +100,4 @@ def common_normal(local: Floats, labels: NDArray[np.int64], normal: Floats) -> F
     means = np.stack([np.bincount(label, column) for column in taken.T], axis=1) / np.bincount(label)[:, None]
     centered = taken - means[label]
     fitted = np.linalg.eigh(centered.T @ centered)[1][:, 0]
-    return np.asarray(fitted * np.sign(fitted @ normal))
+    return np.asarray(fitted * np.copysign(1.0, fitted @ normal))

@@ -19,7 +19,7 @@ STEEPEST = 1e3
 
 @dataclass(frozen=True)
 class Ending:
-    """The end of a part: of its squared thickness  1 - fall t - bend t^2 - rest t^power  is left, the sum of all three 1.
+    """The end of a part: of its squared thickness  1 - fall t - bend t^2 - rest t^power  is left, nothing at t = 1.
 
     Attributes
     ----------

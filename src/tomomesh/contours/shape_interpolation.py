@@ -123,12 +123,16 @@ class _Span:
 
     def __init__(self, stack: Stack, shapes: dict[Key, Shape], link: Link, height: Floats) -> None:
         self.stack, self.shapes, self.link, self.height = stack, shapes, link, height / stack.edge
-        low, high = (shapes[key].height if key else None for key in (link.below, link.above))
-        if low is None or high is None:
-            self.end, self.aside = stack.ending(link.below or link.above, upward=high is None)
-            beyond = self.end.reach / stack.edge + MARGIN
-            low, high = (low, low + beyond) if low is not None else (high - beyond, high)
-        self.layers = range(*np.searchsorted(self.height, [low, high], side="right").tolist())
+        self.layers = range(*np.searchsorted(self.height, self._reach(), side="right").tolist())
+
+    def _reach(self) -> tuple[float, float]:
+        """Return where it begins and ends, in voxels."""
+        below, above = self.link.below, self.link.above
+        if below and above:
+            return self.shapes[below].height, self.shapes[above].height
+        self.end, self.aside = self.stack.ending(below or above, upward=not above)
+        here, beyond = self.shapes[below or above].height, self.end.reach / self.stack.edge + MARGIN
+        return (here, here + beyond) if below else (here - beyond, here)
 
     def fill(self, volume: Values) -> None:
         """Add the inside along the link to the layers of voxels."""

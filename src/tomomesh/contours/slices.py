@@ -127,13 +127,13 @@ def find_slices(positions: Floats) -> Slices | None:
 def _joined(local: Floats, normal: Floats, spacing: float) -> tuple[NDArray[np.int64], float]:
     """Join points with near neighbors of their own height; return the contour of each, and the sampling distance."""
     height = local @ normal
-    away, near = cKDTree(local).query(local, k=min(NEIGHBORS + 1, len(local)))
+    away, near = map(np.asarray, cKDTree(local).query(local, k=min(NEIGHBORS + 1, len(local))))
     reach = away[:, 2]
     one = np.broadcast_to(np.arange(len(local))[:, None], near.shape)
     level = np.abs(height[near] - height[one]) <= PARTED * np.maximum(reach[near], reach[one]).clip(max=spacing)
     linked = level & (away <= LINKED * np.maximum(reach[near], reach[one]))
     ends = one[linked], near[linked]
-    links = coo_array((np.ones(len(ends[0]), np.bool_), ends), shape=(len(local),) * 2)
+    links = coo_array((np.ones(len(ends[0])), ends), shape=(len(local),) * 2)
     return connected_components(links, directed=False)[1].astype(np.int64), float(np.median(reach))
 
 
@@ -147,7 +147,7 @@ def _planes(
     np.maximum.at(high, contour, placed[:, :2])
     height = np.bincount(contour, placed[:, 2]) / count
     column = columns_of(low, high)
-    plane = planes_within(height, column)
+    plane = planes_within(height, column, (high - low).max(axis=1))
     full = np.bincount(plane, count) >= FEWEST
     labels = np.where(full, np.cumsum(full) - 1, -1)[plane][contour]
     group = np.zeros(len(full), np.int64)

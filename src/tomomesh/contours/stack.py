@@ -18,10 +18,11 @@ from ..progress import Progress, silent
 from ..settings import FitSettings
 from .assembly import Stack
 from .curves import DENSE, fine_curve
-from .levels import typical_gap
+from .levels import slices_at, typical_gap
+from .parts import Part
 from .rings import Outline, nested, outline
 from .shape_interpolation import filled_between
-from .tracks import Part, link_parts
+from .tracks import link_parts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,9 +45,6 @@ half of it changes the distance by +3.3 %, twice by -0.5 %."""
 MEASURED = 0.75
 """Faces farther than this from every point, in slice distances, are filled rather than measured. Chosen: half and twice
 of it change no case of benchmarks/constants.py."""
-
-SAME_HEIGHT = 0.05
-"""Heights nearer than this share of the slices' distance count as one in the report."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +146,7 @@ def contour_surface(
     measured = _along(stack, slices) if slices.rings else points
     away, _ = cKDTree(measured).query(centers, distance_upper_bound=MEASURED * stack.step)
     return ContourSurface(
-        edges, rest, np.isinf(away), stack, _levels(slices.heights, stack.step), sum(len(outlined.rings) for outlined in found),
+        edges, rest, np.isinf(away), stack, slices_at(slices.heights), sum(len(outlined.rings) for outlined in found),
         sum(len(outlined.open) for outlined in found), max(outlined.reach for outlined in found), asked, levels.size,
     )  # fmt: skip
 
@@ -168,11 +166,6 @@ def _drawn(
 
     in_blocks(work, len(drawn), block=1, threads=threads, done=lambda n: progress("contours", n, len(drawn)))
     return drawn, found
-
-
-def _levels(heights: Floats, step: float) -> int:
-    """Count the heights of planes; those of several groups may be the same."""
-    return 1 + int((np.diff(np.sort(heights)) > SAME_HEIGHT * step).sum())
 
 
 def _require_any(inside: NDArray[np.bool_], edge: float) -> None:

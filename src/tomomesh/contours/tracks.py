@@ -10,24 +10,20 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..measure.matching import SHARED, matched, similar
-from ..measure.polygon import side_lengths
-from .curves import mask_of, moments_of
+from .parts import shared_area
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from .curves import Moments
+    from .parts import Part
 
     Floats = NDArray[np.float64]
 
 STEEP = 2.0
 """Farthest that a part moves sideways to the next slice, in distances of the slices, where the two do not overlap.
 Chosen: half and twice of it change no case of benchmarks/constants.py."""
-COARSE = 48
-"""Pixels across two parts on which overlaps are counted, at most. Chosen: half and twice of it change no case of
-benchmarks/constants.py."""
 NEXT, MISSING = 1.5, 4.5
 """Distances of slices within which a part goes on in any case, and within which it may go on over slices that are
 missing: three at most. Chosen: with half of the first slices that jitter by a quarter part, with twice of it two
@@ -40,58 +36,11 @@ NOT, WITHIN, OVER = 0, 1, 2
 
 
 @dataclass(frozen=True)
-class Part:
-    """A connected part of a slice's inside.
-
-    Attributes
-    ----------
-    curves : sequence of (u, 2) float arrays
-        Its outer curve and its holes, the inside on the left.
-    moments : Moments
-    low, high : (2,) float arrays
-        Its box.
-    height : float
-        Its own, which need not be quite that of its plane.
-    plane : int
-    """
-
-    curves: Sequence[Floats]
-    moments: Moments
-    low: Floats
-    high: Floats
-    height: float = 0.0
-    plane: int = 0
-
-    @classmethod
-    def within(cls, curves: Sequence[Floats], height: float = 0.0, plane: int = 0) -> Part:
-        """Measure the part within curves."""
-        every = np.concatenate(list(curves))
-        return cls(curves, moments_of(curves), every.min(axis=0), every.max(axis=0), height, plane)
-
-    @property
-    def thickness(self) -> float:
-        """The radius of a disk, and the width of a ring: twice the area over the length of the curves."""
-        return 2 * self.moments.area / sum(float(side_lengths(curve).sum()) for curve in self.curves)
-
-
-@dataclass(frozen=True)
 class Link:
     """Parts of one plane that go on as parts of another above it, by number; one side is empty where parts end."""
 
     below: tuple[int, ...]
     above: tuple[int, ...]
-
-
-def shared_area(one: Part, other: Part, shift: Floats, pixel: float) -> float:
-    """Return the area that a shifted part has in common with another, to about a pixel of the outlines."""
-    low, high = np.minimum(one.low + shift, other.low), np.maximum(one.high + shift, other.high)
-    if ((one.low + shift > other.high) | (other.low > one.high + shift)).any():
-        return 0.0
-    size = max(pixel, float((high - low).max()) / COARSE)
-    box = np.floor(low / size).astype(np.int64) - 1, np.ceil(high / size).astype(np.int64) + 2
-    still = np.zeros(2)
-    both = mask_of(one.curves, size, *box, shift) & mask_of(other.curves, size, *box, still)
-    return float(np.count_nonzero(both)) * size**2
 
 
 def link_parts(parts: Sequence[Part], groups: NDArray[np.int64], pixel: float, *, complete: bool) -> list[Link]:
@@ -196,9 +145,21 @@ class _Neighbors:
 
     def _reach(self, n: int, m: int, way: int) -> bool:
         """Tell whether two parts are near enough to be of one body, though slices be missing between them."""
+        if self.are_next(n, m):
+            return True
         gap, step = self.gap(n, m), min(self._step(n), self._step(m))
         near = gap <= MISSING * step and self._taper(n, way) + self._taper(m, -way) >= gap
-        return near or self.are_next(n, m)
+        return near and (self._meet(n, m, way) or self._meet(m, n, -way))
+
+    def _meet(self, n: int, m: int, way: int) -> bool:
+        """Tell whether a part overlaps another when it moves on as it comes."""
+        inward, center = self.beyond(n, -way, OVER), self.parts[n].moments.center
+        shift = np.zeros(2)
+        if inward:
+            source = min(inward, key=lambda one: _away(self.parts[one], self.parts[n]))
+            shift = self.gap(n, m) / self.gap(n, source) * (center - self.parts[source].moments.center)
+        least = SHARED * min(self.parts[n].moments.area, self.parts[m].moments.area)
+        return shared_area(self.parts[n], self.parts[m], shift, self.pixel) > least
 
     def are_next(self, n: int, m: int) -> bool:
         """Tell whether no slice is missing between two parts."""
@@ -272,7 +233,7 @@ def _links(parts: Sequence[Part], pairs: Sequence[tuple[int, int]]) -> list[Link
     for a, b in sorted(set(pairs)):
         grouped.setdefault((parts[a].plane, parts[b].plane), []).append((a, b))
     links = [link for _, group in sorted(grouped.items()) for link in _joined(group)]
-    low, high = ({n for link in links for n in side(link)} for side in (lambda one: one.above, lambda one: one.below))
+    low, high = {n for link in links for n in link.above}, {n for link in links for n in link.below}
     begins = [Link((), (n,)) for n in range(len(parts)) if n not in low]
     return [*begins, *links, *(Link((n,), ()) for n in range(len(parts)) if n not in high)]
 

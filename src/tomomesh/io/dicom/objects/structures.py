@@ -1,15 +1,16 @@
-"""DICOM RT Structure Sets: the closed contours of one structure as rings of points, each with its slice."""
+"""DICOM RT Structure Sets: the closed contours of structures as rings of points, each with its slice."""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from functools import reduce
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
 from ....errors import EmptyError, FormatError, GeometryError, ResourceError, TomomeshError, UsageError
-from ....model.points import NEURON, RING, PointSet
+from ....model.points import NEURON, RING, STRUCTURE, PointSet
 from ...files.source import counted, third_party
 from ..headers.dataset import read_dataset
 from ..headers.kinds import STRUCTURES, storage_class
@@ -32,6 +33,8 @@ FINEST, FINE = 0.1, 0.3
 """Distances of the points on a contour, in distances of the slices: corners that are nearer are left out; longer sides
 get points. Chosen, on a torus: half of the first changes the distance by -6 %, twice by +18 %; half of the other by
 -23 %, twice by +58 %."""
+ALL = "all"
+"""What stands for every structure that has closed contours."""
 MOST_POINTS = 20_000_000
 """Points that a structure may have: their positions alone are half a gigabyte."""
 
@@ -96,17 +99,30 @@ def read_structure(path: Path, settings: CloudSettings) -> PointSet:
         )  # fmt: skip
     structures = _listed(path)
     taken = _chosen(structures, settings.structure, file=str(path))
+    read = [_read(one, path, len(structures), settings) for one in taken]
+    points = reduce(_stacked, (points for points, _ in read))
+    return replace(points, frame="LPS", notes=tuple(note for _, notes in read for note in notes))
+
+
+def _read(taken: Structure, path: Path, of: int, settings: CloudSettings) -> tuple[PointSet, list[str]]:
+    """Return the points of one structure, and what is to be told of it."""
     with third_party("pydicom", path.name):
         where = f"structure {taken.number}"
         corners = corners_of(taken.contours, where=where, file=path.name, skip_flat=settings.skip_flat)
     planes = planes_of(corners, file=str(path))
-    points = _points(corners, planes.labels, float(np.median(np.diff(planes.heights))), file=str(path))
-    notes = [f"structure {taken} of {len(structures)}, {len(corners)} contours on {len(planes.heights)} slices"]
+    notes = [f"structure {taken} of {of}, {len(corners)} contours on {planes.slices} slices"]
     if taken.others:
         notes.append(f"contours that are not closed, left out: {counted(taken.others)}")
     if flat := len(taken.contours) - len(corners):
         notes.append(f"contours that enclose nothing, left out: {flat}")
-    return replace(points, frame="LPS", notes=tuple(notes))
+    points = _points(corners, planes.labels, planes.apart, file=str(path))
+    number = np.full(len(points), taken.number, np.int32)
+    return replace(points, attributes={**points.attributes, STRUCTURE: number}), notes
+
+
+def _stacked(one: PointSet, other: PointSet) -> PointSet:
+    """Append the points of another structure, whose planes get numbers of their own."""
+    return one.joined(replace(other, slices=other.slices + one.slices.max() + 1))
 
 
 def _listed(path: Path) -> list[Structure]:
@@ -128,28 +144,54 @@ def _structure(number: int, name: str, items: Sequence[Any]) -> Structure:
     return Structure(number, name, closed, Counter(shown(kind) for kind in kinds if kind not in CLOSED))
 
 
-def _chosen(structures: list[Structure], wanted: str | None, *, file: str) -> Structure:
-    """Return the structure that is wanted, or the only one that has closed contours."""
+def _chosen(structures: list[Structure], wanted: str | None, *, file: str) -> list[Structure]:
+    """Return the structures that are wanted, or the only one that has closed contours."""
     closed = [one for one in structures if one.contours]
-    if wanted is not None:
-        found = [one for one in structures if str(one.number) == wanted.strip()]
-        found = found or [one for one in structures if wanted.strip() in (one.name.strip(), shown(one.name))]
-    else:
-        found = closed
-    if len(found) > 1:
-        what = "several structures could be meant" if wanted else f"the file holds {len(found)} structures"
-        raise GeometryError(
-            what, file=file, found=_table(structures, file), expected="one structure", hint="--structure N"
-        )
-    if wanted is not None and not found:
+    if wanted is None and len(closed) == 1:
+        return closed
+    if wanted is not None and wanted.strip() == ALL and closed:
+        return closed
+    if wanted is None:
+        if closed:
+            _refuse_several(f"the file holds {len(closed)} structures", structures, file)
+        raise _no_contours(structures, file)
+    if found := _named(structures, wanted):
+        return [_only(found, structures, file)]
+    each = [_named(structures, name) for name in wanted.split(",")]
+    if not all(each):
         raise UsageError(
             "there is no such structure", file=file, found=_table(structures, file),
             expected="--structure with a number or a name of the table",
         )  # fmt: skip
-    if not found or not found[0].contours:
-        listed = _table(found or structures, file) or "0 structures"
-        raise EmptyError("there are no closed contours", file=file, found=listed, expected=" or ".join(CLOSED))
+    chosen = {one.number: one for one in (_only(found, structures, file) for found in each)}
+    return [chosen[number] for number in sorted(chosen)]
+
+
+def _named(structures: list[Structure], wanted: str) -> list[Structure]:
+    """Return the structure of a number, else those of a name."""
+    found = [one for one in structures if str(one.number) == wanted.strip()]
+    return found or [one for one in structures if wanted.strip() in (one.name.strip(), shown(one.name))]
+
+
+def _only(found: list[Structure], structures: list[Structure], file: str) -> Structure:
+    """Return the structure that is found, where it is one that has closed contours."""
+    if len(found) > 1:
+        _refuse_several("several structures could be meant", structures, file)
+    if not found[0].contours:
+        raise _no_contours(found, file)
     return found[0]
+
+
+def _refuse_several(what: str, structures: list[Structure], file: str) -> NoReturn:
+    raise GeometryError(
+        what, file=file, found=_table(structures, file), expected="one structure, or several by their numbers",
+        hint="--structure N, --structure N,M or --structure all",
+    )  # fmt: skip
+
+
+def _no_contours(listed: list[Structure], file: str) -> EmptyError:
+    found = _table(listed, file) or "0 structures"
+    return EmptyError("there are no closed contours", file=file, found=found, expected=" or ".join(CLOSED))
 
 
 def _table(structures: list[Structure], file: str) -> str:
@@ -163,7 +205,7 @@ def _slices(structure: Structure, file: str) -> str:
     try:
         with third_party("pydicom", file):
             corners = corners_of(structure.contours, where="", file=file, skip_flat=True)
-            return str(len(planes_of(corners, file=file).heights))
+            return str(planes_of(corners, file=file).slices)
     except EmptyError:
         return "1"
     except TomomeshError:
