@@ -100,6 +100,11 @@ class Stack:
         """The parts on both sides of each link that has two."""
         return [(link.below, link.above) for link in self.links if link.below and link.above]
 
+    @property
+    def widest(self) -> float:
+        """The widest gap of a body, in medians of its own."""
+        return max((float(gaps.max() / np.median(gaps)) for gaps in self.gaps.values()), default=1.0)
+
     @cached_property
     def step(self) -> float:
         """Median gap between slices of one body."""
@@ -133,11 +138,14 @@ class Stack:
         return max(self.parts[n].thickness for n in key)
 
     @cached_property
-    def frusta(self) -> float:
-        """Volume of the truncated cones between the areas of the parts, and of what lies beyond the last ones."""
-        between = [frustum(self.area(low), self.area(high), self.gap(low, high)) for low, high in self.before_and_after]
-        ends = [self.ending(key, upward)[0].volume * self.area(key) for key, upward in self.ends]
-        return float(np.sum(between) + np.sum(ends))
+    def frusta(self) -> Floats:
+        """Volume (b,) of each body's truncated cones between the areas of its parts, and of its ends."""
+        found = np.zeros(int(self.body.max()) + 1)
+        for low, high in self.before_and_after:
+            found[self.body[low[0]]] += frustum(self.area(low), self.area(high), self.gap(low, high))
+        for key, upward in self.ends:
+            found[self.body[key[0]]] += self.ending(key, upward)[0].volume * self.area(key)
+        return found
 
     @property
     def ends(self) -> list[tuple[Key, bool]]:

@@ -139,17 +139,18 @@ class _Neighbors:
         over, within = (self.beyond(n, way, least) for least in (OVER, WITHIN))
         if any(self._reach(n, m, way) for m in over):
             return self.parts[over[0]].plane
-        if over != within and any(self.gap(n, m) <= NEXT * self._step(n) for m in within):
+        if over != within and any(self.gap(n, m) <= NEXT * self._nearest(n) for m in within):
             return self.parts[within[0]].plane
         return -1
 
     def _reach(self, n: int, m: int, way: int) -> bool:
         """Tell whether two parts are near enough to be of one body, though slices be missing between them."""
-        if self.are_next(n, m):
+        if self.are_next(n, m, way):
             return True
-        gap, step = self.gap(n, m), min(self._step(n), self._step(m))
-        near = gap <= MISSING * step and self._taper(n, way) + self._taper(m, -way) >= gap
-        return near and (self._meet(n, m, way) or self._meet(m, n, -way))
+        gap = self.gap(n, m)
+        near = gap <= MISSING * self._step(n, m, way)
+        tapers = self._taper(n, way), self._taper(m, -way)
+        return near and min(tapers) >= gap / 2 and (self._meet(n, m, way) or self._meet(m, n, -way))
 
     def _meet(self, n: int, m: int, way: int) -> bool:
         """Tell whether a part overlaps another when it moves on as it comes."""
@@ -161,11 +162,16 @@ class _Neighbors:
         least = SHARED * min(self.parts[n].moments.area, self.parts[m].moments.area)
         return shared_area(self.parts[n], self.parts[m], shift, self.pixel) > least
 
-    def are_next(self, n: int, m: int) -> bool:
+    def are_next(self, n: int, m: int, way: int) -> bool:
         """Tell whether no slice is missing between two parts."""
-        return self.complete or self.gap(n, m) <= NEXT * min(self._step(n), self._step(m))
+        return self.complete or self.gap(n, m) <= NEXT * self._step(n, m, way)
 
-    def _step(self, n: int) -> float:
+    def _step(self, n: int, m: int, way: int) -> float:
+        """Return the distance of slices on the far sides of two parts; of any neighbors, where they have no such."""
+        far = [self.gap(one, other) for one, w in ((n, -way), (m, way)) for other in self.beyond(one, w, OVER)[:1]]
+        return min(far) if far else min(self._nearest(n), self._nearest(m))
+
+    def _nearest(self, n: int) -> float:
         """Return how far the nearest part is that one may go on as."""
         beyond = [m for way in (1, -1) for m in self.beyond(n, way, WITHIN)]
         return min((self.gap(n, m) for m in beyond), default=0.0)
@@ -223,7 +229,7 @@ def _covering(near: _Neighbors, n: int, source: int | None, others: Sequence[int
         shift = share * (part.moments.center - near.parts[source].moments.center)
     shared = [shared_area(part, near.parts[m], shift, near.pixel) for m in others]
     best = int(np.argmax(shared))
-    joined = shared[best] > SHARED * part.moments.area and near.are_next(n, others[best])
+    joined = shared[best] > SHARED * part.moments.area and near.are_next(n, others[best], 1 if n < others[best] else -1)
     return others[best] if joined else -1
 
 

@@ -66,24 +66,29 @@ def surface_of_slices(
     made = closed.value
     surface = Surface(
         cloud, made.boundary.cuberille, made.rest.smoothed, made.mesh, made.rest.nearest, filled=made.filled,
-        cavities=made.boundary.cavities, encloses=encloses or Enclosed("slices", made.stack.frusta),
+        cavities=made.boundary.cavities, encloses=encloses or Enclosed("slices", _least(made, slices)),
     )  # fmt: skip
     spaced = points_found(cloud, slices.spacing, unit=unit, bridged=bridged)
-    return folded(
-        surface,
-        closed,
-        spaced,
-        boundary_found(made.boundary, made.rest),
-        _stack_found(
-            made, slices, left=int((cloud.kinds[slices.labels < 0] == NEURON).sum()), of_study=encloses is not None
-        ),
-    )
+    left = int((cloud.kinds[slices.labels < 0] == NEURON).sum())
+    told = _stack_found(made, slices, left=left, of_study=encloses is not None)
+    return folded(surface, closed, spaced, boundary_found(made.boundary, made.rest), told)
+
+
+def _least(made: ContourSurface, slices: Slices) -> float:
+    """Return the volume of the frusta; of several structures, which may lie in each other, that of the largest."""
+    stack = made.stack
+    if not slices.rings:
+        return float(stack.frusta.sum())
+    _, first = np.unique(stack.body, return_index=True)
+    groups = slices.groups[[stack.parts[n].plane for n in first]]
+    return float(np.bincount(groups, stack.frusta).max())
 
 
 def _stack_found(made: ContourSurface, slices: Slices, *, left: int, of_study: bool) -> Stage[None]:
     """Tell of the slices, and the voxels between them."""
     stack, volume = made.stack, float(made.mesh.face_volumes.sum())
     widest = max((float(gaps.max()) for gaps in stack.gaps.values()), default=stack.step)
+    frusta = float(stack.frusta.sum())
     stats: dict[str, dict[str, Any]] = {
         "stack": {
             "slices": made.slices,
@@ -95,8 +100,8 @@ def _stack_found(made: ContourSurface, slices: Slices, *, left: int, of_study: b
             "slice_distance_mm": stack.step,
             "widest_slice_distance_mm": widest,
             "longest_gap": made.reach,
-            "frusta_mm3": stack.frusta,
-            "volume_over_frusta": volume / stack.frusta,
+            "frusta_mm3": frusta,
+            "volume_over_frusta": volume / frusta,
             "voxel_mm": made.edge,
             "voxels": made.voxels,
         },
@@ -111,7 +116,7 @@ def _stack_found(made: ContourSurface, slices: Slices, *, left: int, of_study: b
 def _told_of_slices(made: ContourSurface, slices: Slices, widest: float, left: int) -> list[str]:
     """Warn of what the slices do not tell."""
     stack, told = made.stack, []
-    if widest > APART * stack.step:
+    if stack.widest > APART:
         told.append(f"slices lie up to {widest:.4g} apart, {stack.step:.4g} as a rule: that is interpolated")
     if stack.alone:
         places = (slices.origin + part.place @ slices.axes for part in stack.alone[:NAMED])

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from ....contours.direction import axes_across
 from ....contours.levels import columns_of, planes_within, slices_at, typical_gap
@@ -24,6 +26,10 @@ SAME_HEIGHT_MM = 1e-3
 MOST_OFF_PLANE = 0.25
 """Share of the distance of two planes by which a contour may leave its own: half of the way to where it would lie
 nearer to another."""
+
+TURNED = np.radians(20.0)
+"""Contours whose planes are turned by more than this are of different stacks: no contour of a stack leans so much, and
+the three axes are 90 degrees apart. Half and twice of it change nothing for these."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +98,15 @@ def planes_of(contours: Sequence[Floats], *, file: str) -> Planes:
             expected=f"at most {MOST_OFF_PLANE * apart:.3g} mm across ({', '.join(f'{n:.3g}' for n in normal)})",
         )
     return Planes(labels, heights, apart)
+
+
+def directions(contours: Sequence[Floats]) -> int:
+    """Count the directions of the planes of contours (u, 3), where there are several with two contours each; else 0."""
+    areas = np.array([vector_area(contour) for contour in contours])
+    normals = areas / np.linalg.norm(areas, axis=1)[:, None]
+    near = np.abs(normals @ normals.T) > np.cos(TURNED)
+    count, direction = connected_components(csr_array(near), directed=False)
+    return int(count) if count > 1 and np.bincount(direction).min() > 1 else 0
 
 
 def _normal(contours: Sequence[Floats]) -> Floats:

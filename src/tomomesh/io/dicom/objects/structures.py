@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from ....errors import EmptyError, FormatError, GeometryError, ResourceError, TomomeshError, UsageError
+from ....measure.polygon import side_lengths
 from ....model.points import NEURON, RING, STRUCTURE, PointSet
 from ...files.source import counted, third_party
 from ..headers.dataset import read_dataset
 from ..headers.kinds import STRUCTURES, storage_class
 from ..headers.names import shown
-from .contours import CLOSED, corners_of
-from .planes import planes_of
+from .contours import CLOSED, OPEN, corners_of, ends_meet
+from .planes import directions, planes_of
 from .rings import filled, parted, pieces_of, thinned
 
 if TYPE_CHECKING:
@@ -50,7 +51,9 @@ class Structure:
     name : str
         As the file has it.
     contours : list of pydicom Dataset
-        The closed ones.
+        Those that are closed, or whose ends meet.
+    met : int
+        How many are said to be open.
     others : Counter
         How many others there are, by their kind.
     """
@@ -58,6 +61,7 @@ class Structure:
     number: int
     name: str
     contours: list[Any]
+    met: int
     others: Counter[str]
 
     def __str__(self) -> str:
@@ -109,15 +113,24 @@ def _read(taken: Structure, path: Path, of: int, settings: CloudSettings) -> tup
     with third_party("pydicom", path.name):
         where = f"structure {taken.number}"
         corners = corners_of(taken.contours, where=where, file=path.name, skip_flat=settings.skip_flat)
-    planes = planes_of(corners, file=str(path))
-    notes = [f"structure {taken} of {of}, {len(corners)} contours on {planes.slices} slices"]
+    told = f"structure {taken} of {of}, {len(corners)} contours"
+    if ways := directions(corners):
+        notes = [f"{told} in planes of {ways} directions: their points are taken as a cloud"]
+        points = _points(corners, np.zeros(len(corners), np.int64), _side(corners) / FINE, file=str(path))
+        points = PointSet.from_positions(points.positions)
+    else:
+        planes = planes_of(corners, file=str(path))
+        notes = [f"{told} on {planes.slices} slices"]
+        points = _points(corners, planes.labels, planes.apart, file=str(path))
+        number = np.full(len(points), taken.number, np.int32)
+        points = replace(points, attributes={**points.attributes, STRUCTURE: number})
+    if taken.met:
+        notes.append(f"open contours whose ends meet, taken as closed: {taken.met}")
     if taken.others:
         notes.append(f"contours that are not closed, left out: {counted(taken.others)}")
     if flat := len(taken.contours) - len(corners):
         notes.append(f"contours that enclose nothing, left out: {flat}")
-    points = _points(corners, planes.labels, planes.apart, file=str(path))
-    number = np.full(len(points), taken.number, np.int32)
-    return replace(points, attributes={**points.attributes, STRUCTURE: number}), notes
+    return points, notes
 
 
 def _stacked(one: PointSet, other: PointSet) -> PointSet:
@@ -140,8 +153,10 @@ def _listed(path: Path) -> list[Structure]:
 
 def _structure(number: int, name: str, items: Sequence[Any]) -> Structure:
     kinds = [str(item.get("ContourGeometricType") or "no type") for item in items]
-    closed = [item for item, kind in zip(items, kinds, strict=True) if kind in CLOSED]
-    return Structure(number, name, closed, Counter(shown(kind) for kind in kinds if kind not in CLOSED))
+    met = [kind == OPEN and ends_meet(item) for item, kind in zip(items, kinds, strict=True)]
+    closed = [kind in CLOSED or one for kind, one in zip(kinds, met, strict=True)]
+    others = Counter(shown(kind) for kind, one in zip(kinds, closed, strict=True) if not one)
+    return Structure(number, name, [item for item, one in zip(items, closed, strict=True) if one], sum(met), others)
 
 
 def _chosen(structures: list[Structure], wanted: str | None, *, file: str) -> list[Structure]:
@@ -212,6 +227,11 @@ def _slices(structure: Structure, file: str) -> str:
         return "unknown"
 
 
+def _side(contours: list[Floats]) -> float:
+    """Return the median side of contours (u, 3)."""
+    return float(np.median(np.concatenate([side_lengths(one) for one in contours])))
+
+
 def _points(contours: list[Floats], labels: NDArray[np.int64], apart: float, *, file: str) -> PointSet:
     """Draw contours as points as far apart as their corners are as a rule, as is fit for slices that far `apart`."""
     rings = [
@@ -220,8 +240,7 @@ def _points(contours: list[Floats], labels: NDArray[np.int64], apart: float, *, 
         for ring in parted(contour)
     ]
     rings.sort(key=lambda one: one[1])
-    sides = [np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1) for ring, _ in rings]
-    distance = min(float(np.median(np.concatenate(sides))), FINE * apart)
+    distance = min(_side([ring for ring, _ in rings]), FINE * apart)
     pieces = [pieces_of(ring, distance) for ring, _ in rings]
     if (total := sum(float(one.sum()) for one in pieces)) > MOST_POINTS:
         raise ResourceError(
