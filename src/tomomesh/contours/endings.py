@@ -42,14 +42,14 @@ class Ending:
         step : float
             Distance to the slice that does not have it.
         fall, bend : float
-            Of its squared thickness  1 - fall t - bend t^2  would be left at t steps, as `parabola` tells.
+            Of its squared thickness  1 - fall t - bend t^2  would be left at t steps, as `parabola` tells: bend is at
+            least -fall^2 / 4, as a cone's.
         """
-        if fall <= 0 or fall + bend <= 0:
+        if fall <= 0:
             return cls(step / 2)
-        if fall + bend >= 1 or -2 * bend >= fall:
-            zero = 2 / (fall + np.sqrt(max(fall**2 + 4 * bend, 0.0)))
-            if zero <= 1:
-                return cls(step * zero, fall * zero, bend * zero**2, 1.0)
+        zero = 2 / (fall + np.sqrt(max(fall**2 + 4 * bend, 0.0)))
+        if zero <= 1:
+            return cls(step * zero, fall * zero, bend * zero**2, 1.0)
         reach = (1 + fall + bend) / 2
         fall, bend, volume = fall * reach, bend * reach**2, (1 + (fall + bend) * bend / 3) / 2
         short = 1 - fall / 2 - bend / 3 - volume / reach
