@@ -20,6 +20,7 @@ from tomomesh.errors import GeometryError, UsageError
 from tomomesh.io import read_points
 from tomomesh.measure.intersections import self_intersections
 from tomomesh.measure.topology import check_promise, topology
+from tomomesh.model.mesh import TriMesh
 from tomomesh.pipeline import reconstruct_points
 from tomomesh.settings import CloudSettings
 
@@ -45,15 +46,20 @@ def raised(ring: Floats, z: float, x: float = 0.0) -> Floats:
     return moved
 
 
+def widths(kind: str, radius: float, z: float) -> list[float]:
+    return {
+        "ball": [float(np.sqrt(max(radius**2 - z * z, 0)))],
+        "cylinder": [0.6 * radius],
+        "cone": [(radius - z) / 2],
+        "tube": [0.8 * radius, 0.4 * radius],
+    }[kind]
+
+
 def cut(kind: str, x: float, y: float, radius: float, heights: Floats) -> list[list[Floats]]:
     """Return the rings of a body about (x, y, 0) on slices."""
-    widths = {
-        "ball": lambda z: [np.sqrt(max(radius**2 - z * z, 0))],
-        "cylinder": lambda z: [0.6 * radius],
-        "cone": lambda z: [(radius - z) / 2],
-        "tube": lambda z: [0.8 * radius, 0.4 * radius],
-    }[kind]
-    slices = [[circle(x, y, width, z) for width in widths(z) if width > 0.2 * radius] for z in heights.tolist()]
+    slices = [
+        [circle(x, y, width, z) for width in widths(kind, radius, z) if width > 0.2 * radius] for z in heights.tolist()
+    ]
     return [rings for rings in slices if rings]
 
 
@@ -83,9 +89,12 @@ def test_bodies_are_found_with_their_volume(drawn: tuple[Floats, int, int], seed
     points, pieces, genus = drawn
     slices = find_slices(np.random.default_rng(seed).permutation(points))
     assert slices is not None
-    made = contour_surface(points[np.random.default_rng(seed).permutation(len(points))], slices, edge=size(None, 2.5))
+    made = contour_surface(
+        points[np.random.default_rng(seed).permutation(len(points))], slices, edge=size(slices.spacing, 2.5)
+    )
     check_promise(made.mesh, cavities=made.boundary.cavities)
-    assert not self_intersections(made.mesh).any()
+    # a cap is flat to the last bit, and faces that touch at a corner alone are then told by rounding
+    assert not self_intersections(TriMesh(np.round(made.mesh.vertices, 9), made.mesh.faces)).any()
     assert (topology(made.mesh).components, topology(made.mesh).genus) == (pieces, genus)
     assert len(made.stack.frusta) == pieces
     assert made.mesh.face_volumes.sum() == pytest.approx(made.stack.frusta.sum(), rel=size(0.02, 0.06))
@@ -281,11 +290,10 @@ class TestEndings:
 
     @given(st.floats(0.05, 0.99), st.floats(0.5, 5.0), st.floats(5, 40))
     def test_balls_and_cones_end_in_their_pole(self, share: float, step: float, radius: float) -> None:
-        pole = share * step
-        ball, cone = ([f(pole + n * step) for n in range(3)] for f in (lambda d: d * (2 * radius - d), lambda d: d * d))
-        for squares in (ball, cone) if radius > 3 * step else (cone,):
+        away = share * step + step * np.arange(3)
+        for squares in (away * (2 * radius - away), away**2) if radius > 3 * step else (away**2,):
             shape = parabola((1.0, 2.0), (squares[1] / squares[0], squares[2] / squares[0]))
-            assert Ending.after(step, *shape).reach == pytest.approx(pole, rel=1e-3)
+            assert Ending.after(step, *shape).reach == pytest.approx(away[0], rel=1e-3)
 
     @given(st.floats(0.5, 5.0))
     def test_a_prism_ends_flat_half_a_step_later(self, step: float) -> None:
