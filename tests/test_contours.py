@@ -14,11 +14,11 @@ from conftest import sphere, torus
 from studies import shared
 from tomomesh.contours.curves import fine_curve, moments_of
 from tomomesh.contours.known import known_slices
+from tomomesh.contours.parts import Part
 from tomomesh.contours.rings import outline
-from tomomesh.contours.shape_interpolation import ENDS
 from tomomesh.contours.slices import find_slices
 from tomomesh.contours.stack import ContourSurface, contour_surface
-from tomomesh.contours.tracks import Part, link_slices
+from tomomesh.contours.tracks import link_parts
 from tomomesh.errors import EmptyError, GeometryError
 from tomomesh.measure.intersections import self_intersections
 from tomomesh.measure.topology import check_promise, topology
@@ -224,7 +224,7 @@ class TestSurface:
         made = closed(legs(slope))
         found = topology(made.mesh)
         assert (found.components, found.genus) == (2, 0)
-        assert volume(made) == pytest.approx(2 * np.pi * 25 * (66 + ENDS * 6 * 4 / 3), rel=0.02)
+        assert volume(made) == pytest.approx(2 * np.pi * 25 * 72, rel=0.02)
 
     @pytest.mark.parametrize("seed", [0, 1])
     def test_noise_joins_no_legs(self, seed: int) -> None:
@@ -248,7 +248,7 @@ class TestSurface:
         rings = [circle(x, 0, r, 5 * k) for k in range(10) for x, r in ((0, 20), (2, 8))]
         made = closed(np.concatenate(rings))
         assert (topology(made.mesh).components, topology(made.mesh).genus) == (1, 1)
-        assert volume(made) == pytest.approx(np.pi * (400 - 64) * (45 + ENDS * 5 * 4 / 3), rel=0.02)
+        assert volume(made) == pytest.approx(np.pi * (400 - 64) * 50, rel=0.02)
 
     def test_a_core_in_a_shell(self) -> None:
         heights = np.arange(-23, 24, 5.0)
@@ -345,17 +345,19 @@ class TestKnown:
 class TestLinks:
     """Which part goes on as which."""
 
-    def parts(self, *disks: tuple[float, float]) -> list[Part]:
-        return [Part.within([fine_curve(circle(x, 0, r, 0)[:, :2], 0.25)]) for x, r in disks]
+    def parts(self, plane: int, *disks: tuple[float, float]) -> list[Part]:
+        height = 6.0 * plane
+        return [Part.within([fine_curve(circle(x, 0, r, 0)[:, :2], 0.25)], height, plane) for x, r in disks]
 
-    def test_parts_end_where_nothing_follows(self) -> None:
-        slices = [self.parts((0, 5)), self.parts((0, 5), (40, 5))]
-        links = link_slices(slices, np.array([0.0, 6.0]), 1.0)
-        assert [(link.below, link.above) for link in links[1]] == [((0,), (0,)), ((), (1,))]
-        assert len(links[0]) == 1
-        assert len(links[2]) == 2
+    @pytest.mark.parametrize("complete", [False, True])
+    def test_parts_end_where_nothing_follows(self, complete: bool) -> None:
+        parts = self.parts(0, (0, 5)) + self.parts(1, (0, 5), (40, 5))
+        links = link_parts(parts, np.zeros(2, np.int64), 1.0, complete=complete)
+        found = [(link.below, link.above) for link in links]
+        assert found == [((), (0,)), ((), (2,)), ((0,), (1,)), ((1,), ()), ((2,), ())]
 
-    def test_a_part_may_go_on_as_two(self) -> None:
-        slices = [self.parts((0, 12)), self.parts((-7, 5), (7, 5))]
-        links = link_slices(slices, np.array([0.0, 6.0]), 1.0)
-        assert [(link.below, link.above) for link in links[1]] == [((0,), (0, 1))]
+    @pytest.mark.parametrize("complete", [False, True])
+    def test_a_part_may_go_on_as_two(self, complete: bool) -> None:
+        parts = self.parts(0, (0, 12)) + self.parts(1, (-7, 5), (7, 5))
+        links = link_parts(parts, np.zeros(2, np.int64), 1.0, complete=complete)
+        assert [(link.below, link.above) for link in links if link.below and link.above] == [((0,), (1, 2))]

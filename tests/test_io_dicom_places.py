@@ -17,6 +17,7 @@ from studies import (
     assert_in_place,
     enhanced,
     indices_of,
+    rotation,
     sampled,
     save,
     setting,
@@ -86,6 +87,17 @@ class TestMillimeters:
             middle = volume.to_mm(np.stack([i, j, np.full(len(i), k)], axis=1).astype(float)).mean(axis=0)
             assert np.abs(middle[:2]).max() < 0.25
         assert_in_place(read_volume(write_series(tmp_path / "t", sampled(affine), affine)))
+
+    @pytest.mark.parametrize("scale", [0.999, 1.0, 1.0005])
+    def test_directions_that_are_not_quite_of_unit_length_are_no_tilt(self, tmp_path: Path, scale: float) -> None:
+        turned = affine_of(rotation(0.0, 0.0, 0.1), (0.5, 0.5, 1.25), (-8.0, -8.0, 0.0))
+
+        def longer(data: Dataset, k: int) -> None:
+            data.ImageOrientationPatient = [scale * float(value) for value in data.ImageOrientationPatient]
+
+        volume = read_volume(write_series(tmp_path / "s", sampled(turned), turned, longer))
+        assert not any("tilt" in note for note in volume.notes)
+        np.testing.assert_allclose(volume.spacing_mm, (0.5, 0.5, 1.25), rtol=1e-4)
 
     @pytest.mark.parametrize("order", [[0, 1, 2, 3, 4], [3, 0, 4, 1, 2]])
     def test_frames_of_an_enhanced_file_are_sorted_too(self, tmp_path: Path, order: list[int]) -> None:

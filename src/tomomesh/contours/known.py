@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..measure.polygon import area, side_lengths
-from ..model.points import NEURON, RING, SIDE
+from ..model.points import NEURON, RING, SIDE, STRUCTURE
+from .direction import FEWEST, axes_across, common_normal
+from .levels import typical_gap
 from .rings import holes
-from .slices import FEWEST, PARTED, Slices, axes_across, common_normal
+from .slices import PARTED, Slices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,17 +46,24 @@ def known_slices(points: PointSet) -> Slices | None:
         return None
     rings = [points.positions[one] for one in grouped]
     origin = np.mean([corner for one in rings for corner in (one.min(axis=0), one.max(axis=0))], axis=0)
-    labels = np.where(neuron, np.searchsorted(numbers, points.slices), -1).astype(np.int32)
+    labels = np.where(neuron, np.searchsorted(numbers, points.slices), -1).astype(np.int64)
     local = points.positions - origin
     normal = common_normal(local[order], labels[order], rings[-1].mean(axis=0) - rings[0].mean(axis=0))
-    height = local[order] @ normal
-    heights = np.bincount(labels[order], height) / np.bincount(labels[order])
-    gaps = np.diff(heights)
-    if gaps.min() <= 0 or np.abs(height - heights[labels[order]]).max() > PARTED * gaps.min():
+    height = local @ normal
+    structure = points.attributes.get(STRUCTURE)
+    groups = np.zeros(len(numbers), np.int64)
+    if structure is not None:
+        groups[labels[order]] = structure[order]
+    levels = np.bincount(labels[order], height[order]) / np.bincount(labels[order])
+    rank = np.lexsort((levels, groups))
+    labels = np.where(neuron, np.argsort(rank)[labels], -1)
+    heights, groups = levels[rank], groups[rank]
+    gap = max(typical_gap(heights[groups == one]) for one in np.unique(groups))
+    if max(float(np.ptp(height[one])) for one in grouped) > 2 * PARTED * gap or gap <= 0:
         return None
     sides = np.concatenate([side_lengths(one) for one in rings])
-    spacing = min(float(np.median(sides)), float(np.median(gaps)))
-    found = Slices(origin, axes_across(normal), heights, labels, spacing)
+    spacing = min(float(np.median(sides)), gap)
+    found = Slices(origin, axes_across(normal), heights, groups, labels, spacing, complete=structure is None)
     return replace(found, rings=_oriented(points, grouped, found))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..kernels.threads import in_blocks
 from ..progress import Progress, silent
+from .assembly import MARGIN
 from .curves import Field, field_of
 
 if TYPE_CHECKING:
@@ -16,19 +17,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .tracks import Link, Part
+    from .assembly import Key, Stack
+    from .tracks import Link
 
     Floats = NDArray[np.float64]
     Values = NDArray[np.float32]
     Array = TypeVar("Array", Floats, Values)
 
-MARGIN = 3
-"""Voxels of background around the shapes. Chosen: half of it changes the distance by -0.2 %, twice by 0.0 %."""
 FAR = np.float32(1e4)
 """Distance far outside, in voxels. Farther than volumes are wide, and exact in 32 bits."""
-ENDS = 0.5
-"""Share of a slice distance that a part goes on beyond its last contour. Chosen: half of it changes the distance by
-+116.0 %, twice by -19.7 %."""
 LIMIT = 3.0
 """Slopes are at most this many times the smaller change: then nothing overshoots (Fritsch & Carlson 1980). Chosen: half
 of it changes the distance by +0.1 %, twice by -0.4 %."""
@@ -36,52 +33,12 @@ of it changes the distance by +0.1 %, twice by -0.4 %."""
 
 @dataclass(frozen=True)
 class Shape:
-    """Parts of one slice that go on together: their middle, the distances around it, and their depth."""
+    """Parts of one slice that go on together: center, height in voxels, distances around the center, and depth."""
 
     center: Floats
+    height: float
     field: Field
     depth: float
-
-
-@dataclass(frozen=True)
-class Stack:
-    """The parts of every slice, how they go on, and the voxels to fill.
-
-    Attributes
-    ----------
-    slices : sequence of sequences of Part
-    links : sequence of sequences of Link
-        For the space below each slice, and that above the last.
-    heights : (s,) float array
-    edge : float
-        Edge of the voxels.
-    """
-
-    slices: Sequence[Sequence[Part]]
-    links: Sequence[Sequence[Link]]
-    heights: Floats
-    edge: float
-
-    def ending(self, k: int, upward: bool) -> float:
-        """Return how far parts of slice k that end go on beyond it."""
-        steps = np.diff(self.heights)
-        nearest = k if upward else k - 1
-        return ENDS * float(steps[np.clip(nearest, 0, len(steps) - 1)])
-
-    @property
-    def low(self) -> Floats:
-        """Center of the first voxel, in the stack's own frame."""
-        corner = np.min([part.low for parts in self.slices for part in parts], axis=0)
-        return np.append(corner, self.heights[0] - self.ending(0, False)) - MARGIN * self.edge
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Voxels along height, second and first axis."""
-        corner = np.max([part.high for parts in self.slices for part in parts], axis=0)
-        last = len(self.heights) - 1
-        high = np.append(corner, self.heights[last] + self.ending(last, True)) + MARGIN * self.edge
-        i, j, k = (np.ceil((high - self.low) / self.edge).astype(int) + 1).tolist()
-        return k, j, i
 
 
 def filled_between(stack: Stack, *, threads: int = 0, progress: Progress = silent) -> Values:
@@ -89,9 +46,9 @@ def filled_between(stack: Stack, *, threads: int = 0, progress: Progress = silen
 
     Along each link the distances f of both slices follow, at each pixel, a cubic over the height whose slopes are
     those of the parabola through the next slices too, limited so that nothing overshoots; their middles follow such
-    a cubic too, so that a slanted part keeps its width. Where a part ends, its outline closes over half of the
-    distance to the next slice: with the depth e of the part, the height t in shares of that, and a the slope at the
-    contour,  f + e (1 - sqrt(1 - a t - (1 - a) t^2)):  an ellipsoid for a = 0, a paraboloid for a = 1.
+    a cubic too, so that a slanted part keeps its width. Where a part ends, its outline closes as
+    `tomomesh.contours.endings.Ending` has it: with the depth e of the part and the share s of its square that is left,
+    f + e (1 - sqrt(s)). What several links fill is their union.
 
     Parameters
     ----------
@@ -107,119 +64,117 @@ def filled_between(stack: Stack, *, threads: int = 0, progress: Progress = silen
     shapes = _shapes(stack, threads)
     volume = np.full(stack.shape, FAR, np.float32)
     height = stack.low[2] + stack.edge * np.arange(len(volume))
-    space = np.searchsorted(stack.heights, height)
+    spans = [_Span(stack, shapes, link, height) for link in stack.links]
+    filled = 0
+    for units in _rounds(spans):
 
-    def work(start: int, stop: int) -> None:
-        for k in range(start, stop):
-            layers = np.flatnonzero(space == k)
-            for link in stack.links[k]:
-                _Span(stack, shapes, k, link).fill(volume, layers, height)
+        def work(start: int, stop: int, units: list[list[_Span]] = units) -> None:
+            for unit in units[start:stop]:
+                for span in unit:
+                    span.fill(volume)
 
-    in_blocks(
-        work, len(stack.links), block=1, threads=threads, done=lambda n: progress("slices", n, len(stack.links))
-    )  # fmt: skip
+        def done(count: int, before: int = filled, units: list[list[_Span]] = units) -> None:
+            progress("slices", before + sum(map(len, units[:count])), len(spans))
+
+        in_blocks(work, len(units), block=1, threads=threads, done=done)
+        filled += sum(map(len, units))
     return volume
 
 
-Key = tuple[int, tuple[int, ...]]
+def _rounds(spans: Sequence[_Span]) -> list[list[list[_Span]]]:
+    """Share out spans to rounds of units whose layers have none in common, so that each writes what is its own."""
+    units: dict[tuple[int, int], list[_Span]] = {}
+    for span in spans:
+        units.setdefault((span.layers.start, span.layers.stop), []).append(span)
+    rounds: list[list[list[_Span]]] = []
+    free: list[int] = []
+    for (start, stop), unit in sorted(units.items(), key=lambda one: one[0]):
+        n = next((n for n, first in enumerate(free) if first <= start), len(free))
+        if n == len(free):
+            rounds.append([])
+            free.append(0)
+        rounds[n].append(unit)
+        free[n] = stop
+    return rounds
 
 
 def _shapes(stack: Stack, threads: int) -> dict[Key, Shape]:
     """Measure each set of parts that goes on together."""
-    keys = sorted(
-        {(k, link.above) for k, links in enumerate(stack.links) for link in links if link.above}
-        | {(k - 1, link.below) for k, links in enumerate(stack.links) for link in links if link.below}
-    )
+    keys = sorted({key for link in stack.links for key in (link.below, link.above) if key})
     made: list[Shape | None] = [None] * len(keys)
 
     def work(start: int, stop: int) -> None:
         for n in range(start, stop):
-            made[n] = _shape([stack.slices[keys[n][0]][part] for part in keys[n][1]], stack.edge)
+            made[n] = _shape(stack, keys[n])
 
     in_blocks(work, len(keys), block=1, threads=threads)
     return {key: shape for key, shape in zip(keys, made, strict=True) if shape}
 
 
-def _shape(parts: Sequence[Part], edge: float) -> Shape:
-    areas = np.array([part.moments.area for part in parts])
-    center = (areas[:, None] * np.stack([part.moments.center for part in parts])).sum(axis=0) / areas.sum()
-    field = field_of([curve for part in parts for curve in part.curves], center, edge, MARGIN)
-    return Shape(center, field, max(-float(field.values.min()), 0.5))
+def _shape(stack: Stack, key: Key) -> Shape:
+    *center, height = stack.mean(key)
+    curves = [curve for n in key for curve in stack.parts[n].curves]
+    field = field_of(curves, np.array(center), stack.edge, MARGIN)
+    return Shape(np.array(center), height / stack.edge, field, max(-float(field.values.min()), 0.5))
 
 
 class _Span:
-    """One link through the space below slice k."""
+    """One link through the layers of voxels that it fills."""
 
-    def __init__(self, stack: Stack, shapes: dict[Key, Shape], k: int, link: Link) -> None:
-        self.stack, self.shapes, self.k, self.link = stack, shapes, k, link
+    def __init__(self, stack: Stack, shapes: dict[Key, Shape], link: Link, height: Floats) -> None:
+        self.stack, self.shapes, self.link, self.height = stack, shapes, link, height / stack.edge
+        self.layers = range(*np.searchsorted(self.height, self._reach(), side="right").tolist())
 
-    def fill(self, volume: Values, layers: NDArray[np.int64], height: Floats) -> None:
+    def _reach(self) -> tuple[float, float]:
+        """Return where it begins and ends, in voxels."""
+        below, above = self.link.below, self.link.above
+        if below and above:
+            return self.shapes[below].height, self.shapes[above].height
+        self.end, self.aside = self.stack.ending(below or above, upward=not above)
+        here, beyond = self.shapes[below or above].height, self.end.reach / self.stack.edge + MARGIN
+        return (here, here + beyond) if below else (here - beyond, here)
+
+    def fill(self, volume: Values) -> None:
         """Add the inside along the link to the layers of voxels."""
         if self.link.below and self.link.above:
-            self._fill_between(volume, layers, height)
+            self._fill_between(volume)
         else:
-            self._fill_end(volume, layers, height)
+            self._fill_end(volume)
 
-    def _before(self, k: int, parts: tuple[int, ...]) -> Key | None:
-        return next(((k - 1, link.below) for link in self.stack.links[k] if link.above == parts and link.below), None)
-
-    def _after(self, k: int, parts: tuple[int, ...]) -> Key | None:
-        return next(
-            ((k + 1, link.above) for link in self.stack.links[k + 1] if link.below == parts and link.above), None
-        )
-
-    def _fill_between(self, volume: Values, layers: NDArray[np.int64], height: Floats) -> None:
-        k, heights = self.k, self.stack.heights / self.stack.edge
-        one, other = self.shapes[k - 1, self.link.below], self.shapes[k, self.link.above]
+    def _fill_between(self, volume: Values) -> None:
+        one, other = self.shapes[self.link.below], self.shapes[self.link.above]
         low = np.minimum(one.field.low, other.field.low)
         high = np.maximum(one.field.high, other.field.high)
-        step = float(heights[k] - heights[k - 1])
+        step = other.height - one.height
         f, g = one.field.over(low, high), other.field.over(low, high)
         change, way = (g - f) / step, (other.center - one.center) / step
-        before, after = self._before(k - 1, self.link.below), self._after(k, self.link.above)
+        before, after = self.stack.before.get(self.link.below), self.stack.after.get(self.link.above)
         slopes, ways = [change, change], [way, way]
         if before:
-            last, step_before = self.shapes[before], float(heights[k - 1] - heights[k - 2])
+            last = self.shapes[before]
+            step_before = one.height - last.height
             earlier = (f - last.field.over(low, high)) / step_before
             slopes[0] = _limited(earlier, change, step_before, step)
             ways[0] = _parabolic((one.center - last.center) / step_before, way, step_before, step)
         if after:
-            next_, step_after = self.shapes[after], float(heights[k + 1] - heights[k])
+            next_ = self.shapes[after]
+            step_after = next_.height - other.height
             later = (next_.field.over(low, high) - g) / step_after
             slopes[1] = _limited(change, later, step, step_after)
             ways[1] = _parabolic(way, (next_.center - other.center) / step_after, step, step_after)
-        for layer in layers:
-            t = float(height[layer] / self.stack.edge - heights[k - 1]) / step
+        for layer in self.layers:
+            t = float(self.height[layer] - one.height) / step
             values = _cubic(t, step, f, g, *slopes)
             center = _cubic(t, step, one.center, other.center, *ways)
             self._lay(volume[layer], values, low, center)
 
-    def _fill_end(self, volume: Values, layers: NDArray[np.int64], height: Floats) -> None:
-        upward = not self.link.above
-        k = self.k - 1 if upward else self.k
-        parts = self.link.below or self.link.above
-        shape = self.shapes[k, parts]
-        reach, slope = self._ending(k, parts, upward)
-        for layer in layers:
-            t = abs(height[layer] - self.stack.heights[k]) / reach
-            if t < 1 + MARGIN * self.stack.edge / reach:
-                left = 1 - slope * t - (1 - slope) * t * t
-                closed = shape.depth * (1 - np.sign(left) * np.sqrt(abs(left)))
-                self._lay(volume[layer], shape.field.values + np.float32(closed), shape.field.low, shape.center)
-
-    def _ending(self, k: int, parts: tuple[int, ...], upward: bool) -> tuple[float, float]:
-        """Return how far parts go on beyond their last slice, and the slope at which they begin to close.
-
-        The squared depth of a ball falls all but evenly along its end: where it would reach 0 by the last two slices.
-        """
-        most = self.stack.ending(k, upward)
-        inward = self._before(k, parts) if upward else self._after(k, parts)
-        if inward is None:
-            return most, 0.0
-        depth, deeper = self.shapes[k, parts].depth, self.shapes[inward].depth
-        step = abs(float(self.stack.heights[k] - self.stack.heights[inward[0]]))
-        closing = max((deeper / depth) ** 2 - 1, 0.0) * most / step
-        return most / max(closing, 1.0), min(closing, 1.0)
+    def _fill_end(self, volume: Values) -> None:
+        shape, reach = self.shapes[self.link.below or self.link.above], self.end.reach / self.stack.edge
+        for layer in self.layers:
+            away = abs(float(self.height[layer]) - shape.height)
+            closed = shape.depth * (1 - np.sqrt(self.end.left(away / reach)))
+            values = np.maximum(shape.field.values + np.float32(closed), np.float32(away - reach))
+            self._lay(volume[layer], values, shape.field.low, shape.center + self.aside * min(away / reach, 1.0))
 
     def _lay(self, layer: Values, values: Values, low: NDArray[np.int64], center: Floats) -> None:
         """Write distances around a center to a layer of voxels, where they are less; linear between the pixels."""

@@ -16,10 +16,13 @@ from ..kernels.threads import in_blocks
 from ..model.volume import Grid, Volume
 from ..progress import Progress, silent
 from ..settings import FitSettings
+from .assembly import Stack
 from .curves import DENSE, fine_curve
+from .levels import slices_at, typical_gap
+from .parts import Part
 from .rings import Outline, nested, outline
-from .shape_interpolation import Stack, filled_between
-from .tracks import Part, link_slices
+from .shape_interpolation import filled_between
+from .tracks import link_parts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,34 +59,38 @@ class ContourSurface:
         The net around it at rest.
     filled : (m,) bool array
         Faces that are far from every point: on the ends of parts, and where slices are missing.
+    stack : Stack
+        The parts, and how they go on.
     slices, contours, open : int
         Planes, contours, and those among them that did not close by themselves.
     reach : float
         Longest gap that was closed, in local sampling distances.
-    edge, asked_edge : float
-        Edge of the voxels, and what it would be without a limit on the memory.
+    asked_edge : float
+        Edge of the voxels without a limit on the memory.
     voxels : int
         Voxels interpolated.
-    encloses : float
-        Volume between the slices: the areas of their insides times the distance.
     """
 
     boundary: Boundary
     rest: VoxelSurface
     filled: NDArray[np.bool_]
+    stack: Stack
     slices: int
     contours: int
     open: int
     reach: float
-    edge: float
     asked_edge: float
     voxels: int
-    encloses: float
 
     @property
     def mesh(self) -> TriMesh:
         """The surface."""
         return self.rest.mesh
+
+    @property
+    def edge(self) -> float:
+        """Edge of the voxels."""
+        return self.stack.edge
 
 
 def contour_surface(
@@ -122,19 +129,10 @@ def contour_surface(
     EmptyError
         Where no contour encloses anything, or all are too thin for the voxels.
     """
-    placed = slices.placed(points)
-    planar = [np.unique(placed[slices.labels == k, :2], axis=0) for k in range(len(slices.heights))]
-    found: list[Outline] = [outline(planar[0][:0])] * len(planar)
-
-    def work(start: int, stop: int) -> None:
-        for k in range(start, stop):
-            rings = [slices.placed(ring)[:, :2] for ring in slices.rings[k]] if slices.rings else []
-            planar[k], found[k] = _known(rings) if rings else _outlined(planar[k], allow_leaks)
-
-    in_blocks(work, len(planar), block=1, threads=threads, done=lambda n: progress("contours", n, len(planar)))
+    drawn, found = _drawn(points, slices, allow_leaks, threads, progress)
     _refuse_open(found, slices, allow_leaks)
     asked = edge or slices.spacing
-    stack = _stack(planar, found, slices, asked)
+    stack = _stack(drawn, found, slices, asked)
     levels = filled_between(stack, threads=threads, progress=progress)
     np.negative(levels, out=levels)
     volume = _volume(levels, stack, slices)
@@ -146,12 +144,28 @@ def contour_surface(
     rest = voxel_surface(edges, softer, threads=threads, progress=progress)
     centers = rest.mesh.corners.mean(axis=1)
     measured = _along(stack, slices) if slices.rings else points
-    away, _ = cKDTree(measured).query(centers, distance_upper_bound=MEASURED * slices.distance)
+    away, _ = cKDTree(measured).query(centers, distance_upper_bound=MEASURED * stack.step)
     return ContourSurface(
-        edges, rest, np.isinf(away), len(planar),
-        sum(len(outlined.rings) for outlined in found), sum(len(outlined.open) for outlined in found),
-        max(outlined.reach for outlined in found), stack.edge, asked, levels.size, _between(stack),
+        edges, rest, np.isinf(away), stack, slices_at(slices.heights), sum(len(outlined.rings) for outlined in found),
+        sum(len(outlined.open) for outlined in found), max(outlined.reach for outlined in found), asked, levels.size,
     )  # fmt: skip
+
+
+def _drawn(
+    points: Floats, slices: Slices, allow_leaks: bool, threads: int, progress: Progress
+) -> tuple[list[Floats], list[Outline]]:
+    """Return the points (n, 3) of each plane, and the inside along them."""
+    placed = slices.placed(points)
+    drawn = [np.unique(placed[slices.labels == k], axis=0) for k in range(len(slices.heights))]
+    found: list[Outline] = [outline(placed[:0, :2])] * len(drawn)
+
+    def work(start: int, stop: int) -> None:
+        for k in range(start, stop):
+            rings = [slices.placed(ring) for ring in slices.rings[k]] if slices.rings else []
+            drawn[k], found[k] = _known(rings) if rings else _outlined(drawn[k], allow_leaks)
+
+    in_blocks(work, len(drawn), block=1, threads=threads, done=lambda n: progress("contours", n, len(drawn)))
+    return drawn, found
 
 
 def _require_any(inside: NDArray[np.bool_], edge: float) -> None:
@@ -163,26 +177,22 @@ def _require_any(inside: NDArray[np.bool_], edge: float) -> None:
         )  # fmt: skip
 
 
-def _between(stack: Stack) -> float:
-    """Return the volume between the slices, by trapezoids of the areas of their insides."""
-    areas = [sum(part.moments.area for part in parts) for parts in stack.slices]
-    return float(np.trapezoid(areas, stack.heights))
-
-
 def _known(rings: Sequence[Floats]) -> tuple[Floats, Outline]:
-    """Return the points of rings that are known, each once, and the outline along them."""
-    curves = [ring[(ring != np.roll(ring, 1, axis=0)).any(axis=1)] for ring in rings]
-    return np.concatenate(curves), nested(curves)
+    """Return the points (n, 3) of rings that are known, each once, and the outline along them."""
+    curves = [ring[(ring != np.roll(ring, 1, axis=0))[:, :2].any(axis=1)] for ring in rings]
+    return np.concatenate(curves), nested([curve[:, :2] for curve in curves])
 
 
 def _outlined(points: Floats, allow_leaks: bool) -> tuple[Floats, Outline]:
-    """Return the outline of a slice, and its points with those of the chords that close it."""
-    found = outline(points)
+    """Return the outline of a slice, and its points (n, 3) with those of the chords that close it."""
+    placed, first = np.unique(points[:, :2], axis=0, return_index=True)
+    heights = points[first, 2]
+    found = outline(placed)
     if not (found.open and allow_leaks):
-        return points, found
-    chords = [_chord(points[numbers]) for numbers in found.open]
-    closed = np.unique(np.concatenate([points, *chords]), axis=0)
-    again = outline(closed)
+        return np.column_stack([placed, heights]), found
+    chords = [(_chord(placed[numbers]), heights[numbers].mean()) for numbers in found.open]
+    more = [np.column_stack([chord, np.full(len(chord), height)]) for chord, height in chords]
+    closed, again = _outlined(np.concatenate([np.column_stack([placed, heights]), *more]), allow_leaks=False)
     return closed, Outline(again.rings, again.parts, found.open, again.reach)
 
 
@@ -211,15 +221,17 @@ def _refuse_open(found: list[Outline], slices: Slices, allow_leaks: bool) -> Non
         )
 
 
-def _stack(planar: list[Floats], found: list[Outline], slices: Slices, edge: float) -> Stack:
+def _stack(drawn: list[Floats], found: list[Outline], slices: Slices, edge: float) -> Stack:
     """Link the parts of all slices."""
-    parts = [_parts(points, outlined, DENSE * edge) for points, outlined in zip(planar, found, strict=True)]
-    whole = [k for k, inside in enumerate(parts) if inside]
-    if len(whole) < 2:
+    parts = [
+        part
+        for k, (points, outlined) in enumerate(zip(drawn, found, strict=True))
+        for part in _parts(points, outlined, DENSE * edge, k)
+    ]
+    if len({part.plane for part in parts}) < 2:
         raise EmptyError("the contours enclose nothing", expected="at least two slices with closed contours")
-    kept = [parts[k] for k in whole]
-    heights = slices.heights[whole]
-    stack = Stack(kept, link_slices(kept, heights, edge), heights, edge)
+    links = link_parts(parts, slices.groups, edge, complete=slices.complete)
+    stack = Stack(parts, links, edge, float(typical_gap(slices.heights)))
     while np.prod(stack.shape) > MOST_VOXELS:
         stack = replace(stack, edge=COARSER * stack.edge)
     return stack
@@ -228,23 +240,21 @@ def _stack(planar: list[Floats], found: list[Outline], slices: Slices, edge: flo
 def _along(stack: Stack, slices: Slices) -> Floats:
     """Return places about a voxel apart along the curves of all slices, in space."""
     step = round(1 / DENSE)
-    curves = [
-        (curve[::step], h)
-        for h, parts in zip(stack.heights, stack.slices, strict=True)
-        for p in parts
-        for curve in p.curves
-    ]
+    curves = [(curve[::step], part.height) for part in stack.parts for curve in part.curves]
     placed = np.concatenate([np.column_stack([curve, np.full(len(curve), height)]) for curve, height in curves])
     return np.asarray(slices.origin + placed @ slices.axes)
 
 
-def _parts(points: Floats, outlined: Outline, distance: float) -> list[Part]:
+def _parts(points: Floats, outlined: Outline, distance: float, plane: int) -> list[Part]:
     """Draw the rings of a slice finely, and gather those around one part; ordered by the parts' places."""
-    curves: dict[int, list[Floats]] = {}
+    rings: dict[int, list[Floats]] = {}
     for ring, part in zip(outlined.rings, outlined.parts, strict=True):
-        curves.setdefault(part, []).append(fine_curve(points[ring], distance))
-    parts = [part for part in map(Part.within, curves.values()) if part.moments.area > 0]
-    return sorted(parts, key=lambda part: tuple(part.moments.center))
+        rings.setdefault(part, []).append(points[ring])
+    parts = [
+        Part.within([fine_curve(ring[:, :2], distance) for ring in one], float(np.concatenate(one)[:, 2].mean()), plane)
+        for one in rings.values()
+    ]
+    return sorted((part for part in parts if part.moments.area > 0), key=lambda part: tuple(part.moments.center))
 
 
 def _volume(levels: NDArray[np.float32], stack: Stack, slices: Slices) -> Volume:

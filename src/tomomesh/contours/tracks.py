@@ -1,4 +1,4 @@
-"""Which part of a slice's inside goes on as which from slice to slice."""
+"""Which part of a slice's inside goes on as which on another slice."""
 
 from __future__ import annotations
 
@@ -10,144 +10,246 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..measure.matching import SHARED, matched, similar
-from .curves import mask_of, moments_of
+from .parts import shared_area
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from .curves import Moments
+    from .parts import Part
 
     Floats = NDArray[np.float64]
 
 STEEP = 2.0
 """Farthest that a part moves sideways to the next slice, in distances of the slices, where the two do not overlap.
 Chosen: half and twice of it change no case of benchmarks/constants.py."""
-COARSE = 48
-"""Pixels across two parts on which overlaps are counted, at most. Chosen: half and twice of it change no case of
-benchmarks/constants.py."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """A connected part of a slice's inside.
-
-    Attributes
-    ----------
-    curves : sequence of (u, 2) float arrays
-        Its outer curve and its holes, the inside on the left.
-    moments : Moments
-    low, high : (2,) float arrays
-        Its box.
-    """
-
-    curves: Sequence[Floats]
-    moments: Moments
-    low: Floats
-    high: Floats
-
-    @classmethod
-    def within(cls, curves: Sequence[Floats]) -> Part:
-        """Measure the part within curves."""
-        every = np.concatenate(list(curves))
-        return cls(curves, moments_of(curves), every.min(axis=0), every.max(axis=0))
+NEXT, MISSING = 1.5, 4.5
+"""Distances of slices within which a part goes on in any case, and within which it may go on over slices that are
+missing: three at most. Chosen: with half of the first slices that jitter by a quarter part, with twice of it two
+objects one slice apart join; with half of the second three missing slices part a ball, with twice of it two
+nodules that neither taper nor touch are one."""
+LOOK = 24
+"""Planes beyond a part in which it is looked for, those of other objects among them."""
+NOT, WITHIN, OVER = 0, 1, 2
+"""How a part may go on as another: not at all; lying in its hole, for want of a better one; over it or beside it."""
 
 
 @dataclass(frozen=True)
 class Link:
-    """Parts of one slice that go on as parts of the next; one side is empty where parts end."""
+    """Parts of one plane that go on as parts of another above it, by number; one side is empty where parts end."""
 
     below: tuple[int, ...]
     above: tuple[int, ...]
 
 
-def shared_area(one: Part, other: Part, shift: Floats, pixel: float) -> float:
-    """Return the area that a shifted part has in common with another, to about a pixel of the outlines."""
-    low, high = np.minimum(one.low + shift, other.low), np.maximum(one.high + shift, other.high)
-    if ((one.low + shift > other.high) | (other.low > one.high + shift)).any():
-        return 0.0
-    size = max(pixel, float((high - low).max()) / COARSE)
-    box = np.floor(low / size).astype(np.int64) - 1, np.ceil(high / size).astype(np.int64) + 2
-    still = np.zeros(2)
-    both = mask_of(one.curves, size, *box, shift) & mask_of(other.curves, size, *box, still)
-    return float(np.count_nonzero(both)) * size**2
-
-
-def link_slices(slices: Sequence[Sequence[Part]], heights: Floats, pixel: float) -> list[list[Link]]:
+def link_parts(parts: Sequence[Part], groups: NDArray[np.int64], pixel: float, *, complete: bool) -> list[Link]:
     """Find which parts go on as which.
 
-    First each part has one successor at most, those nearest in place and size over the whole slice (Kuhn 1955). What
-    is left over is then a branch where, moved on as it moves on its other side, it overlaps a part of the next slice;
-    else it ends.
+    A part goes on in the nearest plane of its group that holds something it overlaps, or something like it nearby;
+    planes of other objects lie between. Parts of two planes that seek each other have one successor at most, those
+    nearest in place and size over the whole slice (Kuhn 1955). What is left over is then a branch where, moved on as it
+    moves on its other side, it overlaps a part of the other plane; else it ends.
 
     Parameters
     ----------
-    slices : sequence of sequences of Part
-    heights : (s,) float array
+    parts : sequence of Part
+        By rising plane.
+    groups : (s,) int64 array
+        The group of each plane.
     pixel : float
         Finest detail that matters.
+    complete : bool
+        Whether what is not on the next plane ends.
 
     Returns
     -------
-    list of lists of Link
-        For the space below each slice, and at last that above the last one.
+    list of Link
+        Those below what begins, those between, those above what ends; by rising plane.
     """
-    steps = np.diff(heights)
-    pairs = [_successors(slices[k], slices[k + 1], float(steps[k]), pixel) for k in range(len(steps))]
-    links = [[Link((), (b,)) for b in range(len(slices[0]))]]
-    for k in range(len(steps)):
-        branches = _branches(slices, pairs, steps, k, pixel)
-        links.append(_joined(pairs[k] + branches, len(slices[k]), len(slices[k + 1])))
-    return [*links, [Link((a,), ()) for a in range(len(slices[-1]))]]
+    near = _Neighbors(parts, _layers(parts, groups), pixel, complete)
+    sought = _sought(near)
+    pairs = [pair for key in sorted(sought) for pair in near.successors(*sought[key])]
+    pairs += _branches(near, sought, pairs)
+    return _links(parts, pairs)
 
 
-def _successors(below: Sequence[Part], above: Sequence[Part], step: float, pixel: float) -> list[tuple[int, int]]:
-    cost, like = (
-        np.zeros((len(below), len(above))),
-        similar(*([part.moments.area for part in one] for one in (below, above))),
-    )
-    allowed = np.zeros(like.shape, np.bool_)
-    for a, one in enumerate(below):
-        for b, other in enumerate(above):
-            p, q = one.moments, other.moments
-            away = float(((p.center - q.center) ** 2).sum())
-            near = like[a, b] and away <= (STEEP * step) ** 2
-            allowed[a, b] = near or shared_area(one, other, np.zeros(2), pixel) > 0
-            cost[a, b] = away + (p.radius - q.radius) ** 2
-    return matched(cost, allowed)
+def _layers(parts: Sequence[Part], groups: NDArray[np.int64]) -> list[list[list[int]]]:
+    """Gather the parts of each plane, planes by group."""
+    planes: dict[int, dict[int, list[int]]] = {}
+    for n, part in enumerate(parts):
+        planes.setdefault(int(groups[part.plane]), {}).setdefault(part.plane, []).append(n)
+    return [list(one.values()) for one in planes.values()]
 
 
-def _branches(
-    slices: Sequence[Sequence[Part]], pairs: Sequence[Sequence[tuple[int, int]]], steps: Floats, k: int, pixel: float
-) -> list[tuple[int, int]]:
-    """Join what is left over between slices k and k + 1 to the part that it overlaps most."""
-    below, above = slices[k], slices[k + 1]
-    found = []
-    before = {b: a for a, b in pairs[k - 1]} if k else {}
-    after = dict(pairs[k + 1]) if k + 1 < len(pairs) else {}
-    for a in sorted(set(range(len(below))) - {a for a, _ in pairs[k]}):
-        source = slices[k - 1][before[a]] if a in before else below[a]
-        b = _covering(below[a], source, steps[k] / steps[k - 1] if k else 0.0, above, pixel)
-        found += [(a, b)] if b >= 0 else []
-    for b in sorted(set(range(len(above))) - {b for _, b in pairs[k]}):
-        source = slices[k + 2][after[b]] if b in after else above[b]
-        a = _covering(above[b], source, steps[k] / steps[k + 1] if b in after else 0.0, below, pixel)
-        found += [(a, b)] if a >= 0 else []
+def _sought(near: _Neighbors) -> dict[tuple[int, int], tuple[list[int], list[int]]]:
+    """Return the parts of a lower plane that seek a part in an upper one, and those that seek one in the lower."""
+    found: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
+    for n, part in enumerate(near.parts):
+        for way in (1, -1):
+            plane = near.onward(n, way)
+            if plane >= 0:
+                key = (part.plane, plane) if way > 0 else (plane, part.plane)
+                found.setdefault(key, ([], []))[0 if way > 0 else 1].append(n)
     return found
 
 
-def _covering(part: Part, source: Part, share: float, others: Sequence[Part], pixel: float) -> int:
+class _Neighbors:
+    """What lies over and under each part."""
+
+    def __init__(self, parts: Sequence[Part], groups: list[list[list[int]]], pixel: float, complete: bool) -> None:
+        self.parts, self.groups, self.pixel, self.complete = parts, groups, pixel, complete
+        self.place = {n: (g, k) for g, layers in enumerate(groups) for k, layer in enumerate(layers) for n in layer}
+        self.on = {parts[layer[0]].plane: layer for layers in groups for layer in layers}
+        self.known: dict[tuple[int, int], int] = {}
+
+    def layers(self, n: int, way: int) -> list[list[int]]:
+        """Return the parts of the planes beyond a part, upward or downward, from near to far."""
+        g, k = self.place[n]
+        numbers = range(k + way, len(self.groups[g]) if way > 0 else -1, way)
+        return [self.groups[g][number] for number in numbers[: 1 if self.complete else LOOK]]
+
+    def gap(self, one: int, other: int) -> float:
+        """Return how far apart two parts are along the normal."""
+        return abs(self.parts[one].height - self.parts[other].height)
+
+    def kind(self, one: int, other: int) -> int:
+        """Tell how one part may go on as another: `OVER` it, `WITHIN` its hole, or `NOT`."""
+        key = min(one, other), max(one, other)
+        if key not in self.known:
+            self.known[key] = self._kind(self.parts[key[0]], self.parts[key[1]])
+        return self.known[key]
+
+    def _kind(self, one: Part, other: Part) -> int:
+        least = 0.0 if self.complete else SHARED * min(one.moments.area, other.moments.area)
+        if shared_area(one, other, np.zeros(2), self.pixel) > least:
+            return OVER
+        like = similar([one.moments.area], [other.moments.area]).all()
+        if not like or _away(one, other) > (STEEP * (one.height - other.height)) ** 2:
+            return NOT
+        return WITHIN if not self.complete and (_around(one, other) or _around(other, one)) else OVER
+
+    def beyond(self, n: int, way: int, least: int) -> list[int]:
+        """Return the parts that one may go on as, in the nearest plane that holds any."""
+        kinds = ([m for m in layer if self.kind(n, m) >= least] for layer in self.layers(n, way))
+        return next((found for found in kinds if found), [])
+
+    def onward(self, n: int, way: int) -> int:
+        """Return the plane in which a part goes on; -1 where it ends."""
+        over, within = (self.beyond(n, way, least) for least in (OVER, WITHIN))
+        if any(self._reach(n, m, way) for m in over):
+            return self.parts[over[0]].plane
+        if over != within and any(self.gap(n, m) <= NEXT * self._nearest(n) for m in within):
+            return self.parts[within[0]].plane
+        return -1
+
+    def _reach(self, n: int, m: int, way: int) -> bool:
+        """Tell whether two parts are near enough to be of one body, though slices be missing between them."""
+        if self.are_next(n, m, way):
+            return True
+        gap = self.gap(n, m)
+        near = gap <= MISSING * self._step(n, m, way)
+        tapers = self._taper(n, way), self._taper(m, -way)
+        return near and min(tapers) >= gap / 2 and (self._meet(n, m, way) or self._meet(m, n, -way))
+
+    def _meet(self, n: int, m: int, way: int) -> bool:
+        """Tell whether a part overlaps another when it moves on as it comes."""
+        inward, center = self.beyond(n, -way, OVER), self.parts[n].moments.center
+        shift = np.zeros(2)
+        if inward:
+            source = min(inward, key=lambda one: _away(self.parts[one], self.parts[n]))
+            shift = self.gap(n, m) / self.gap(n, source) * (center - self.parts[source].moments.center)
+        least = SHARED * min(self.parts[n].moments.area, self.parts[m].moments.area)
+        return shared_area(self.parts[n], self.parts[m], shift, self.pixel) > least
+
+    def are_next(self, n: int, m: int, way: int) -> bool:
+        """Tell whether no slice is missing between two parts."""
+        return self.complete or self.gap(n, m) <= NEXT * self._step(n, m, way)
+
+    def _step(self, n: int, m: int, way: int) -> float:
+        """Return the distance of slices on the far sides of two parts; of any neighbors, where they have no such."""
+        far = [self.gap(one, other) for one, w in ((n, -way), (m, way)) for other in self.beyond(one, w, OVER)[:1]]
+        return min(far) if far else min(self._nearest(n), self._nearest(m))
+
+    def _nearest(self, n: int) -> float:
+        """Return how far the nearest part is that one may go on as."""
+        beyond = [m for way in (1, -1) for m in self.beyond(n, way, WITHIN)]
+        return min((self.gap(n, m) for m in beyond), default=0.0)
+
+    def _taper(self, n: int, way: int) -> float:
+        """Return how far a part goes on before it ends in a cone; one that nothing tells of, as far as it is thick."""
+        inward, thick = self.beyond(n, -way, OVER), self.parts[n].thickness
+        if not inward:
+            return thick
+        m = max(inward, key=lambda one: self.parts[one].thickness)
+        wider = self.parts[m].thickness - thick
+        return self.gap(n, m) * thick / wider if wider > 0 else np.inf
+
+    def successors(self, below: list[int], above: list[int]) -> list[tuple[int, int]]:
+        """Pair the parts of two planes that seek each other."""
+        if not below or not above:
+            return []
+        allowed = np.array([[self.kind(a, b) != NOT for b in above] for a in below])
+        cost = np.array([[_cost(self.parts[a], self.parts[b]) for b in above] for a in below])
+        return [(below[a], above[b]) for a, b in matched(cost, allowed)]
+
+
+def _away(one: Part, other: Part) -> float:
+    return float(((one.moments.center - other.moments.center) ** 2).sum())
+
+
+def _around(one: Part, other: Part) -> bool:
+    return bool((one.low <= other.low).all() and (one.high >= other.high).all())
+
+
+def _cost(one: Part, other: Part) -> float:
+    return _away(one, other) + (one.moments.radius - other.moments.radius) ** 2
+
+
+def _branches(
+    near: _Neighbors, sought: dict[tuple[int, int], tuple[list[int], list[int]]], pairs: Sequence[tuple[int, int]]
+) -> list[tuple[int, int]]:
+    """Join what is left over to the part of the plane that it seeks which it overlaps most."""
+    before, after = {b: a for a, b in pairs}, dict(pairs)
+    found = []
+    for (low, high), (below, above) in sorted(sought.items()):
+        for n, source, plane in [(a, before.get(a), high) for a in below if a not in after] + [
+            (b, after.get(b), low) for b in above if b not in before
+        ]:
+            m = _covering(near, n, source, near.on[plane])
+            found += [(min(n, m), max(n, m))] if m >= 0 else []
+    return found
+
+
+def _covering(near: _Neighbors, n: int, source: int | None, others: Sequence[int]) -> int:
     """Return the part that one overlaps most when it moves on as it came from its source; -1 where there is none."""
-    shift = share * (part.moments.center - source.moments.center)
-    shared = [shared_area(part, other, shift, pixel) for other in others]
-    best = int(np.argmax(shared)) if shared else -1
-    return best if shared and shared[best] > SHARED * part.moments.area else -1
+    part, shift = near.parts[n], np.zeros(2)
+    if source is not None:
+        share = near.gap(n, others[0]) / near.gap(n, source)
+        shift = share * (part.moments.center - near.parts[source].moments.center)
+    shared = [shared_area(part, near.parts[m], shift, near.pixel) for m in others]
+    best = int(np.argmax(shared))
+    joined = shared[best] > SHARED * part.moments.area and near.are_next(n, others[best], 1 if n < others[best] else -1)
+    return others[best] if joined else -1
 
 
-def _joined(pairs: Sequence[tuple[int, int]], below: int, above: int) -> list[Link]:
-    one, other = [a for a, _ in pairs], [below + b for _, b in pairs]
-    links = sparse.coo_array((np.ones(len(pairs)), (one, other)), shape=(below + above,) * 2)
-    count, group = connected_components(links, directed=False)
-    numbers = [np.flatnonzero(group == g).tolist() for g in range(count)]
-    return [Link(tuple(n for n in g if n < below), tuple(n - below for n in g if n >= below)) for g in numbers]
+def _links(parts: Sequence[Part], pairs: Sequence[tuple[int, int]]) -> list[Link]:
+    """Gather the pairs of two planes that have a part in common, and the parts that nothing goes on from or to."""
+    grouped: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for a, b in sorted(set(pairs)):
+        grouped.setdefault((parts[a].plane, parts[b].plane), []).append((a, b))
+    links = [link for _, group in sorted(grouped.items()) for link in _joined(group)]
+    low, high = {n for link in links for n in link.above}, {n for link in links for n in link.below}
+    begins = [Link((), (n,)) for n in range(len(parts)) if n not in low]
+    return [*begins, *links, *(Link((n,), ()) for n in range(len(parts)) if n not in high)]
+
+
+def _joined(pairs: Sequence[tuple[int, int]]) -> list[Link]:
+    """Join pairs (below, above) of two planes to links."""
+    names = sorted({n for pair in pairs for n in pair})
+    one, other = np.searchsorted(names, np.array(pairs).T)
+    graph = sparse.coo_array((np.ones(len(pairs)), (one, other)), shape=(len(names),) * 2)
+    count, group = connected_components(graph, directed=False)
+    below = {a for a, _ in pairs}
+    sets = [[names[n] for n in np.flatnonzero(group == g)] for g in range(count)]
+    return [Link(tuple(n for n in one if n in below), tuple(n for n in one if n not in below)) for one in sets]

@@ -31,6 +31,10 @@ RING, SIDE, TRACK = "ring", "side", "track"
 """The attributes of neurons where a slice has several rings: which ring, what side it is on (`contours.SIDES`; odd ones
 are around what is outside), and which contour it is from slice to slice."""
 
+STRUCTURE = "structure"
+"""The attribute of contours that somebody drew: the structure that each point is of. Slices that they are not on were
+left out, or do not have them: nobody knows."""
+
 
 @dataclass(frozen=True)
 class PointSet:

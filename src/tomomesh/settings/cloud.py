@@ -12,6 +12,8 @@ class CloudSettings(Group):
     """How a cloud is read where its file leaves a choice."""
 
     structure: str | None = param(
-        None, "structure of a DICOM RT Structure Set: its number in the table, or its name", kind=str
+        None,
+        "structures of a DICOM RT Structure Set: a number in the table or a name, several with commas between, or all",
+        kind=str,
     )
     skip_flat: bool = param(False, "leave out contours that enclose nothing: of one or two corners, or on one line")

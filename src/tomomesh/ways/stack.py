@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..contours.direction import FEWEST
 from ..contours.stack import ContourSurface, contour_surface
+from ..model.points import NEURON
 from ..results import Enclosed, Surface
 from ..stage import Stage, folded, measured
 from .points import place_found
@@ -23,6 +25,9 @@ if TYPE_CHECKING:
 APART = 1.5
 """Distance of two slices of a stack of contours, in median ones, over which a result is warned of: half a slice more
 than one, so that a missing slice is told. A warning's threshold, chosen: no mesh depends on it."""
+
+NAMED = 4
+"""Places that a warning names at most."""
 
 
 def surface_of_stack(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
@@ -61,40 +66,69 @@ def surface_of_slices(
     made = closed.value
     surface = Surface(
         cloud, made.boundary.cuberille, made.rest.smoothed, made.mesh, made.rest.nearest, filled=made.filled,
-        cavities=made.boundary.cavities, encloses=encloses or Enclosed("slices", made.encloses),
+        cavities=made.boundary.cavities, encloses=encloses or Enclosed("slices", _least(made, slices)),
     )  # fmt: skip
     spaced = points_found(cloud, slices.spacing, unit=unit, bridged=bridged)
-    return folded(
-        surface,
-        closed,
-        spaced,
-        boundary_found(made.boundary, made.rest),
-        _stack_found(made, slices, of_study=encloses is not None),
-    )
+    left = int((cloud.kinds[slices.labels < 0] == NEURON).sum())
+    told = _stack_found(made, slices, left=left, of_study=encloses is not None)
+    return folded(surface, closed, spaced, boundary_found(made.boundary, made.rest), told)
 
 
-def _stack_found(made: ContourSurface, slices: Slices, *, of_study: bool) -> Stage[None]:
+def _least(made: ContourSurface, slices: Slices) -> float:
+    """Return the volume of the frusta; of several structures, which may lie in each other, that of the largest."""
+    stack = made.stack
+    if not slices.rings:
+        return float(stack.frusta.sum())
+    _, first = np.unique(stack.body, return_index=True)
+    groups = slices.groups[[stack.parts[n].plane for n in first]]
+    return float(np.bincount(groups, stack.frusta).max())
+
+
+def _stack_found(made: ContourSurface, slices: Slices, *, left: int, of_study: bool) -> Stage[None]:
     """Tell of the slices, and the voxels between them."""
-    widest = float(np.diff(slices.heights).max())
+    stack, volume = made.stack, float(made.mesh.face_volumes.sum())
+    widest = max((float(gaps.max()) for gaps in stack.gaps.values()), default=stack.step)
+    frusta = float(stack.frusta.sum())
     stats: dict[str, dict[str, Any]] = {
         "stack": {
             "slices": made.slices,
             "contours": made.contours,
             "open": made.open,
-            "slice_distance_mm": slices.distance,
+            "bodies": int(stack.body.max()) + 1,
+            "on_one_slice": len(stack.alone),
+            "points_left_out": left,
+            "slice_distance_mm": stack.step,
             "widest_slice_distance_mm": widest,
             "longest_gap": made.reach,
+            "frusta_mm3": frusta,
+            "volume_over_frusta": volume / frusta,
             "voxel_mm": made.edge,
             "voxels": made.voxels,
         },
         "fit": {"filled_faces": int(made.filled.sum())},
     }
-    warnings = []
-    if not of_study and widest > APART * slices.distance:
-        warnings.append(f"slices lie up to {widest:.4g} apart, {slices.distance:.4g} as a rule: that is interpolated")
+    warnings = [] if of_study else _told_of_slices(made, slices, widest, left)
     if made.edge > made.asked_edge:
         warnings.append(f"voxels of {made.asked_edge:.4g} would not fit: they are {made.edge:.4g} wide")
     return Stage(None, stats, tuple(warnings))
+
+
+def _told_of_slices(made: ContourSurface, slices: Slices, widest: float, left: int) -> list[str]:
+    """Warn of what the slices do not tell."""
+    stack, told = made.stack, []
+    if stack.widest > APART:
+        told.append(f"slices lie up to {widest:.4g} apart, {stack.step:.4g} as a rule: that is interpolated")
+    if stack.alone:
+        places = (slices.origin + part.place @ slices.axes for part in stack.alone[:NAMED])
+        named = "; ".join(", ".join(f"{axis:.4g}" for axis in place) for place in places)
+        more = "; ..." if len(stack.alone) > NAMED else ""
+        told.append(
+            f"{len(stack.alone)} contour(s) go on in no other slice, and are made a slice distance thick: "
+            f"at {named}{more}"
+        )
+    if left:
+        told.append(f"{left} point(s) are on no contour of {FEWEST} points or more: they are left out")
+    return told
 
 
 def body_of_stack(report: dict[str, Any]) -> list[str]:

@@ -17,8 +17,18 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-CLOSED = ("CLOSED_PLANAR", "CLOSEDPLANAR_XOR")
-"""Kinds of contours that enclose an area."""
+CLOSED, OPEN = ("CLOSED_PLANAR", "CLOSEDPLANAR_XOR"), "OPEN_PLANAR"
+"""Kinds of contours that enclose an area, and the kind that does where its ends meet."""
+
+
+def ends_meet(item: Any) -> bool:
+    """Tell whether the ends of an open contour are no farther apart than its longest side; no for a broken one."""
+    try:
+        corners = _corners(item, "", "")
+    except FormatError:
+        return False
+    sides = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    return len(corners) > 2 and bool(np.linalg.norm(corners[0] - corners[-1]) <= sides.max())
 
 
 def corners_of(items: Sequence[Any], *, where: str, file: str, skip_flat: bool = False) -> list[Floats]:

@@ -6,7 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
+from ....contours.direction import axes_across
+from ....contours.levels import columns_of, planes_within, slices_at, typical_gap
 from ....errors import EmptyError, GeometryError
 from .rings import vector_area
 
@@ -19,16 +23,18 @@ if TYPE_CHECKING:
 
 SAME_HEIGHT_MM = 1e-3
 """Heights in mm that differ by less are the same: planning systems write two or three decimals."""
-ONE_PLANE = 0.1
-"""Contours nearer than this share of the planes' median distance lie in one plane: no stack has slices so uneven."""
 MOST_OFF_PLANE = 0.25
-"""Share of the least distance of two planes by which a contour may leave its own: half of the way to where it would
-lie nearer to another."""
+"""Share of the distance of two planes by which a contour may leave its own: half of the way to where it would lie
+nearer to another."""
+
+TURNED = np.radians(20.0)
+"""Contours whose planes are turned by more than this are of different stacks: no contour of a stack leans so much, and
+the three axes are 90 degrees apart. Half and twice of it change nothing for these."""
 
 
 @dataclass(frozen=True)
 class Planes:
-    """Parallel planes, rising along their normal.
+    """Parallel planes, rising along their normal within each column of contours that lie over one another.
 
     Attributes
     ----------
@@ -36,10 +42,18 @@ class Planes:
         The plane of each contour.
     heights : (s,) float array
         Where the planes are along their normal, mm.
+    apart : float
+        Distance of the planes of a column, as a rule.
     """
 
     labels: NDArray[np.int64]
     heights: Floats
+    apart: float
+
+    @property
+    def slices(self) -> int:
+        """How many slices the planes of all columns are on."""
+        return slices_at(self.heights)
 
 
 def planes_of(contours: Sequence[Floats], *, file: str) -> Planes:
@@ -62,28 +76,37 @@ def planes_of(contours: Sequence[Floats], *, file: str) -> Planes:
     if not contours:
         raise EmptyError("no contour encloses anything", file=file, expected="at least two slices")
     normal = _normal(contours)
-    along = [contour @ normal for contour in contours]
-    height = np.array([float(one.mean()) for one in along])
-    order = np.argsort(height, kind="stable")
-    gaps = np.diff(height[order])
-    apart = gaps[gaps > SAME_HEIGHT_MM]
-    if not len(apart):
+    axes = axes_across(normal)
+    placed = [contour @ axes.T for contour in contours]
+    height = np.array([float(one[:, 2].mean()) for one in placed])
+    low, high = (np.array([end(one[:, :2], axis=0) for one in placed]) for end in (np.min, np.max))
+    column = columns_of(low, high)
+    labels = planes_within(height, column, (high - low).max(axis=1), SAME_HEIGHT_MM)
+    heights = np.bincount(labels, height) / np.bincount(labels)
+    gaps = np.array([typical_gap(heights[np.unique(labels[column == one])]) for one in range(column.max() + 1)])[column]
+    if not (gaps > SAME_HEIGHT_MM).any():
         raise EmptyError(
             "contours on one slice enclose no volume", file=file, found="1 slice", expected="at least two slices"
         )
-    labels = np.empty(len(height), np.int64)
-    labels[order] = np.cumsum(np.concatenate([[False], gaps > ONE_PLANE * np.median(apart)]))
-    heights = np.bincount(labels, height) / np.bincount(labels)
-    off = np.array([np.abs(one - heights[label]).max() for one, label in zip(along, labels, strict=True)])
-    most = MOST_OFF_PLANE * float(np.diff(heights).min())
-    if off.max() > most:
+    apart = float(np.median(gaps[gaps > SAME_HEIGHT_MM]))
+    off = np.array([np.abs(one[:, 2] - level).max() for one, level in zip(placed, height, strict=True)])
+    if off.max() > MOST_OFF_PLANE * apart:
         raise GeometryError(
             "the contours do not lie in parallel planes",
             file=file,
             found=f"contour {int(off.argmax()) + 1} is {off.max():.3g} mm off its plane",
-            expected=f"at most {most:.3g} mm across ({', '.join(f'{n:.3g}' for n in normal)})",
+            expected=f"at most {MOST_OFF_PLANE * apart:.3g} mm across ({', '.join(f'{n:.3g}' for n in normal)})",
         )
-    return Planes(labels, heights)
+    return Planes(labels, heights, apart)
+
+
+def directions(contours: Sequence[Floats]) -> int:
+    """Count the directions of the planes of contours (u, 3), where there are several with two contours each; else 0."""
+    areas = np.array([vector_area(contour) for contour in contours])
+    normals = areas / np.linalg.norm(areas, axis=1)[:, None]
+    near = np.abs(normals @ normals.T) > np.cos(TURNED)
+    count, direction = connected_components(csr_array(near), directed=False)
+    return int(count) if count > 1 and np.bincount(direction).min() > 1 else 0
 
 
 def _normal(contours: Sequence[Floats]) -> Floats:

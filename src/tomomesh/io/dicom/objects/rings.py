@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
 NO_AREA = 1e-9
 """Polygons of less area, in shares of their squared length, enclose nothing: far above the rounding of doubles (1e-16),
 and far below a sliver a thousand times as long as wide (2.5e-4)."""
+SLIT = 0.05
+"""Corners nearer than this share of a polygon's median side are one. A tenth of what a contour's own detail could be:
+with twice of it nothing changes, as long as no side is that short."""
 FEWEST_POINTS = 24
 """Points that a ring gets at least: a circle's polygon of so many has 1.1 % less area."""
 
@@ -32,7 +36,8 @@ def perimeter(polygon: Floats) -> float:
 def parted(polygon: Floats) -> list[Floats]:
     """Part a polygon (u, 3) where it returns to one of its corners.
 
-    A keyhole, an inner ring that is joined to the outer one by a slit, becomes two rings, and the slit nothing.
+    A keyhole, an inner ring that is joined to the outer one by a slit, becomes two rings, and the slit nothing. Corners
+    nearer than `SLIT` times the median side are one, as the two banks of a slit may be drawn apart.
 
     Returns
     -------
@@ -42,7 +47,7 @@ def parted(polygon: Floats) -> list[Floats]:
     chain: list[tuple[float, ...]] = []
     place: dict[tuple[float, ...], int] = {}
     found = []
-    for corner in map(tuple, polygon.tolist()):
+    for corner in map(tuple, _joined(polygon).tolist()):
         start = place.setdefault(corner, len(chain))
         if start < len(chain):
             found.append(chain[start:])
@@ -53,6 +58,16 @@ def parted(polygon: Floats) -> list[Floats]:
             chain.append(corner)
     rings = [np.array(ring) for ring in [*found, chain] if len(ring) > 2]
     return [ring for ring in rings if np.linalg.norm(vector_area(ring)) > NO_AREA * perimeter(ring) ** 2]
+
+
+def _joined(polygon: Floats) -> Floats:
+    """Move corners (u, 3) that are all but the same to the first of them."""
+    sides = _sides(polygon)
+    near = SLIT * float(np.median(sides[sides > 0])) if (sides > 0).any() else 0.0
+    joined = polygon.copy()
+    for one, other in sorted(cKDTree(polygon).query_pairs(near)):
+        joined[other] = joined[one]
+    return joined
 
 
 def thinned(ring: Floats, distance: float) -> Floats:

@@ -1,21 +1,23 @@
-"""DICOM RT Structure Sets: the closed contours of one structure as rings of points, each with its slice."""
+"""DICOM RT Structure Sets: the closed contours of structures as rings of points, each with its slice."""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from functools import reduce
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
 from ....errors import EmptyError, FormatError, GeometryError, ResourceError, TomomeshError, UsageError
-from ....model.points import NEURON, RING, PointSet
+from ....measure.polygon import side_lengths
+from ....model.points import NEURON, RING, STRUCTURE, PointSet
 from ...files.source import counted, third_party
 from ..headers.dataset import read_dataset
 from ..headers.kinds import STRUCTURES, storage_class
 from ..headers.names import shown
-from .contours import CLOSED, corners_of
-from .planes import planes_of
+from .contours import CLOSED, OPEN, corners_of, ends_meet
+from .planes import directions, planes_of
 from .rings import filled, parted, pieces_of, thinned
 
 if TYPE_CHECKING:
@@ -32,6 +34,8 @@ FINEST, FINE = 0.1, 0.3
 """Distances of the points on a contour, in distances of the slices: corners that are nearer are left out; longer sides
 get points. Chosen, on a torus: half of the first changes the distance by -6 %, twice by +18 %; half of the other by
 -23 %, twice by +58 %."""
+ALL = "all"
+"""What stands for every structure that has closed contours."""
 MOST_POINTS = 20_000_000
 """Points that a structure may have: their positions alone are half a gigabyte."""
 
@@ -47,7 +51,9 @@ class Structure:
     name : str
         As the file has it.
     contours : list of pydicom Dataset
-        The closed ones.
+        Those that are closed, or whose ends meet.
+    met : int
+        How many are said to be open.
     others : Counter
         How many others there are, by their kind.
     """
@@ -55,6 +61,7 @@ class Structure:
     number: int
     name: str
     contours: list[Any]
+    met: int
     others: Counter[str]
 
     def __str__(self) -> str:
@@ -96,17 +103,39 @@ def read_structure(path: Path, settings: CloudSettings) -> PointSet:
         )  # fmt: skip
     structures = _listed(path)
     taken = _chosen(structures, settings.structure, file=str(path))
+    read = [_read(one, path, len(structures), settings) for one in taken]
+    points = reduce(_stacked, (points for points, _ in read))
+    return replace(points, frame="LPS", notes=tuple(note for _, notes in read for note in notes))
+
+
+def _read(taken: Structure, path: Path, of: int, settings: CloudSettings) -> tuple[PointSet, list[str]]:
+    """Return the points of one structure, and what is to be told of it."""
     with third_party("pydicom", path.name):
         where = f"structure {taken.number}"
         corners = corners_of(taken.contours, where=where, file=path.name, skip_flat=settings.skip_flat)
-    planes = planes_of(corners, file=str(path))
-    points = _points(corners, planes.labels, float(np.median(np.diff(planes.heights))), file=str(path))
-    notes = [f"structure {taken} of {len(structures)}, {len(corners)} contours on {len(planes.heights)} slices"]
+    told = f"structure {taken} of {of}, {len(corners)} contours"
+    if ways := directions(corners):
+        notes = [f"{told} in planes of {ways} directions: their points are taken as a cloud"]
+        points = _points(corners, np.zeros(len(corners), np.int64), _side(corners) / FINE, file=str(path))
+        points = PointSet.from_positions(points.positions)
+    else:
+        planes = planes_of(corners, file=str(path))
+        notes = [f"{told} on {planes.slices} slices"]
+        points = _points(corners, planes.labels, planes.apart, file=str(path))
+        number = np.full(len(points), taken.number, np.int32)
+        points = replace(points, attributes={**points.attributes, STRUCTURE: number})
+    if taken.met:
+        notes.append(f"open contours whose ends meet, taken as closed: {taken.met}")
     if taken.others:
         notes.append(f"contours that are not closed, left out: {counted(taken.others)}")
     if flat := len(taken.contours) - len(corners):
         notes.append(f"contours that enclose nothing, left out: {flat}")
-    return replace(points, frame="LPS", notes=tuple(notes))
+    return points, notes
+
+
+def _stacked(one: PointSet, other: PointSet) -> PointSet:
+    """Append the points of another structure, whose planes get numbers of their own."""
+    return one.joined(replace(other, slices=other.slices + one.slices.max() + 1))
 
 
 def _listed(path: Path) -> list[Structure]:
@@ -124,32 +153,60 @@ def _listed(path: Path) -> list[Structure]:
 
 def _structure(number: int, name: str, items: Sequence[Any]) -> Structure:
     kinds = [str(item.get("ContourGeometricType") or "no type") for item in items]
-    closed = [item for item, kind in zip(items, kinds, strict=True) if kind in CLOSED]
-    return Structure(number, name, closed, Counter(shown(kind) for kind in kinds if kind not in CLOSED))
+    met = [kind == OPEN and ends_meet(item) for item, kind in zip(items, kinds, strict=True)]
+    closed = [kind in CLOSED or one for kind, one in zip(kinds, met, strict=True)]
+    others = Counter(shown(kind) for kind, one in zip(kinds, closed, strict=True) if not one)
+    return Structure(number, name, [item for item, one in zip(items, closed, strict=True) if one], sum(met), others)
 
 
-def _chosen(structures: list[Structure], wanted: str | None, *, file: str) -> Structure:
-    """Return the structure that is wanted, or the only one that has closed contours."""
+def _chosen(structures: list[Structure], wanted: str | None, *, file: str) -> list[Structure]:
+    """Return the structures that are wanted, or the only one that has closed contours."""
     closed = [one for one in structures if one.contours]
-    if wanted is not None:
-        found = [one for one in structures if str(one.number) == wanted.strip()]
-        found = found or [one for one in structures if wanted.strip() in (one.name.strip(), shown(one.name))]
-    else:
-        found = closed
-    if len(found) > 1:
-        what = "several structures could be meant" if wanted else f"the file holds {len(found)} structures"
-        raise GeometryError(
-            what, file=file, found=_table(structures, file), expected="one structure", hint="--structure N"
-        )
-    if wanted is not None and not found:
+    if wanted is None and len(closed) == 1:
+        return closed
+    if wanted is not None and wanted.strip() == ALL and closed:
+        return closed
+    if wanted is None:
+        if closed:
+            _refuse_several(f"the file holds {len(closed)} structures", structures, file)
+        raise _no_contours(structures, file)
+    if found := _named(structures, wanted):
+        return [_only(found, structures, file)]
+    each = [_named(structures, name) for name in wanted.split(",")]
+    if not all(each):
         raise UsageError(
             "there is no such structure", file=file, found=_table(structures, file),
             expected="--structure with a number or a name of the table",
         )  # fmt: skip
-    if not found or not found[0].contours:
-        listed = _table(found or structures, file) or "0 structures"
-        raise EmptyError("there are no closed contours", file=file, found=listed, expected=" or ".join(CLOSED))
+    chosen = {one.number: one for one in (_only(found, structures, file) for found in each)}
+    return [chosen[number] for number in sorted(chosen)]
+
+
+def _named(structures: list[Structure], wanted: str) -> list[Structure]:
+    """Return the structure of a number, else those of a name."""
+    found = [one for one in structures if str(one.number) == wanted.strip()]
+    return found or [one for one in structures if wanted.strip() in (one.name.strip(), shown(one.name))]
+
+
+def _only(found: list[Structure], structures: list[Structure], file: str) -> Structure:
+    """Return the structure that is found, where it is one that has closed contours."""
+    if len(found) > 1:
+        _refuse_several("several structures could be meant", structures, file)
+    if not found[0].contours:
+        raise _no_contours(found, file)
     return found[0]
+
+
+def _refuse_several(what: str, structures: list[Structure], file: str) -> NoReturn:
+    raise GeometryError(
+        what, file=file, found=_table(structures, file), expected="one structure, or several by their numbers",
+        hint="--structure N, --structure N,M or --structure all",
+    )  # fmt: skip
+
+
+def _no_contours(listed: list[Structure], file: str) -> EmptyError:
+    found = _table(listed, file) or "0 structures"
+    return EmptyError("there are no closed contours", file=file, found=found, expected=" or ".join(CLOSED))
 
 
 def _table(structures: list[Structure], file: str) -> str:
@@ -163,11 +220,16 @@ def _slices(structure: Structure, file: str) -> str:
     try:
         with third_party("pydicom", file):
             corners = corners_of(structure.contours, where="", file=file, skip_flat=True)
-            return str(len(planes_of(corners, file=file).heights))
+            return str(planes_of(corners, file=file).slices)
     except EmptyError:
         return "1"
     except TomomeshError:
         return "unknown"
+
+
+def _side(contours: list[Floats]) -> float:
+    """Return the median side of contours (u, 3)."""
+    return float(np.median(np.concatenate([side_lengths(one) for one in contours])))
 
 
 def _points(contours: list[Floats], labels: NDArray[np.int64], apart: float, *, file: str) -> PointSet:
@@ -178,8 +240,7 @@ def _points(contours: list[Floats], labels: NDArray[np.int64], apart: float, *, 
         for ring in parted(contour)
     ]
     rings.sort(key=lambda one: one[1])
-    sides = [np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1) for ring, _ in rings]
-    distance = min(float(np.median(np.concatenate(sides))), FINE * apart)
+    distance = min(_side([ring for ring, _ in rings]), FINE * apart)
     pieces = [pieces_of(ring, distance) for ring, _ in rings]
     if (total := sum(float(one.sum()) for one in pieces)) > MOST_POINTS:
         raise ResourceError(
