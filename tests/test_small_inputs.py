@@ -85,10 +85,13 @@ class TestSpace:
             reconstruct(full, lower=0.0, network=network, neurons=3)
 
 
-def test_contours_thinner_than_a_voxel_enclose_nothing() -> None:
-    few = 200 * (np.random.default_rng(10).random((12, 12, 12)) < 0.15).astype(np.uint8)
-    with pytest.raises(EmptyError, match="the contours enclose no voxel"):
-        reconstruct(Volume.from_stored(few, np.eye(4)), lower=100.0, contours="walls", neurons=22, start="neighbor")
+def test_contours_thinner_than_a_pixel_enclose_nothing() -> None:
+    plate = np.zeros((4, 20, 30), np.uint8)
+    plate[:, 10, 5:25] = 200
+    study = Volume.from_stored(plate, np.eye(4))
+    with pytest.raises(EmptyError, match="the contours enclose no pixel"):
+        reconstruct(study, lower=100.0, contours="components", signal="region")
+    assert reconstruct(study, lower=100.0, contours="loops").report["quality"]["components"] == 1
 
 
 class TestClouds:
