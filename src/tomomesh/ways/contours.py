@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +10,9 @@ from ..errors import EmptyError
 from ..isosurface.crossings import Levels
 from ..isosurface.voxels import Boundary, boundary, voxel_surface
 from ..measure.rings import assess_contours
+from ..progress import Progress, silent
 from ..results import Enclosed, Segmentation, Surface
-from ..segmentation.contours.levels import LEVEL, levels_of
+from ..segmentation.contours.between import filled_between
 from ..segmentation.contours.train import train_contours
 from ..segmentation.sample import sample_contours
 from ..segmentation.training import regions
@@ -22,7 +22,6 @@ from .way import POINTS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
     from ..model.contours import Contours
-    from ..progress import Progress
     from ..segmentation.study import Selected
     from ..settings import Settings
 
@@ -57,7 +56,9 @@ def surface_by_contours(found: Segmentation[Contours], settings: Settings, progr
         Where the rings enclose the middle of no pixel, or are on one slice alone.
     """
     run = settings.run
-    bounded = measured("contours", boundary_of_rings, found, settings.cubes.surface, run.threads)
+    bounded = measured(
+        "contours", boundary_of_rings, found, surface=settings.cubes.surface, threads=run.threads, progress=progress
+    )
     made = bounded.value
     meshed = measured("fit", voxel_surface, made, settings.fit, threads=run.threads, progress=progress)
     rest = meshed.value
@@ -68,19 +69,21 @@ def surface_by_contours(found: Segmentation[Contours], settings: Settings, progr
     return folded(surface, bounded, meshed, boundary_found(made, rest))
 
 
-def boundary_of_rings(found: Segmentation[Contours], surface: str = "all", threads: int = 0) -> Boundary:
-    """Return the boundary of the pixels that rings enclose, crossed where the rings pass."""
-    volume, contours = found.volume, found.source
+def boundary_of_rings(
+    found: Segmentation[Contours], *, surface: str = "all", threads: int = 0, progress: Progress = silent
+) -> Boundary:
+    """Return the boundary of what rings enclose on their slices and between them, crossed where they pass."""
+    contours = found.source
     _refuse_one_slice(contours)
-    levels = levels_of(contours, found.mask, volume.spacing_mm[:2], threads)
-    inside = levels > LEVEL
+    filled = filled_between(contours, found.mask, found.volume, threads=threads, progress=progress)
+    inside = filled.voxels > 0
     if not inside.any():
         raise EmptyError(
             "the contours enclose no pixel", found=f"{len(contours)} contours", expected="contours wider than a pixel",
             hint="--contours loops",
         )  # fmt: skip
     outer = "outer" if surface == "outer" else "all"
-    return boundary(replace(volume, voxels=levels), inside, lower=LEVEL, surface=outer, threads=threads)
+    return boundary(filled, inside, lower=0.0, surface=outer, threads=threads)
 
 
 def _refuse_one_slice(contours: Contours) -> None:
