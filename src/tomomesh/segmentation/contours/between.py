@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 MOST_VOXELS = 60_000_000
 """Voxels over which fewer slices are laid between the slices: 240 MB of 32-bit depths."""
 TOUCHING = np.ones((3, 3, 3), bool)
+"""Voxels that touch at a corner are of one piece."""
 
 
 def filled_between(

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     Depths = NDArray[np.float32]
 
 REACH = 4.0
-"""Pixels from the rings within which depths are measured: farther away they are this deep."""
+"""Pixels from the rings within which depths are measured: farther away they are this deep. Chosen: half of it changes
+the distance by +2.6 %, twice by -0.3 % and the volume by -0.5 %."""
 MARGIN = 2
 """Pixels around the rings that are looked at: one outside, and one beyond it."""
 NEAR = 1.0
@@ -32,7 +33,7 @@ than that from the pixels on both of its sides. Measured on the skull of a head:
 other side at the default neurons, 189 for half of it, and 2,419 for none."""
 BARELY = 0.01
 """Pixels that one lies from a ring at least which the ring leaves on the other side; no crossing comes nearer to the
-middle of a voxel."""
+middle of a voxel (`isosurface.crossings.CLOSEST`)."""
 
 
 @dataclass(frozen=True)
