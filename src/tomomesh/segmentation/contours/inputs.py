@@ -31,8 +31,8 @@ SIDES_MOST = 8
 """Pixel sides of an outline for each neuron of a loop at most: fewer neurons would cut thin walls and bays across.
 Chosen: half and twice of it change no case of benchmarks/constants.py."""
 OFF = 0.02
-"""Pixels that a straight side of a loop may be off the outline that it follows. Chosen, on a skull in slabs of 4 mm: half
-of it changes the distance by -0.4 % and the turn from face to face by +2.7 %, twice by +2.1 % and -7.2 %."""
+"""Pixels that a straight side of a loop may be off the outline that it follows. Chosen, on a skull in slabs of 4 mm:
+half of it changes the distance by -0.4 % and the turn from face to face by +2.7 %, twice by +2.1 % and -7.2 %."""
 STAIRS = 2.0
 """Pixel sides over which the stairs of an outline are evened out before its curvature is measured. Chosen: half of it
 changes the distance by -0.2 % and the turn by +2.8 %, twice by +1.7 % and -8.0 %."""
