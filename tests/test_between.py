@@ -273,6 +273,17 @@ class TestBetween:
         assert quality["components"] == 2
         assert quality["volume_mm3"] == pytest.approx(4 * mask.sum(), rel=0.06)
 
+    @pytest.mark.parametrize("share", [0.6, 0.75, 1.0])
+    def test_the_gray_level_of_a_step_tells_how_high_it_is(self, share: float) -> None:
+        away = np.hypot(*(np.indices((60, 60)) - 29.3))
+        wide, narrow = (np.clip(radius - away, 0, 1) for radius in (22.5, 7.5))
+        gray = np.stack([wide, wide, np.maximum(share * wide, narrow), narrow, narrow]).astype(np.float32)
+        found = reconstruct(Volume.from_stored(gray, np.diag([1.0, 1.0, 4.0, 1.0])), lower=0.5, contours="loops")
+        far = np.hypot(*(found.mesh.vertices[:, :2] - 29.3).T)
+        step = found.mesh.vertices[(far > 13) & (far < 17) & (found.mesh.vertices[:, 2] > 4), 2]
+        # linear between the levels of the two slices
+        assert step.mean() == pytest.approx(4 * (2 + (share - 0.5) / share), abs=0.3)
+
     def test_a_prism_encloses_its_areas_times_the_slices(self) -> None:
         away = np.hypot(*(np.indices((60, 60)) - 29.3))
         found = loops(np.stack([away < 20] * 6))

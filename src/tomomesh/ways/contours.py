@@ -41,7 +41,7 @@ def segment_by_contours(kept: Selected, settings: Settings, progress: Progress) 
     labels = measured("regions", regions, mask, trained.value, pixel_mm=pixel_mm, threads=run.threads)
     placed = measured("points", sample_contours, trained.value, study)
     sampling = placed.value
-    found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value)
+    found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value, levels)
     return folded(
         found, trained, labels, _contours_found(trained.value, kept, settings), placed, sampling_found(placed.value)
     )
@@ -75,7 +75,7 @@ def boundary_of_rings(
     """Return the boundary of what rings enclose on their slices and between them, crossed where they pass."""
     contours = found.source
     _refuse_one_slice(contours)
-    filled = filled_between(contours, found.mask, found.volume, threads=threads, progress=progress)
+    filled = filled_between(contours, found.mask, found.volume, levels=found.levels, threads=threads, progress=progress)
     inside = filled.voxels > 0
     if not inside.any():
         raise EmptyError(

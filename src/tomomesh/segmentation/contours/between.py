@@ -13,11 +13,13 @@ from ...kernels.threads import in_blocks
 from ...model.contours import BIRTH, DEATH
 from ...progress import Progress, silent
 from .courses import courses_of
+from .gray import tempered
 from .insides import insides_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ...isosurface.crossings import Levels
     from ...model.contours import Contours
     from ...model.volume import Volume
     from .courses import Course
@@ -32,8 +34,9 @@ TOUCHING = np.ones((3, 3, 3), bool)
 
 
 def filled_between(
-    contours: Contours, mask: NDArray[np.bool_], study: Volume, *, threads: int = 0, progress: Progress = silent
-) -> Volume:
+    contours: Contours, mask: NDArray[np.bool_], study: Volume, *, levels: Levels | None = None, threads: int = 0,
+    progress: Progress = silent,
+) -> Volume:  # fmt: skip
     """Lay slices between the slices of rings, about as far apart as pixels are wide.
 
     Along each track the rings pass from point to point, and carry the depths of both slices with them, which are
@@ -49,6 +52,8 @@ def filled_between(
         The window.
     study : Volume
         Its slices K are those of the contours.
+    levels : Levels, optional
+        The gray levels and the window on them, which tell of loops how near the surface is above and below.
     threads : int
     progress : callable
 
@@ -60,18 +65,19 @@ def filled_between(
     insides = insides_of(contours, mask, study.spacing_mm[:2], threads)
     times = _times(insides, study.slice_distance_mm)
     courses = courses_of(insides, study.slice_distance_mm, threads)
-    spaces = _Spaces(insides, courses, _ended(contours, insides), _holes(contours), times)
-    levels = np.empty((spaces.layers, *insides.depths.shape[1:]), np.float32)
+    depths = tempered(insides, levels if contours.kind == "loops" else None, mask)
+    spaces = _Spaces(insides, depths, courses, _ended(contours, insides), _holes(contours), times)
+    filled = np.empty((spaces.layers, *insides.depths.shape[1:]), np.float32)
 
     def work(start: int, stop: int) -> None:
         for k in range(start, stop):
-            spaces.fill(k - 1, levels)
+            spaces.fill(k - 1, filled)
 
     total = len(insides.curves) + 2
     in_blocks(work, total, block=1, threads=threads, done=lambda done: progress("slices", done, total))
     most = np.float32(insides.pixel.max())
-    np.clip(levels, -most, most, out=levels)
-    return replace(study, voxels=levels, affine=_affine(study, insides, times, spaces.around))
+    np.clip(filled, -most, most, out=filled)
+    return replace(study, voxels=filled, affine=_affine(study, insides, times, spaces.around))
 
 
 def _times(insides: Insides, step: float) -> int:
@@ -108,6 +114,8 @@ class _Spaces:
     Attributes
     ----------
     insides : Insides
+    depths : (K, J, I) float32 array
+        Those that are blended between the slices.
     courses : list of lists of Course
     ended : dict
         The tracks that are born on a slice, or die there.
@@ -118,6 +126,7 @@ class _Spaces:
     """
 
     insides: Insides
+    depths: Depths
     courses: list[list[Course]]
     ended: dict[tuple[str, int], list[int]]
     holes: set[int]
@@ -147,7 +156,7 @@ class _Spaces:
 
     def _closed(self, k: int) -> tuple[Depths, Depths]:
         """Return the depths of slice k and the next, where what has nothing there lies as far outside as it is deep."""
-        curves, depths = self.insides.curves, self.insides.depths
+        curves, depths = self.insides.curves, self.depths
         if k == len(curves):
             return -np.abs(depths[-1]), -np.abs(depths[-1])
         if k + 1 == len(curves) or not curves[k + 1]:
@@ -166,7 +175,7 @@ class _Spaces:
             low = np.maximum(np.floor(curve.min(axis=0)).astype(np.int64) - 1, 0)
             high = np.ceil(curve.max(axis=0)).astype(np.int64) + 2
             window = slice(low[1], high[1]), slice(low[0], high[0])
-            own, other = self.insides.depths[k][window], beside[window]
+            own, other = self.depths[k][window], beside[window]
             within = np.empty(own.shape, np.float32)
             self.insides.draw([np.ascontiguousarray((curve[::-1] if hole else curve) - low)], within)
             if hole:

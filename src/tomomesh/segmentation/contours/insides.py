@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -63,6 +63,14 @@ class Insides:
         """The greatest depth that is told."""
         return REACH * float(self.pixel.max())
 
+    def over(self, voxels: NDArray[Any], beyond: float) -> NDArray[np.float32]:
+        """Return voxels (K, J, I) of the study over the pixels that are looked at; `beyond` where it has none."""
+        found = np.full(self.depths.shape, beyond, np.float32)
+        low = self.low[::-1]
+        first, stop = np.maximum(low, 0), np.minimum(low + found.shape, voxels.shape)
+        found[tuple(map(slice, first - low, stop - low))] = voxels[tuple(map(slice, first, stop))]
+        return found
+
     def draw(self, curves: Sequence[Floats], depths: Depths) -> None:
         """Measure how deep pixels (J, I) lie inside of curves."""
         sizes = np.array([len(curve) for curve in curves])
@@ -92,7 +100,7 @@ def insides_of(contours: Contours, mask: NDArray[np.bool_], pixel_mm: tuple[floa
     Insides
     """
     insides = _empty(contours, np.array(pixel_mm))
-    window = _window(mask, insides) if contours.kind == "loops" else None
+    window = insides.over(mask, 0) > 0 if contours.kind == "loops" else None
 
     def work(start: int, stop: int) -> None:
         for k in range(start, stop):
@@ -115,15 +123,6 @@ def _empty(contours: Contours, pixel: Floats) -> Insides:
     for one in contours.contours:
         curves[one.slice - first][one.track] = turned(one) - low[:2]
     return Insides(pixel, low, curves, np.full((count, rows, columns), -REACH * pixel.max(), np.float32))
-
-
-def _window(mask: NDArray[np.bool_], insides: Insides) -> NDArray[np.bool_]:
-    """Return the window over the pixels of the insides; beyond the study there is none."""
-    found = np.zeros(insides.depths.shape, bool)
-    low = insides.low[::-1]
-    first, stop = np.maximum(low, 0), np.minimum(low + found.shape, mask.shape)
-    found[tuple(map(slice, first - low, stop - low))] = mask[tuple(map(slice, first, stop))]
-    return found
 
 
 def _side_with(plane: NDArray[np.bool_], depths: Depths, pixel: float) -> None:
