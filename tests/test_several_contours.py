@@ -18,7 +18,7 @@ from tomomesh.measure.contour import crossings, crossings_between, measure_conto
 from tomomesh.model.contours import BIRTH, BRANCH, DEATH, HOLE, MERGE, OUTER, WALL_INNER, WALL_OUTER
 from tomomesh.model.lattice import lattice
 from tomomesh.segmentation.contours.curved import evened, finely
-from tomomesh.segmentation.contours.inputs import SHORTEST, slices_with_several
+from tomomesh.segmentation.contours.inputs import slices_with_several
 from tomomesh.segmentation.contours.loops import trace
 from tomomesh.segmentation.contours.train import drawn, train_contours
 from tomomesh.segmentation.training import regions
@@ -112,14 +112,15 @@ class TestKinds:
     @law(10)
     @given(blots())
     def test_areas_of_loops_are_the_pixels(self, plane: Mask) -> None:
-        loops = [loop for loop in trace(plane) if len(loop) >= SHORTEST]
+        loops = trace(plane)
         if not loops:
             return
         found = trained([plane], "loops", neurons=400)
+        assert len(found) == len(loops)
         sign = [-1 if one.side == HOLE else 1 for one in found.contours]
         area = sum(s * measure_contour(one.codebook).area for s, one in zip(sign, found.contours, strict=True))
         length = sum(map(len, loops))
-        assert abs(area - sum(loop.area for loop in loops)) < 0.12 * length
+        assert abs(area - plane.sum()) < 0.12 * length
 
     def test_components_share_the_neurons_by_length(self) -> None:
         planes = [disk(30, 30, 20) | disk(75, 75, 10) | disk(75, 20, 2)]
@@ -161,9 +162,12 @@ class TestKinds:
         assert [one.side for one in found.contours] == [WALL_OUTER, WALL_INNER] * 2
 
     def test_specks_alone_are_refused(self) -> None:
-        for kind in ("components", "walls", "loops"):
+        for kind in ("components", "walls"):
             with pytest.raises(EmptyError, match="no contour is long enough"):
                 trained([disk(48, 48, 1)], kind)
+        assert [len(one) for one in trained([disk(48, 48, 1) | disk(9, 9, 0)], "loops").contours] == [4, 12]
+        with pytest.raises(EmptyError, match="no contour"):
+            trained([disk(48, 48, -1)], "loops")
 
     def test_several_contours_are_rings(self) -> None:
         with pytest.raises(UsageError, match="several contours are rings"):

@@ -225,7 +225,7 @@ class TestReport:
 
         page = (Path(__file__).parents[1] / "docs" / "report.md").read_text(encoding="utf-8")
         report = reconstruct(study(shell()), contours="loops").report
-        for section in ("networks", "rings", "stack", "points", "surface", "fit", "voxels"):
+        for section in ("networks", "rings", "points", "surface", "fit", "voxels"):
             for key in report[section]:
                 assert f"`{section}.{key}`" in page or f"| `{key}` |" in page, f"{section}.{key}"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,11 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law
-from tomomesh import TomomeshError, Volume, phantom, reconstruct, reconstruct_points
+from tomomesh import TomomeshError, Volume, phantom, reconstruct, reconstruct_points, segment
 from tomomesh.errors import EmptyError, GeometryError, InternalCheckError
 from tomomesh.measure.intersections import CrossingFaces
 from tomomesh.measure.topology import check_promise
 from tomomesh.model.mesh import TriMesh
+from tomomesh.ways.contours import boundary_of_rings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -85,10 +87,16 @@ class TestSpace:
             reconstruct(full, lower=0.0, network=network, neurons=3)
 
 
-def test_contours_thinner_than_a_voxel_enclose_nothing() -> None:
-    few = 200 * (np.random.default_rng(10).random((12, 12, 12)) < 0.15).astype(np.uint8)
-    with pytest.raises(EmptyError, match="the contours enclose no voxel"):
-        reconstruct(Volume.from_stored(few, np.eye(4)), lower=100.0, contours="walls", neurons=22, start="neighbor")
+def test_contours_thinner_than_a_pixel_enclose_nothing() -> None:
+    plate = np.zeros((4, 20, 30), np.uint8)
+    plate[:, 10, 5:25] = 200
+    study = Volume.from_stored(plate, np.eye(4))
+    assert reconstruct(study, lower=100.0, contours="loops").report["quality"]["components"] == 1
+    found = segment(study, lower=100.0, contours="loops")
+    thin = tuple(replace(one, codebook=10.5 + 0.02 * (one.codebook - 10.5)) for one in found.source.contours)
+    shrunk = replace(found, source=replace(found.source, kind="components", contours=thin))
+    with pytest.raises(EmptyError, match="the contours enclose no pixel"):
+        boundary_of_rings(shrunk)
 
 
 class TestClouds:

@@ -15,6 +15,7 @@ from .report import Reported
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from .isosurface.crossings import Levels
     from .model.cubes import CubeGrid
     from .model.mesh import QuadMesh, TriMesh
     from .model.points import PointSet
@@ -49,6 +50,8 @@ class Segmentation(Reported, Generic[S]):
     sampling : Sampling
     source : Networks, Contours, SpaceFound or Boundary
         What the points were taken from: one network a slice, several, one in space, or the window's own boundary.
+    levels : Levels or None
+        The gray levels and the window on them, where a way goes on by them.
     """
 
     volume: Volume
@@ -58,6 +61,7 @@ class Segmentation(Reported, Generic[S]):
     points: PointSet
     sampling: Sampling
     source: S
+    levels: Levels | None = None
 
 
 @dataclass(frozen=True)

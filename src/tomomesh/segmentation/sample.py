@@ -117,7 +117,8 @@ def sample_contours(contours: Contours, volume: Volume) -> Sampling:
     Returns
     -------
     Sampling
-        Holes take from the area of a slice.
+        Holes take from the area of a slice. The slices before the first and after the last have none, nor have those
+        between without a contour: what is on a slice goes on for half of the way to the next.
     """
     sizes = [len(one) for one in contours.contours]
     slices, ring, side, track = (
@@ -129,16 +130,16 @@ def sample_contours(contours: Contours, volume: Volume) -> Sampling:
     points = PointSet(
         positions, slices, neurons, np.full(len(slices), NEURON, np.uint8), {RING: ring, SIDE: side, TRACK: track}
     )
-    areas = np.zeros(len(contours.slices))
+    first = int(contours.slices[0]) - 1
+    areas = np.zeros(int(contours.slices[-1]) + 2 - first)
     for one in contours.contours:
-        sign = -1 if one.side % 2 else 1
-        areas[np.searchsorted(contours.slices, one.slice)] += sign * abs(area(one.codebook))
+        areas[one.slice - first] += (-1 if one.side % 2 else 1) * abs(area(one.codebook))
     lengths = np.concatenate(
         [side_lengths(one.codebook * volume.spacing_mm[:2])[~one.bridged] for one in contours.contours]
     )
     spacing = float(lengths.max(initial=0.0))
     bridged = sum(int(one.bridged.sum()) for one in contours.contours)
-    distance = contours.slices * np.float64(volume.slice_distance_mm)
+    distance = np.arange(first, first + len(areas)) * np.float64(volume.slice_distance_mm)
     return Sampling(points, spacing, bridged, areas * volume.pixel_area_mm2, distance)
 
 

@@ -1,4 +1,4 @@
-"""Several rings a slice: networks -> regions -> points -> insides -> voxels between the slices -> mesh."""
+"""Several rings a slice: networks -> regions -> points -> levels around the rings -> boundary -> mesh."""
 
 from __future__ import annotations
 
@@ -6,68 +6,90 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..contours.known import known_slices
 from ..errors import EmptyError
+from ..isosurface.crossings import Levels
+from ..isosurface.voxels import Boundary, boundary, voxel_surface
 from ..measure.rings import assess_contours
-from ..results import Enclosed, Segmentation
+from ..progress import Progress, silent
+from ..results import Enclosed, Segmentation, Surface
+from ..segmentation.contours.between import filled_between
 from ..segmentation.contours.train import train_contours
 from ..segmentation.sample import sample_contours
 from ..segmentation.training import regions
 from ..stage import Stage, folded, measured
-from .sections import missed, networks_on_slices, sampling_found
-from .stack import body_of_stack, surface_of_slices
+from .sections import body_of_voxels, boundary_found, missed, networks_on_slices, sampling_found
 from .way import POINTS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
-    from ..contours.slices import Slices
     from ..model.contours import Contours
-    from ..model.points import PointSet
-    from ..progress import Progress
-    from ..results import Surface
     from ..segmentation.study import Selected
     from ..settings import Settings
+
+NOTHING = np.empty(0, np.int32)
 
 
 def segment_by_contours(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Contours]]:
     """Train a ring on every contour of each slice, and place their neurons in space."""
     study, mask, run = kept.study, kept.mask, settings.run
     pixel_mm = study.spacing_mm[:2]
+    chosen = kept.chosen
+    levels = Levels(chosen.volume.voxels, chosen.lower, chosen.upper, settings.window.layers)
     trained = measured(
-        "networks", train_contours, mask, settings.network, pixel_mm=pixel_mm, seed=run.seed, threads=run.threads,
-        progress=progress,
+        "networks", train_contours, mask, settings.network, levels=levels, pixel_mm=pixel_mm, seed=run.seed,
+        threads=run.threads, progress=progress,
     )  # fmt: skip
     labels = measured("regions", regions, mask, trained.value, pixel_mm=pixel_mm, threads=run.threads)
     placed = measured("points", sample_contours, trained.value, study)
     sampling = placed.value
-    found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value)
+    found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value, levels)
     return folded(
         found, trained, labels, _contours_found(trained.value, kept, settings), placed, sampling_found(placed.value)
     )
 
 
 def surface_by_contours(found: Segmentation[Contours], settings: Settings, progress: Progress) -> Stage[Surface]:
-    """Close the contours of all slices."""
-    encloses = Enclosed("rings", found.sampling.volume_mm3).or_more(Enclosed.window(found))
-    finest, sampling = min(found.volume.spacing_mm[:2]), found.sampling
-    return surface_of_slices(
-        found.points, slices_of_rings(found.points), settings, progress, finest=finest, bridged=sampling.bridged,
-        encloses=encloses,
-    )  # fmt: skip
-
-
-def slices_of_rings(points: PointSet) -> Slices:
-    """Return the slices of the rings of a study, which know them.
+    """Let a net around the pixels that the rings enclose come to rest where the rings pass between them.
 
     Raises
     ------
     EmptyError
-        Where they are on one slice alone.
+        Where the rings enclose the middle of no pixel, or are on one slice alone.
     """
-    slices = known_slices(points)
-    if slices is None:
-        found = f"{len(np.unique(points.slices))} slice"
+    run = settings.run
+    bounded = measured(
+        "contours", boundary_of_rings, found, surface=settings.cubes.surface, threads=run.threads, progress=progress
+    )
+    made = bounded.value
+    meshed = measured("fit", voxel_surface, made, settings.fit, threads=run.threads, progress=progress)
+    rest = meshed.value
+    surface = Surface(
+        found.points, made.cuberille, rest.smoothed, rest.mesh, NOTHING, cavities=made.cavities,
+        encloses=Enclosed("rings", found.sampling.volume_mm3).or_more(Enclosed.window(found)),
+    )  # fmt: skip
+    return folded(surface, bounded, meshed, boundary_found(made, rest))
+
+
+def boundary_of_rings(
+    found: Segmentation[Contours], *, surface: str = "all", threads: int = 0, progress: Progress = silent
+) -> Boundary:
+    """Return the boundary of what rings enclose on their slices and between them, crossed where they pass."""
+    contours = found.source
+    _refuse_one_slice(contours)
+    filled = filled_between(contours, found.mask, found.volume, levels=found.levels, threads=threads, progress=progress)
+    inside = filled.voxels > 0
+    if not inside.any():
+        raise EmptyError(
+            "the contours enclose no pixel", found=f"{len(contours)} contours", expected="contours wider than a pixel",
+            hint="--contours loops",
+        )  # fmt: skip
+    outer = "outer" if surface == "outer" else "all"
+    return boundary(filled, inside, lower=0.0, surface=outer, threads=threads)
+
+
+def _refuse_one_slice(contours: Contours) -> None:
+    if len(contours.slices) < 2:
+        found = f"{len(contours.slices)} slice"
         raise EmptyError("contours on one slice enclose no volume", found=found, expected="at least two slices")
-    return slices
 
 
 def _contours_found(contours: Contours, kept: Selected, settings: Settings) -> Stage[None]:
@@ -75,10 +97,11 @@ def _contours_found(contours: Contours, kept: Selected, settings: Settings) -> S
     each = contours.contours
     seen = {"boundary" if one.outlined else "region" for one in each}
     without, lost = missed(contours.slices, kept.mask)
+    counted = contours.kind == "loops" and settings.network.neurons is None
     stats: dict[str, dict[str, Any]] = {
         "networks": {
             "topology": "ring",
-            "neurons": settings.network.neuron_count,
+            "neurons": None if counted else settings.network.neuron_count,
             "trained": len(contours.slices),
             "signal": seen.pop() if len(seen) == 1 else "both",
             "pixels": sum(one.pixels for one in each),
@@ -107,10 +130,10 @@ def _of_networks(report: dict[str, Any]) -> list[str]:
 WAY = Way(
     applies=lambda settings, input: input not in POINTS and settings.network.contours not in ("auto", "one"),
     because=lambda settings, input: "with --way contours",
-    reads=TRAINING | parameters("bridge", "even", "cell_mm", "cell_factor", "stiffness", "allow_leaks"),
+    reads=TRAINING | parameters("bridge", "even", "surface", "stiffness", "allow_leaks"),
     segment=segment_by_contours,
     surface=surface_by_contours,
     of_networks=_of_networks,
-    of_body=body_of_stack,
+    of_body=lambda report: body_of_voxels(report, "crossed where the rings pass"),
     pictures=networks_on_slices,
 )

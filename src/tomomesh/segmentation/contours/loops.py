@@ -45,6 +45,14 @@ class Loop:
         """Middles of the sides, which are those of the pixels inside and outside, (p, 2) pixel columns and rows."""
         return (self.corners + np.roll(self.corners, -1, axis=0)) / 2 - 0.5
 
+    @property
+    def pixels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Pixels (column, row) inside and outside of each side, (p, 2) twice."""
+        step = np.roll(self.corners, -1, axis=0) - self.corners
+        way = (step[:, None] == STEPS).all(axis=2).argmax(axis=1)
+        inner = self.corners - CORNERS[way]
+        return inner, inner + BESIDE[way]
+
     def filled(self) -> Patch:
         """Return the pixels that the loop encloses."""
         low, high = self.corners.min(axis=0), self.corners.max(axis=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -16,7 +17,8 @@ from ...progress import Progress, silent
 from ...som.even_spacing import bridged_edges, evenly
 from ...som.fit import fit, radii
 from .curved import evened, unshrunk
-from .inputs import SHORTEST, Inputs, components_of, inputs_of_loops, solids
+from .inputs import FEWEST, SHORTEST, Inputs, components_of, inputs_of_loops, solids
+from .loops import trace
 from .tracking import track
 from .walls import inputs_of_walls
 
@@ -25,12 +27,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ...isosurface.crossings import Levels
     from ...settings import NetworkSettings
+    from .loops import Loop
 
     Floats = NDArray[np.float64]
 
 T = TypeVar("T")
 
+MOST = 4_096
+"""Neurons of a slice at most where none are asked for, as many as can be asked for."""
 REFINED = (2.0, 0.7)
 """First and last radius of a ring that starts near its place, hops: measured, a start at 4 fails on two-sided walls."""
 
@@ -39,6 +45,7 @@ def train_contours(
     mask: NDArray[np.bool_],
     settings: NetworkSettings,
     *,
+    levels: Levels | None = None,
     pixel_mm: tuple[float, float] = (1.0, 1.0),
     seed: int = 0,
     threads: int = 0,
@@ -47,15 +54,20 @@ def train_contours(
     """Run a ring on every contour of each slice of a window: ``settings.contours`` says which.
 
     ``settings.neurons`` are shared among the contours of a slice by the lengths of their outlines: `FEWEST` each at
-    least (a loop: one for `SIDES_MOST` pixel sides at least), and at most one for two pixel sides. Shorter outlines
-    than `SHORTEST` sides get none: on the skull of a head they are pores. First the inputs of every slice are found,
-    then the contours are linked from slice to slice by what they enclose, then each track is trained from its first
-    slice to its last, every ring with its first neuron next to that of the ring before it.
+    least (a loop: one for `SIDES_MOST` pixel sides at least), and at most one for two pixel sides, or a small loop's
+    sides. Where none are asked for, each loop gets as many as its length and curvature want, `MOST` a slice at most.
+    Every loop has a ring, down to one pixel; components and walls of fewer than `SHORTEST` sides have none. First the
+    inputs of every slice are found, then the contours are linked from slice to slice by what they enclose, then each
+    track is trained from its first slice to its last, every ring with its first neuron next to that of the ring before
+    it.
 
     Parameters
     ----------
     mask : (K, J, I) bool array
     settings : NetworkSettings
+    levels : Levels, optional
+        The gray levels and the window on them: loops are shown where they cross its bounds between two pixels. Half
+        way where not given, or where they are those of a mask.
     pixel_mm : (float, float)
         Distance of the columns and of the rows.
     seed, threads : int
@@ -71,7 +83,7 @@ def train_contours(
     EmptyError
         Where no contour is long enough.
     """
-    inputs, dropped = _inputs(mask, settings, pixel_mm, seed, threads)
+    inputs, dropped = _inputs(mask, levels, settings, pixel_mm, seed, threads)
     if not any(inputs):
         raise EmptyError(
             "no contour is long enough for a network",
@@ -80,7 +92,8 @@ def train_contours(
             hint="a wider window",
         )
     tracks = track([[one.inside for one in row] for row in inputs], [[one.side for one in row] for row in inputs])
-    shares = [shared(row, settings.neuron_count) for row in inputs]
+    counted = settings.contours == "loops" and settings.neurons is None
+    shares = [wanted(row) if counted else shared(row, settings.neuron_count) for row in inputs]
     members = tracks.members
     trained: list[list[Contour]] = [[] for _ in members]
 
@@ -110,17 +123,55 @@ def shared(inputs: Sequence[Inputs], neurons: int) -> list[int]:
     return [min(max(one.least, round(neurons * one.perimeter / whole)), one.most) for one in inputs]
 
 
+def wanted(inputs: Sequence[Inputs]) -> list[int]:
+    """Return how many neurons the loops of a slice want: at most `MOST` in all, as far as each has its least."""
+    each = [one.wanted for one in inputs]
+    share = min(1.0, MOST / max(sum(each), 1))
+    return [min(max(FEWEST, round(share * n)), one.most) for n, one in zip(each, inputs, strict=True)]
+
+
 def _inputs(
-    mask: NDArray[np.bool_], settings: NetworkSettings, pixel_mm: tuple[float, float], seed: int, threads: int
-) -> tuple[list[list[Inputs]], int]:
+    mask: NDArray[np.bool_], levels: Levels | None, settings: NetworkSettings, pixel_mm: tuple[float, float],
+    seed: int, threads: int,
+) -> tuple[list[list[Inputs]], int]:  # fmt: skip
     """Find the inputs of all contours, slice by slice; return also how many contours are too small."""
     if settings.contours == "components":
         return _inputs_of_components(mask, settings.signal, threads)
     if settings.contours == "loops":
-        return _in_slices(len(mask), lambda k: inputs_of_loops(mask[k]), threads)
+        return _inputs_of_loops(mask, levels, threads), 0
     return _in_slices(
         len(mask), lambda k: inputs_of_walls(mask[k], settings, np.random.default_rng([seed, k]), pixel_mm), threads
     )
+
+
+def _inputs_of_loops(mask: NDArray[np.bool_], levels: Levels | None, threads: int) -> list[list[Inputs]]:
+    """Show each loop where the gray levels cross the window's bounds; half way where those are a mask's."""
+    loops, _ = _in_slices(len(mask), lambda k: (trace(mask[k]), 0), threads)
+    if levels is not None and _stepped(levels, loops):
+        levels = None
+
+    def find(k: int) -> tuple[list[Inputs], int]:
+        return inputs_of_loops(loops[k], None if levels is None else partial(_crossed, levels, k)), 0
+
+    return _in_slices(len(mask), find, threads)[0]
+
+
+def _stepped(levels: Levels, loops: Sequence[Sequence[Loop]]) -> bool:
+    """Tell whether the gray levels along loops of all slices are those of a mask."""
+    sides = [(k, *loop.pixels) for k, row in enumerate(loops) for loop in row]
+    inner = np.concatenate([np.zeros((0, 3), np.int32), *(_placed(pixels, k) for k, pixels, _ in sides)])
+    outer = np.concatenate([np.zeros((0, 3), np.int32), *(_placed(pixels, k) for k, _, pixels in sides)])
+    return levels.stepped(inner, outer - inner)
+
+
+def _crossed(levels: Levels, k: int, inner: NDArray[np.int64], outer: NDArray[np.int64]) -> Floats:
+    """Return where between pixels of slice k the gray levels cross the window's bounds."""
+    return levels.crossed(_placed(inner, k), _placed(outer, k))
+
+
+def _placed(pixels: NDArray[np.int64], k: int) -> NDArray[np.int32]:
+    """Return pixels (column, row) of slice k as voxels (x, y, z)."""
+    return np.column_stack([pixels, np.full(len(pixels), k)]).astype(np.int32)
 
 
 def _inputs_of_components(mask: NDArray[np.bool_], signal: str, threads: int) -> tuple[list[list[Inputs]], int]:

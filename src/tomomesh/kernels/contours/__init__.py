@@ -1,0 +1,1 @@
+"""Kernels of contours: rings drawn onto pixels."""
