@@ -12,6 +12,8 @@ from ..model.points import ADDED, BORDER, CROSSING
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from .thick_slices import Columns, Thinned
+
 CLOSEST = 0.01
 """A crossing comes no nearer to a voxel's center than this share of the way to its neighbor. Chosen: half of it changes
 nothing, twice the distance by +0.0 %."""
@@ -29,14 +31,14 @@ class Levels:
 
     Attributes
     ----------
-    voxels : (K, J, I) or (K, J, I, L) array
+    voxels : (K, J, I) or (K, J, I, L) array, or Columns
     lower, upper : float or (L,) float array
         A layer is in its window where lower < k <= upper.
     layers : {"all", "any"}
         A voxel is inside where all its layers are in their windows, or one at least.
     """
 
-    voxels: NDArray[Any]
+    voxels: NDArray[Any] | Columns
     lower: float | NDArray[np.float64]
     upper: float | NDArray[np.float64]
     layers: str = "all"
@@ -49,12 +51,13 @@ class Levels:
         """Return the levels (n, L) of voxels (n, 3); NaN beyond the border, and where they are not finite."""
         near = self.nearest(places)
         x, y, z = near.T
-        levels = self.voxels[z, y, x].astype(np.float64).reshape(len(places), -1)
+        levels = self.voxels[z, y, x].astype(np.float64)
+        levels = levels[:, None] if levels.ndim == 1 else levels
         levels[(near != places).any(axis=1)] = np.nan
         levels[np.isinf(levels)] = np.nan
         return np.asarray(levels)
 
-    def kept(self, levels: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def kept(self, levels: NDArray[Any]) -> NDArray[np.bool_]:
         """Tell which levels (n, L) lie in their layer's window."""
         return np.asarray((levels > self.lower) & (levels <= self.upper))
 
@@ -93,10 +96,15 @@ class Levels:
         """
         every = -(-len(inner) // SAMPLES)
         inner, steps = inner[::every], steps[::every]
+        shares = self.shares(inner, steps)
+        return bool(2 * len(shares) > len(inner) and np.median(shares) > STEPPED)
+
+    def shares(self, inner: NDArray[np.int32], steps: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Return what share of a border's height lies between its two voxels, where the next ones are clear of it."""
         before, inside, outside, after = (self.at(inner + n * steps) for n in (-1, 0, 1, 2))
         whole, step = (np.abs(one - other).sum(axis=1) for one, other in ((before, after), (inside, outside)))
         clear = self.inside(before) & ~self.inside(after) & (whole > 0)
-        return bool(2 * clear.sum() > len(clear) and np.median(step[clear] / whole[clear]) > STEPPED)
+        return np.asarray(step[clear] / whole[clear])
 
 
 @dataclass(frozen=True)
@@ -111,17 +119,22 @@ class LevelCrossings:
         ``CROSSING`` where gray levels were interpolated, ``BORDER`` on the border of the volume, ``ADDED`` beside a
         voxel that is not in the window.
     stepped : bool
-        Whether the gray levels are those of a mask: then all crossings are half way.
+        Whether the gray levels are those of a mask.
+    stiffer : float or None
+        How many times as stiff as set the springs of a net are that is drawn to them; None where all are half way
+        between two voxels, and the net is evened out instead.
     """
 
     positions: NDArray[np.float64]
     kinds: NDArray[np.uint8]
     stepped: bool
+    stiffer: float | None = 1.0
 
 
 def crossings(
-    levels: Levels, inner: NDArray[np.int32], steps: NDArray[np.int32], added: NDArray[np.bool_]
-) -> LevelCrossings:
+    levels: Levels, inner: NDArray[np.int32], steps: NDArray[np.int32], added: NDArray[np.bool_],
+    thin: Thinned | None = None,
+) -> LevelCrossings:  # fmt: skip
     """Find where the boundary of a window crosses the lines between voxels.
 
     Parameters
@@ -133,13 +146,18 @@ def crossings(
         From each to its neighbor outside.
     added : (q,) bool array
         Inner voxels that are not in the window.
+    thin : Thinned, optional
+        What the levels are of, where the voxels are parts of thick ones.
 
     Returns
     -------
     LevelCrossings
     """
-    outer, stepped = inner + steps, levels.stepped(inner, steps)
-    share = np.full(len(inner), 0.5) if stepped else np.where(added, BARELY, levels.crossed(inner, outer))
+    outer, even = inner + steps, thin is None and levels.stepped(inner, steps)
+    share = np.full(len(inner), 0.5) if even else np.where(added, BARELY, levels.crossed(inner, outer))
     beyond = (levels.nearest(outer) != outer).any(axis=1)
     kinds = np.where(added, ADDED, np.where(beyond, BORDER, CROSSING)).astype(np.uint8)
-    return LevelCrossings(inner + share[:, None] * steps, kinds, stepped)
+    positions = inner + share[:, None] * steps
+    if thin is None:
+        return LevelCrossings(positions, kinds, even, None if even else 1.0)
+    return LevelCrossings(positions, kinds, thin.of_mask, thin.stiffer)

@@ -168,7 +168,7 @@ def settle(
     NetFit
     """
     start = _means(crossings.positions, net.fans, threads)
-    most = min(settings.max_steps, BENDS) if crossings.stepped else settings.max_steps
+    most = min(settings.max_steps, BENDS) if crossings.stiffer is None else settings.max_steps
     state, trace = iterate(_NetSteps(net, crossings, start, settings, threads), most, progress)
     return NetFit(start, state.position, trace)
 
@@ -207,7 +207,7 @@ class _NetSteps:
             low, moves = self.net.low[at], state.moves[at]
             move_in_cells(steps, state.position[at], low, MARGIN, moves, sums[at.start // BLOCK], 0, len(steps))
 
-        forced = self._unbent if self.crossings.stepped else self._drawn
+        forced = self._unbent if self.crossings.stiffer is None else self._drawn
         position = forced(state.position, move)
         speed, change = sums[:, :2].max(axis=0)
         return _NetState(position, state.moves), Motion(speed, change, sums[:, 2].sum())
@@ -227,7 +227,7 @@ class _NetSteps:
             pulled *= share
             move(pulled, at)
 
-        stiffness = TENSION * self.settings.stiffness
+        stiffness = TENSION * self.settings.stiffness * (self.crossings.stiffer or 0.0)
         share = min(1.0, 2 / (1 + 2 * stiffness))
         tension = self._tension(position)
         return _means(_means(position, self.net.quads, self.threads, pull), self.net.fans, self.threads, add)

@@ -16,6 +16,7 @@ from ..progress import Progress, silent
 from .crossings import LevelCrossings, Levels, crossings
 from .diagonals import placed, right_handed, triangulated
 from .surface_nets import Net, NetFit, net_around, settle
+from .thick_slices import thinned
 from .well_composed import without_contacts
 
 if TYPE_CHECKING:
@@ -32,31 +33,35 @@ class Boundary:
 
     Attributes
     ----------
-    volume : Volume
+    affine : (4, 4) float array
+        Indices of the voxels that it lies between to patient millimeters.
     net : Net
     crossings : LevelCrossings
         One a face.
     added : int
         Voxels added so that no two touch along an edge or at a corner alone.
+    parts : int
+        Into how many each voxel of a thick slice was divided; 1 for none.
     """
 
-    volume: Volume
+    affine: NDArray[np.float64]
     net: Net
     crossings: LevelCrossings
     added: int
+    parts: int = 1
 
     @cached_property
     def points(self) -> PointSet:
         """The crossings in patient millimeters."""
         none = np.full(len(self.net.quads), -1, np.int32)
-        return PointSet(placed(self.crossings.positions, self.volume.affine), none, none, self.crossings.kinds)
+        return PointSet(placed(self.crossings.positions, self.affine), none, none, self.crossings.kinds)
 
     @cached_property
     def cuberille(self) -> QuadMesh:
         """The faces themselves."""
         net = self.net
-        outward = slice(None, None, 1 if right_handed(self.volume.affine) else -1)
-        corners = placed(net.low + 0.5, self.volume.affine)
+        outward = slice(None, None, 1 if right_handed(self.affine) else -1)
+        corners = placed(net.low + 0.5, self.affine)
         return QuadMesh(corners, net.quads[:, outward].astype(np.int64))
 
     @cached_property
@@ -84,6 +89,7 @@ def boundary(
     upper: float | NDArray[np.float64] = np.inf,
     layers: str = "all",
     surface: str = "all",
+    divide: bool = False,
     threads: int = 0,
 ) -> Boundary:
     """Find the boundary of a window, and where the gray levels cross its bounds.
@@ -98,6 +104,8 @@ def boundary(
         Whether a voxel is kept where all its layers lie in their windows, or one at least.
     surface : {"all", "outer"}
         All surfaces, or those that nothing surrounds.
+    divide : bool
+        Whether voxels of thick slices are divided first.
     threads : int
 
     Returns
@@ -110,12 +118,17 @@ def boundary(
     ResourceError
         Where the boundary would not fit into the memory.
     """
-    levels, padded = Levels(volume.voxels, lower, upper, layers), np.pad(mask, 1)
+    levels, affine = Levels(volume.voxels, lower, upper, layers), volume.affine
+    thin = thinned(levels, mask, affine, threads) if divide else None
+    if thin is not None:
+        levels, mask, affine = thin.levels, thin.mask, thin.affine
+    padded = np.pad(mask, 1)
     joined = without_contacts(padded, lambda voxels: levels.excess(voxels - np.int32(1)), threads)
     net = net_around(_filled(joined) if surface == "outer" else joined, threads)
     x, y, z = (net.inner + 1).T
-    found = crossings(levels, net.inner, net.steps, ~padded[z, y, x])
-    return Boundary(volume, net, found, int(np.count_nonzero(joined) - np.count_nonzero(padded)))
+    found = crossings(levels, net.inner, net.steps, ~padded[z, y, x], thin)
+    added = int(np.count_nonzero(joined) - np.count_nonzero(padded))
+    return Boundary(affine, net, found, added, 1 if thin is None else thin.parts)
 
 
 def _filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -163,6 +176,6 @@ def voxel_surface(
     """
     net = found.net
     made = settle(net, found.crossings, settings, threads=threads, progress=progress)
-    smoothed, mesh, fours = triangulated(net, made, found.crossings, found.volume.affine, threads)
+    smoothed, mesh, fours = triangulated(net, made, found.crossings, found.affine, threads)
     nearest = np.concatenate([net.fans[:, 0], fours])
     return VoxelSurface(smoothed, mesh, nearest, made)

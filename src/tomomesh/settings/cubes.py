@@ -52,4 +52,9 @@ class CubeSettings(Group):
         "the outer surfaces, or all, with what lies in cavities; auto is outer, and all without a network",
         choices=("auto", "outer", "all"),
     )
+    divide: bool = param(
+        True,
+        "divide the voxels of thick slices into such as are nearly cubes, and move what is in each to where its "
+        "neighbors have theirs; without, levels are interpolated linearly from slice to slice",
+    )
     smoothing: int = param(3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000)

@@ -169,6 +169,7 @@ def boundary_found(found: Boundary, surface: VoxelSurface) -> Stage[None]:
         "voxels": {
             "added_for_composition": found.added,
             "interpolated": not stepped,
+            "divided_into": found.parts,
             "split_in_four": len(surface.mesh.vertices) - len(found.net.low),
         },
         "surface": {
@@ -184,7 +185,7 @@ def boundary_found(found: Boundary, surface: VoxelSurface) -> Stage[None]:
     if steps:
         stats["fit"] |= {"speed": float(trace.speed[-1]), "acceleration": float(trace.acceleration[-1])}
     warnings: tuple[str, ...] = ()
-    if stepped:
+    if stepped and found.parts == 1:
         warnings = ("the gray levels are those of a mask: the surface is evened out between the voxels",)
     elif steps and not trace.converged:
         warnings = (f"the mesh had not come to rest after {steps} steps",)
@@ -211,5 +212,7 @@ def body_of_voxels(report: dict[str, Any], known: str = "gray levels interpolate
     """Say in the summary what voxels a surface was laid around."""
     voxels = report["voxels"]
     places = known if voxels["interpolated"] else "a mask, evened out"
+    if voxels["divided_into"] > 1:
+        places = f"each of a thick slice divided into {voxels['divided_into']}"
     faces = report["surface"]["square_faces"]
     return [f"voxels    {faces} faces, {places}, {voxels['added_for_composition']} added"]

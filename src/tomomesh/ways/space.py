@@ -116,7 +116,7 @@ def _shown(kept: Selected, mask: NDArray[np.bool_], settings: Settings) -> Shown
     chosen = kept.chosen
     found = boundary(
         chosen.volume, mask, lower=chosen.lower, upper=chosen.upper, layers=settings.window.layers, surface="outer",
-        threads=settings.run.threads,
+        divide=settings.cubes.divide, threads=settings.run.threads,
     )  # fmt: skip
     return Shown(voxels, found.points.positions, outlined=True)
 

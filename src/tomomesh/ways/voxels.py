@@ -27,7 +27,7 @@ def segment_by_voxels(kept: Selected, settings: Settings, progress: Progress) ->
     chosen, surface = kept.chosen, "outer" if settings.cubes.surface == "outer" else "all"
     bounded = measured(
         "points", boundary, chosen.volume, chosen.mask, lower=chosen.lower, upper=chosen.upper,
-        layers=settings.window.layers, surface=surface, threads=settings.run.threads,
+        layers=settings.window.layers, surface=surface, divide=settings.cubes.divide, threads=settings.run.threads,
     )  # fmt: skip
     found, spacing = bounded.value, max(kept.study.spacing_mm)
     sampling = Sampling(found.points, spacing, found.added, NOTHING, NOTHING)
@@ -59,7 +59,7 @@ def _pictures(found: Segmentation[Boundary]) -> dict[str, Any]:
 WAY = Way(
     applies=lambda settings, input: input not in POINTS and settings.network.network == "none",
     because=lambda settings, input: "with --way voxels",
-    reads=parameters("surface", "stiffness"),
+    reads=parameters("surface", "stiffness", "divide"),
     segment=segment_by_voxels,
     surface=surface_by_voxels,
     of_body=body_of_voxels,
