@@ -37,7 +37,7 @@ OF_MASK = 2.0
 """Sharpness of what comes from a mask, which tells nothing of it."""
 OF_LEVELS, OF_STEPS = 2.0, 4.0
 """How many times as stiff a net is around thin voxels, and around those that are all but wholly in or out."""
-UPRIGHT = 75
+UPRIGHT = 90
 """Percentile of the shares that tells how sharp borders are: where they slant, pixels hold a part of both sides, and
 look less sharp than they are."""
 
@@ -159,8 +159,9 @@ def thinned(levels: Levels, mask: Mask, affine: NDArray[np.float64], threads: in
 
 def _told(levels: Levels, mask: Mask, turned: Mask, axis: int, threads: int) -> tuple[Values, Levels, float, float]:
     """Return what voxels hold, the bounds on that, how sharp its borders are, and how stiff a net is around them."""
-    shares, voxels = _shares(levels, mask, axis), np.asarray(levels.voxels)
-    if voxels.ndim > 3 or _are_steps(shares):
+    voxels = np.asarray(levels.voxels)
+    shares = _shares(levels, mask, axis) if voxels.ndim == 3 else np.ones(1)
+    if _are_steps(shares):
         return _averages(turned, threads), Levels(voxels, 0.5, np.inf), OF_MASK, OF_STEPS
     whole = np.ascontiguousarray(np.moveaxis(voxels, axis, 0), np.float32)
     high = float(np.percentile(shares, UPRIGHT)) if len(shares) else 1.0
@@ -169,9 +170,24 @@ def _told(levels: Levels, mask: Mask, turned: Mask, axis: int, threads: int) -> 
 
 
 def _shares(levels: Levels, mask: Mask, axis: int) -> NDArray[np.float64]:
-    """Return what share of a border's height lies between two pixels of a slice, at some of its places."""
-    found = [levels.shares(*_faces_across(mask, other)) for other in range(3) if other != axis]
+    """Return what share of a border's height lies between two pixels of a slice, at some of its places.
+
+    The height is that between four pixels in a line, two inside and two outside, and those of the next slices beside
+    the middle two: where a border slants, these have the whole of it.
+    """
+    across = np.zeros(3, np.int32)
+    across[2 - axis] = 1
+    found = [_shares_of(levels, *_faces_across(mask, other), across) for other in range(3) if other != axis]
     return np.concatenate(found)
+
+
+def _shares_of(levels: Levels, inner: Index, steps: Index, across: Index) -> NDArray[np.float64]:
+    places = [inner - steps, inner + 2 * steps, inner, inner + steps]
+    places += [place + side for place in places[2:] for side in (across, -across)]
+    before, after, *seen = (levels.at(place)[:, 0] for place in places)
+    height = np.fmax.reduce([before, after, *seen]) - np.fmin.reduce([before, after, *seen])
+    clear = levels.inside(before[:, None]) & ~levels.inside(after[:, None]) & (height > 0)
+    return np.asarray(np.abs(seen[0] - seen[1])[clear] / height[clear])
 
 
 def _faces_across(mask: Mask, axis: int) -> tuple[Index, Index]:
@@ -248,13 +264,21 @@ def _averages(mask: Mask, threads: int) -> Values:
     return whole
 
 
+def _interpolated(whole: Values, columns: Index, times: int) -> Values:
+    """Return what lies on the way from each voxel to the next slices (m, n)."""
+    k, j, i = columns.T
+    below, middle, above = (whole[np.clip(k + s, 0, len(whole) - 1), j, i][:, None] for s in (-1, 0, 1))
+    way = (np.arange(times, dtype=np.float32) + np.float32(0.5)) / times - np.float32(0.5)
+    return np.asarray(middle + np.where(way < 0, way * (middle - below), way * (above - middle)), np.float32)
+
+
 def _moved(whole: Values, index: Index, columns: Index, times: int, sharpness: float, threads: int) -> Values:
     """Move what is in the parts of the columns to where their neighbors have theirs."""
     low, high = np.empty(len(columns), np.float32), np.empty(len(columns), np.float32)
     in_blocks(
         lambda a, b: ranges_around(whole, columns, low, high, a, b), len(columns), block=BLOCK, threads=threads
     )  # fmt: skip
-    parts = np.repeat(whole[tuple(columns.T)][:, None], times, axis=1)
+    parts = _interpolated(whole, columns, times)
     for _ in range(ROUNDS):
         moved = np.empty_like(parts)
         given = (whole, index, columns, low, high, parts, sharpness, moved)

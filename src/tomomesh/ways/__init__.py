@@ -14,7 +14,7 @@ WAYS = {
     "voxels": "a study, --way voxels: the window's own boundary, where gray levels cross its bounds",
     "space": "a study, --way sphere, --network torus or --space volume: one network in space, and its own faces",
     "contours": "a study, --way contours: several rings a slice, closed between the slices",
-    "rings": "a study, --way ring: one ring a slice, cubes around its neurons, a mesh that rests on the surface under them",
+    "rings": "a study, --way ring: one ring a slice, cubes around its neurons, a mesh on the surface under them",
     "networks": "any other study: one network a slice, cubes around its neurons, a mesh that rests on them",
     "nearest": "points, --attraction nearest: cubes around them, a mesh that rests on the points themselves",
     "stack": "points on parallel slices: each slice's inside, and the shape between the slices",
