@@ -210,8 +210,8 @@ class TestNearer:
         assert off[middle].mean() < 0.25
 
     def test_a_sheet_that_moves_by_more_than_its_width_stays_one(self) -> None:
-        k, _, x = np.indices((9, 24, 60))
-        sheet = np.abs(x - 10 - 5 * k) < 2.1
+        k, _, x = np.indices((11, 24, 70))
+        sheet = (np.abs(x - 6 * k) < 2.1) & (k > 0) & (k < 10)
         torn, whole = (surface(sheet.astype(np.uint8), divide=divide) for divide in (False, True))
         assert ndimage.label(sheet)[1] == 9
         assert [len(np.unique(_pieces(mesh))) for mesh in (torn, whole)] == [9, 1]

@@ -40,9 +40,9 @@ def tempered(insides: Insides, levels: Levels | None, mask: NDArray[np.bool_]) -
         As the depths of `insides`.
     """
     depths = insides.depths
-    if levels is None or levels.voxels.ndim > 3 or _stepped(levels, mask):
+    if levels is None or np.ndim(levels.voxels) > 3 or _stepped(levels, mask):
         return depths
-    seen = insides.over(levels.voxels, np.nan)
+    seen = insides.over(np.asarray(levels.voxels), np.nan)
     over = np.nan_to_num(np.minimum(seen - levels.lower, levels.upper - seen), nan=-np.inf)
     low, high = (bound * float(insides.pixel.max()) for bound in BEYOND)
     deep = np.full(depths.shape, DEEP * insides.pixel.max(), np.float32)
