@@ -32,7 +32,7 @@ OTHER: dict[str, Any] = {
     "bridge": 1.1, "even": False, "trim": 1.5, "cell_mm": (1.5,), "cell_factor": 1.7, "caps": False, "closing": 3,
     "stacks": "none", "allow_leaks": True, "open": True, "smoothing": 0, "attraction": "surface", "stiffness": 0.9,
     "damping": 0.9, "step": 0.5, "springs": "triangles", "limit": "shorten", "allow_returns": True,
-    "units": "cm", "local_origin": True,
+    "units": "cm", "local_origin": True, "allow_far": True,
     "largest": True, "surface": "outer", "seed": 99, "cell_from": "nearest", "tracking": "faces",
 }  # fmt: skip
 """Another value of each parameter that may be without effect."""
@@ -193,9 +193,9 @@ class TestLargest:
 
 class TestReport:
     def test_what_was_asked_for_is_told_and_nothing_else(self) -> None:
-        settings = Settings().replace(alpha=(0.3, 0.1))
+        settings = Settings().replace(alpha=(0.3, 0.1), neurons=24)
         assert not any("alpha" in told for told in reconstruct(ball(), settings, lower=40.0).report["warnings"])
-        told = reconstruct(ball(), lower=40.0, alpha=(0.3, 0.1), even=False).report["warnings"]
+        told = reconstruct(ball(), lower=40.0, neurons=24, alpha=(0.3, 0.1), even=False).report["warnings"]
         assert told[0] == "--alpha has no effect with --training batch"
         assert not any("even" in one for one in told)
 

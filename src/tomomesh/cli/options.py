@@ -37,7 +37,7 @@ SHELLS = ("bash", "zsh", "fish", "tcsh")
 
 CUTS = ("scale", "flat_base", "hollow", "drain")
 """Parameters that change a part."""
-MESH_ONLY = ("local_origin", "target_faces")
+MESH_ONLY = ("local_origin", "allow_far", "target_faces")
 """Parameters of the run that matter to meshes alone."""
 STUDY_ONLY = ("frame",)
 """Parameters of the run that matter to studies alone."""

@@ -24,6 +24,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
     shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
     shape = shape if quality["closed"] else "a manifold sheet"
     lines = [
+        *_of_far(report),
         *_of_stage_one(report),
         f"points    {_of_points(report)}",
         *way_of(report["way"]["name"]).of_body(report),
@@ -155,6 +156,17 @@ def _volume(found: dict[str, Any]) -> str:
     return ", open" if found["volume_mm3"] is None else f", volume {found['volume_mm3']:.6g}"
 
 
+def _of_far(report: dict[str, Any]) -> list[str]:
+    """Say first of all that a mesh is far from what it was made from."""
+    far = _far(report)
+    return [f"far       {far}"] if far else []
+
+
+def _far(report: dict[str, Any]) -> str | None:
+    told: str | None = report.get("quality", {}).get("follows", {}).get("far")
+    return told
+
+
 def _of_stage_one(report: dict[str, Any]) -> list[str]:
     if "study" not in report:
         return []
@@ -240,7 +252,7 @@ def _of_rings(quality: dict[str, Any]) -> str:
 
 
 def _ending(report: dict[str, Any], output: str) -> list[str]:
-    warnings = [f"warning   {warning}" for warning in report["warnings"]]
+    warnings = [f"warning   {warning}" for warning in report["warnings"] if warning != _far(report)]
     notes = report.get("study", report["points"]).get("notes", [])
     told = [f"note      {'; '.join(notes)}"] if notes else []
     return [*told, *warnings[:SHOWN], f"written   {output}, computed in {report['timings']['total_s']:.2f} s"]
