@@ -119,9 +119,9 @@ class TestMeasure:
         away = np.sqrt(((np.indices((40, 40, 40)) - 19.5) ** 2).sum(axis=0))
         for inner, kind in ((0, "outline"), (9, "outline"), (13, "wall")):
             mask = (away < 16) & (away >= inner)
-            follows = outline_followed(mask, Volume.from_stored(mask.astype(np.uint8), np.eye(4)))
-            assert follows.what == kind
-        assert outline_followed(mask, follows.volume, outlined=True).what == "outline"
+            volume = Volume.from_stored(mask.astype(np.uint8), np.eye(4))
+            assert outline_followed(mask, volume).what == kind
+        assert outline_followed(mask, volume, outlined=True).what == "outline"
 
     def test_the_middle_of_a_wall_is_no_distance_from_it(self) -> None:
         away = np.sqrt(((np.indices((48, 48, 48)) - 23.5) ** 2).sum(axis=0))

@@ -9,7 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .decimation import decimate, faces_under
+from .dynamics.fairing import fair
+from .dynamics.low_pass import OneRing
+from .dynamics.untangle import untangle
 from .judgement import judge
+from .measure.intersections import CrossingFaces
 from .measure.report import assess, compare
 from .measure.topology import check_promise
 from .printing.part import make_part
@@ -46,12 +50,13 @@ def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage
     """
     judged = _judge(made, settings)
     coarse = _coarsen(made, settings)
-    part = _print(coarse.value, settings, progress)
+    even = _smooth(coarse.value, settings)
+    part = _print(even.value, settings, progress)
     surface = part.value
     later: list[Later] = [partial(_measure, surface, settings, progress)]
     if surface.part is not None:
         later.append(partial(_judge_part, surface))
-    return folded(surface, judged, coarse, part), tuple(later)
+    return folded(surface, judged, coarse, even, part), tuple(later)
 
 
 @timed("truth")
@@ -88,6 +93,35 @@ def _decimate(made: Surface, most: int, settings: Settings) -> Stage[Surface]:
         return Stage(coarse)
     filled = made.filled[faces_under(mesh, made.mesh)]
     return Stage(replace(coarse, filled=filled), {"fit": {"filled_faces": int(filled.sum())}})
+
+
+def _smooth(made: Surface, settings: Settings) -> Stage[Surface]:
+    """Take away the detail that is shorter than what was asked for."""
+    return _faired(made, settings) if settings.run.smooth > 0 else Stage(made)
+
+
+@timed("smooth")
+def _faired(made: Surface, settings: Settings) -> Stage[Surface]:
+    before, threads = made.mesh, settings.run.threads
+    found = fair(before, settings.run.smooth)
+    ring = OneRing.of_edges(before.edges, len(before.vertices), threads)
+    mesh, taken_back, crossing = untangle(
+        before.moved(found.vertices), before.vertices, ring, CrossingFaces(threads)
+    )  # fmt: skip
+    smooth = replace(made, mesh=mesh, crossing=crossing)
+    _check(smooth)
+    moved = np.sqrt(((mesh.vertices - before.vertices) ** 2).sum(axis=1))
+    volumes = [float(one.face_volumes.sum()) for one in (before, mesh)]
+    told = {
+        "moved_mean_mm": float(moved.mean()),
+        "moved_p95_mm": float(np.percentile(moved, 95)),
+        "moved_max_mm": float(moved.max()),
+        "volume_change": None if made.borders else volumes[1] / volumes[0] - 1,
+        "taken_back": taken_back,
+        "left": found.left,
+    }
+    left = f"{found.left} of {found.pieces} pieces are thinner than --smooth, and were left as they are"
+    return Stage(smooth, {"smooth": told}, (left,) if found.left else ())
 
 
 def _print(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:

@@ -71,8 +71,8 @@ class Followed:
     ----------
     what : str
         How it is followed, a key of `tomomesh.judgement.LIMITS`.
-    volume : Volume
-        Whose voxels lengths are counted in.
+    affine : (4, 4) float array
+        Indices of the voxels that lengths are counted in to patient millimeters.
     places : (n, 3) float array
         On the boundary, as voxel indices (x, y, z).
     inside : float
@@ -86,7 +86,7 @@ class Followed:
     """
 
     what: str
-    volume: Volume
+    affine: Floats
     places: Floats
     inside: float
     unit: float = 1.0
@@ -97,7 +97,7 @@ class Followed:
     def in_space(cls, found: Boundary, mask: Mask) -> Followed:
         """Ask a network in space for the boundary of a window (K, J, I)."""
         places, inside = found.crossings.positions, float(found.volumes.sum())
-        return cls("space", found.volume, places, inside, unit=unit_of(mask))
+        return cls("space", found.affine, places, inside, unit=unit_of(mask))
 
     def as_closed(self, what: str) -> Followed:
         """Ask the same of a surface that closes the openings of a wall by itself; else it is followed as `what`."""
@@ -105,7 +105,8 @@ class Followed:
 
     def apart(self, mesh: TriMesh, *, leave_out: Mask | None = None, threads: int = 0) -> Apart:
         """Measure a mesh in patient millimeters against it; `leave_out` are faces (m,) that are no part of it."""
-        own = mesh.moved(self.volume.to_indices(mesh.vertices))
+        places = np.linalg.solve(self.affine[:3, :3], (mesh.vertices - self.affine[:3, 3]).T).T
+        own = mesh.moved(np.asarray(places, np.float64))
         enclosed = abs(float(areas_and_volumes(Links(own), threads=threads)[1].sum()))
         samples = area_samples(own, SAMPLES, leave_out=leave_out)
         allowed = self.places if self.besides is None else np.concatenate([self.places, self.besides])
@@ -121,7 +122,7 @@ class Followed:
 
 def boundary_followed(mask: Mask, volume: Volume) -> Followed:
     """Ask contours for the whole boundary of a window (K, J, I)."""
-    return Followed("contours", volume, sides_of(mask), float(np.count_nonzero(mask)))
+    return Followed("contours", volume.affine, sides_of(mask), float(np.count_nonzero(mask)))
 
 
 def components_followed(mask: Mask, volume: Volume, *, outlined: bool, threads: int = 0) -> Followed:
@@ -139,9 +140,9 @@ def outline_followed(mask: Mask, volume: Volume, *, outlined: bool = False, thre
     filled = _over_bare(_filled(mask, threads))
     own, enclosed = int(np.count_nonzero(mask)), int(np.count_nonzero(filled))
     if outlined or own > SHELL * enclosed:
-        return Followed("outline", volume, sides_of(filled), float(enclosed), unit=unit_of(mask))
+        return Followed("outline", volume.affine, sides_of(filled), float(enclosed), unit=unit_of(mask))
     return Followed(
-        "wall", volume, sides_of(mask), enclosed - own / 2, unit=unit_of(mask), wall=mask, besides=sides_of(filled)
+        "wall", volume.affine, sides_of(mask), enclosed - own / 2, unit_of(mask), wall=mask, besides=sides_of(filled)
     )  # fmt: skip
 
 

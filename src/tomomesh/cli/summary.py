@@ -29,6 +29,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
         f"points    {_of_points(report)}",
         *way_of(report["way"]["name"]).of_body(report),
         f"fit       {_of_fit(report)}{_of_filled(report)}",
+        *_of_smooth(report),
         f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}, "
         f"{quality['self_intersections'] or 'no'} face(s) pass through others",
         f"          {quality['components']} component(s), genus {quality['genus']}, "
@@ -231,6 +232,18 @@ def _of_points(report: dict[str, Any]) -> str:
         bridges = "bridged gaps" if "networks" in report else "added voxels"
         made = f", {points['on_bridges']} on {points['bridged_gaps']} {bridges}, {points['on_caps']} on caps"
     return f"{points['count']}{made}, r = {points['spacing_mm']:.4g} {unit}"
+
+
+def _of_smooth(report: dict[str, Any]) -> list[str]:
+    """Say how far smoothing has moved the vertices."""
+    if "smooth" not in report:
+        return []
+    told, unit = report["smooth"], unit_in_words(report)
+    change = "" if told["volume_change"] is None else f", volume {100 * told['volume_change']:+.2g} %"
+    return [
+        f"smooth    vertices moved by {told['moved_mean_mm']:.3g} on average, 95 % at most {told['moved_p95_mm']:.3g}, "
+        f"the most {told['moved_max_mm']:.3g} {unit}{change}"
+    ]
 
 
 def _of_filled(report: dict[str, Any]) -> str:

@@ -134,7 +134,7 @@ def surface_on_cubes(
     tracked = measured("cuberille", _track, shell.value)
     walls = _walls(shell.value, points.positions, settings, asked)
     cubes, cuberille, _ = tracked.value
-    smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.smoothing)
+    smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.low_pass)
     grid, taken = shell.value.grid, shell.value.taken
     encloses = asked.or_more(hollow(shell.value.leak_test, taken, len(grid.keys), grid.cell_mm))
     drawn = tracked.value, smoothed.value, points.positions, samples, settings, progress

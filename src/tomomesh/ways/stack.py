@@ -82,7 +82,7 @@ def _least(made: ContourSurface, slices: Slices) -> Enclosed:
     _, first = np.unique(stack.body, return_index=True)
     groups = slices.groups[[stack.parts[n].plane for n in first]]
     volumes = np.bincount(groups, stack.frusta)
-    return Enclosed("slices", float(volumes.max()), whole=np.count_nonzero(volumes) < 2)
+    return Enclosed("slices", float(volumes.max()), whole=int(np.count_nonzero(volumes)) < 2)
 
 
 def _stack_found(made: ContourSurface, slices: Slices, *, left: int, of_study: bool) -> Stage[None]:

@@ -48,7 +48,7 @@ def surface_by_voxels(found: Segmentation[Boundary], settings: Settings, progres
     made = meshed.value
     surface = Surface(
         found.points, source.cuberille, made.smoothed, made.mesh, made.nearest, cavities=source.cavities,
-        follows=Followed("voxels", source.volume, source.crossings.positions, float(source.volumes.sum())),
+        follows=Followed("voxels", source.affine, source.crossings.positions, float(source.volumes.sum())),
     )  # fmt: skip
     return folded(surface, meshed, boundary_found(source, made))
 
