@@ -30,9 +30,9 @@ OTHER: dict[str, Any] = {
     "epochs": 2, "start": "axes", "neighborhood": "bubble", "alpha": (0.3, 0.1), "alpha_fall": "exponential",
     "alpha_power": 1.5, "radius": (4.0, 0.9), "radius_fall": "linear", "radius_power": 3.0, "least_move": 0.5,
     "bridge": 1.1, "even": False, "trim": 1.5, "cell_mm": (1.5,), "cell_factor": 1.7, "caps": False, "closing": 3,
-    "stacks": "none", "allow_leaks": True, "open": True, "smoothing": 0, "attraction": "surface", "stiffness": 0.9,
+    "stacks": "none", "allow_leaks": True, "open": True, "low_pass": 0, "attraction": "surface", "stiffness": 0.9,
     "damping": 0.9, "step": 0.5, "springs": "triangles", "limit": "shorten", "allow_returns": True,
-    "units": "cm", "local_origin": True,
+    "units": "cm", "local_origin": True, "allow_far": True,
     "largest": True, "surface": "outer", "seed": 99, "cell_from": "nearest", "tracking": "faces",
 }  # fmt: skip
 """Another value of each parameter that may be without effect."""
@@ -42,7 +42,7 @@ ALWAYS = {
     "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "level", "fill_chunks", "structure",
     "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "keep", "slices", "way", "network",
     "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow", "drain", "least_wall",
-    "print_check", "threads", "frame", "target_faces",
+    "print_check", "threads", "frame", "target_faces", "smooth",
 }  # fmt: skip
 """Parameters that matter on every way, or that choose what is read, the way, or what becomes of the mesh."""
 STUDY: dict[str, dict[str, Any]] = {
@@ -141,7 +141,7 @@ class TestTable:
 
     def test_the_defaults_have_something_to_say_of_few(self) -> None:
         assert {"alpha", "iterations"} < set(silent({}, "gray"))
-        assert not {"neurons", "lower", "closing", "smoothing", "cell_mm", "seed"} & set(silent({}, "gray"))
+        assert not {"neurons", "lower", "closing", "low_pass", "cell_mm", "seed"} & set(silent({}, "gray"))
 
 
 @pytest.mark.skipif(not COMPILED, reason="some hundred meshes, seconds each without the compiler")
@@ -166,7 +166,7 @@ class TestTruth:
 
     def test_what_has_an_effect_changes_the_mesh(self) -> None:
         before = vertices(STUDY["networks"], "gray")
-        for name in ("epochs", "radius", "even", "caps", "smoothing", "step", "cell_mm"):
+        for name in ("epochs", "radius", "even", "caps", "low_pass", "step", "cell_mm"):
             assert name not in silent(STUDY["networks"], "gray")
             after = vertices(STUDY["networks"] | {name: OTHER[name]}, "gray")
             assert after.shape != before.shape or not np.array_equal(after, before), name
@@ -193,9 +193,9 @@ class TestLargest:
 
 class TestReport:
     def test_what_was_asked_for_is_told_and_nothing_else(self) -> None:
-        settings = Settings().replace(alpha=(0.3, 0.1))
+        settings = Settings().replace(alpha=(0.3, 0.1), neurons=24)
         assert not any("alpha" in told for told in reconstruct(ball(), settings, lower=40.0).report["warnings"])
-        told = reconstruct(ball(), lower=40.0, alpha=(0.3, 0.1), even=False).report["warnings"]
+        told = reconstruct(ball(), lower=40.0, neurons=24, alpha=(0.3, 0.1), even=False).report["warnings"]
         assert told[0] == "--alpha has no effect with --training batch"
         assert not any("even" in one for one in told)
 

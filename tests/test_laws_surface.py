@@ -115,7 +115,7 @@ class TestSound:
         assert len(np.unique(surface.mesh.vertices, axis=0)) == len(surface.mesh.vertices)
 
     @pytest.mark.parametrize(
-        "changes", [{"smoothing": 0}, {"stiffness": 0.0}, {"max_steps": 0}, {"springs": "triangles"}]
+        "changes", [{"low_pass": 0}, {"stiffness": 0.0}, {"max_steps": 0}, {"springs": "triangles"}]
     )
     def test_whatever_the_settings(self, changes: dict[str, Any]) -> None:
         surface = reconstruct_points(torus(COUNT), **changes)

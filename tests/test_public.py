@@ -73,7 +73,7 @@ def test_a_picture_is_trained_as_its_slice_is() -> None:
 
 def test_numpy_numbers_are_numbers() -> None:
     settings = tomomesh.Settings().replace(
-        smoothing=np.int64(2), stiffness=np.float32(0.5), cell_mm=np.array([2.0, 3.0, 5.0])
+        low_pass=np.int64(2), stiffness=np.float32(0.5), cell_mm=np.array([2.0, 3.0, 5.0])
     )
-    assert settings.cubes.smoothing == 2
+    assert settings.cubes.low_pass == 2
     assert settings.cubes.cell_mm == (2.0, 3.0, 5.0)

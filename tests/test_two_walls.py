@@ -159,7 +159,7 @@ class TestUnfitted:
     def test_no_face_passes_through_another(
         self, seed: int, passes: int, factor: float, closing: int, attraction: str
     ) -> None:
-        asked: dict[str, Any] = {"smoothing": passes, "cell_factor": factor, "closing": closing}
+        asked: dict[str, Any] = {"low_pass": passes, "cell_factor": factor, "closing": closing}
         stretched = ball(400, seed) * np.random.default_rng(seed).uniform(0.3, 3, 3)
         made = reconstruct_points(stretched, attraction=attraction, stacks="none", allow_leaks=True, **asked)
         assert not self_intersections(made.mesh).any()

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .decimation import decimate, faces_under
-from .errors import GeometryError
+from .dynamics.fairing import fair
+from .dynamics.low_pass import OneRing
+from .dynamics.untangle import untangle
+from .judgement import judge
+from .measure.intersections import CrossingFaces
 from .measure.report import assess, compare
 from .measure.topology import check_promise
 from .printing.part import make_part
-from .results import LEAST
 from .stage import Stage, folded, timed
 
 if TYPE_CHECKING:
@@ -26,16 +29,6 @@ if TYPE_CHECKING:
 PLAUSIBLE = 0.15
 """Difference from the volume of the rings over which a result is warned of. Measured on the built-in head and an MR:
 0.4 and 0.0 %, and 4.5 % around loops."""
-HINTS = {
-    "rings": "no --no-caps, a larger --cell-mm or --closing, --network none, or --allow-leaks",
-    "slices": "--allow-leaks, which writes it all the same",
-    "samples": "a larger --cell or --closing, or --allow-leaks",
-    "window": "--signal boundary, more --neurons, --network none, or --allow-leaks",
-}
-"""What may help, by what a mesh should have enclosed."""
-FAR = 2.0
-"""Distance of the surface from one point in twenty, slice distances, from which a result is warned of. Measured on the
-built-in head and an MR: 0.1 and 0.3, and 5 where a network in space leaves out bays."""
 
 
 def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage[Surface], tuple[Later, ...]]:
@@ -51,18 +44,19 @@ def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage
     Raises
     ------
     GeometryError
-        Where it has two walls.
+        Where it has two walls, or does not follow what it was made from.
     InternalCheckError
         Where it is not what is promised.
     """
     judged = _judge(made, settings)
     coarse = _coarsen(made, settings)
-    part = _print(coarse.value, settings, progress)
+    even = _smooth(coarse.value, settings)
+    part = _print(even.value, settings, progress)
     surface = part.value
     later: list[Later] = [partial(_measure, surface, settings, progress)]
     if surface.part is not None:
         later.append(partial(_judge_part, surface))
-    return folded(surface, judged, coarse, part), tuple(later)
+    return folded(surface, judged, coarse, even, part), tuple(later)
 
 
 @timed("truth")
@@ -73,18 +67,9 @@ def compare_with(surface: Surface, truth: TriMesh) -> Stage[None]:
 
 @timed("quality")
 def _judge(made: Surface, settings: Settings) -> Stage[None]:
-    """Refuse a mesh that is not closed as promised, or of which both walls rest on the same points."""
+    """Refuse a mesh that is not closed as promised, or that does not follow what it was made from."""
     _check(made)
-    share = 1.0 if made.encloses is None else made.encloses.share(made.mesh)
-    if made.encloses is None or share >= LEAST:
-        return Stage(None)
-    found = f"{share:.1%} of the volume of its {made.encloses.what}"
-    if settings.cubes.allow_leaks:
-        return Stage(None, warnings=(f"the mesh encloses {found}: it may have two walls",))
-    raise GeometryError(
-        "the surface has two walls, or does not follow what it was made from",
-        found=found, expected=f"at least {LEAST:.0%}", hint=HINTS[made.encloses.what],
-    )  # fmt: skip
+    return judge(made, settings)
 
 
 def _check(made: Surface) -> None:
@@ -108,6 +93,35 @@ def _decimate(made: Surface, most: int, settings: Settings) -> Stage[Surface]:
         return Stage(coarse)
     filled = made.filled[faces_under(mesh, made.mesh)]
     return Stage(replace(coarse, filled=filled), {"fit": {"filled_faces": int(filled.sum())}})
+
+
+def _smooth(made: Surface, settings: Settings) -> Stage[Surface]:
+    """Take away the detail that is shorter than what was asked for."""
+    return _faired(made, settings) if settings.run.smooth > 0 else Stage(made)
+
+
+@timed("smooth")
+def _faired(made: Surface, settings: Settings) -> Stage[Surface]:
+    before, threads = made.mesh, settings.run.threads
+    found = fair(before, settings.run.smooth)
+    ring = OneRing.of_edges(before.edges, len(before.vertices), threads)
+    mesh, taken_back, crossing = untangle(
+        before.moved(found.vertices), before.vertices, ring, CrossingFaces(threads)
+    )  # fmt: skip
+    smooth = replace(made, mesh=mesh, crossing=crossing)
+    _check(smooth)
+    moved = np.sqrt(((mesh.vertices - before.vertices) ** 2).sum(axis=1))
+    volumes = [float(one.face_volumes.sum()) for one in (before, mesh)]
+    told = {
+        "moved_mean_mm": float(moved.mean()),
+        "moved_p95_mm": float(np.percentile(moved, 95)),
+        "moved_max_mm": float(moved.max()),
+        "volume_change": None if made.borders else volumes[1] / volumes[0] - 1,
+        "taken_back": taken_back,
+        "left": found.left,
+    }
+    left = f"{found.left} of {found.pieces} pieces are thinner than --smooth, and were left as they are"
+    return Stage(smooth, {"smooth": told}, (left,) if found.left else ())
 
 
 def _print(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:
@@ -139,31 +153,15 @@ def _measure(made: Surface, settings: Settings, progress: Progress) -> Stage[Non
     crossing = quality["self_intersections"]
     crossed = (f"{crossing} faces pass through others",) if crossing else ()
     measured = Stage(None, {"quality": quality})
-    return folded(None, measured, *_beside_study(made, quality), Stage(None, warnings=crossed))
+    return folded(None, measured, _beside_rings(made, quality["volume_mm3"]), Stage(None, warnings=crossed))
 
 
-def _beside_study(made: Surface, quality: dict[str, Any]) -> list[Stage[None]]:
-    """Compare the mesh with the rings and the slices that it comes from."""
-    if made.segmentation is None:
-        return []
-    rings, volume = made.segmentation.sampling.volume_mm3, quality["volume_mm3"]
-    far = quality.get("points_to_surface_p95_mm", 0.0)
-    return [_beside_rings(volume, rings), _far_from_points(far, made.segmentation.volume.spacing_mm[2])]
-
-
-def _beside_rings(volume: float, rings: float) -> Stage[None]:
+def _beside_rings(made: Surface, volume: float | None) -> Stage[None]:
     """Compare the volume of a mesh with the areas of the rings times the distance of their slices."""
-    if rings <= 0:
+    rings = 0.0 if made.segmentation is None else made.segmentation.sampling.volume_mm3
+    if volume is None or rings <= 0:
         return Stage(None)
     over = volume / rings
     off = f"the mesh encloses {over:.0%} of the volume of its rings"
     stats = {"quality": {"rings_volume_mm3": rings, "volume_over_rings": over}}
     return Stage(None, stats, (off,) if abs(over - 1) > PLAUSIBLE else ())
-
-
-def _far_from_points(far: float, slice_mm: float) -> Stage[None]:
-    said = (
-        f"one point in twenty lies over {far:.3g} mm from the surface: it does not follow the window there, "
-        "as --network none and --contours loops do"
-    )
-    return Stage(None, warnings=(said,) if far > FAR * slice_mm else ())

@@ -15,6 +15,7 @@ from .report import Reported
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from .followed import Followed
     from .isosurface.crossings import Levels
     from .model.cubes import CubeGrid
     from .model.mesh import QuadMesh, TriMesh
@@ -70,6 +71,8 @@ class Enclosed:
 
     what: str
     volume: float
+    whole: bool = True
+    """Whether it is all that a mesh should enclose."""
 
     @classmethod
     def window(cls, found: Segmentation[Any]) -> Enclosed:
@@ -129,6 +132,8 @@ class Surface(Reported):
         The places that distances are measured from, where these are not the points.
     encloses : Enclosed or None
         What it should enclose; None where its way tells nothing of it, or where two walls were allowed.
+    follows : Followed or None
+        What of a window it is to follow; None for clouds, and where two walls were allowed.
     segmentation : Segmentation or None
         Stage one, where the points came from a study.
     place : Place or None
@@ -150,9 +155,15 @@ class Surface(Reported):
     crossing: NDArray[np.bool_] | None = None
     rests_on: NDArray[np.float64] | None = None
     encloses: Enclosed | None = None
+    follows: Followed | None = None
     segmentation: Segmentation[Any] | None = None
     place: Place | None = None
     part: Part | None = None
+
+    @property
+    def capped(self) -> bool:
+        """Whether any of its points are on a cap."""
+        return bool((self.points.kinds == CAP).any())
 
     @property
     def cap_faces(self) -> NDArray[np.bool_]:

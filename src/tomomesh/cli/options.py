@@ -37,12 +37,12 @@ SHELLS = ("bash", "zsh", "fish", "tcsh")
 
 CUTS = ("scale", "flat_base", "hollow", "drain")
 """Parameters that change a part."""
-MESH_ONLY = ("local_origin", "target_faces")
+MESH_ONLY = ("local_origin", "smooth", "allow_far", "target_faces")
 """Parameters of the run that matter to meshes alone."""
 STUDY_ONLY = ("frame",)
 """Parameters of the run that matter to studies alone."""
 SURFACE_ONLY = (
-    "cell_mm", "cell_factor", "closing", "stacks", "largest", "allow_leaks", "surface", "smoothing", *MESH_ONLY,
+    "cell_mm", "cell_factor", "closing", "stacks", "largest", "allow_leaks", "surface", "low_pass", *MESH_ONLY,
 )  # fmt: skip
 """Parameters that do not matter to the points."""
 

@@ -24,10 +24,12 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
     shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
     shape = shape if quality["closed"] else "a manifold sheet"
     lines = [
+        *_of_far(report),
         *_of_stage_one(report),
         f"points    {_of_points(report)}",
         *way_of(report["way"]["name"]).of_body(report),
         f"fit       {_of_fit(report)}{_of_filled(report)}",
+        *_of_smooth(report),
         f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}, "
         f"{quality['self_intersections'] or 'no'} face(s) pass through others",
         f"          {quality['components']} component(s), genus {quality['genus']}, "
@@ -155,6 +157,17 @@ def _volume(found: dict[str, Any]) -> str:
     return ", open" if found["volume_mm3"] is None else f", volume {found['volume_mm3']:.6g}"
 
 
+def _of_far(report: dict[str, Any]) -> list[str]:
+    """Say first of all that a mesh is far from what it was made from."""
+    far = _far(report)
+    return [f"far       {far}"] if far else []
+
+
+def _far(report: dict[str, Any]) -> str | None:
+    told: str | None = report.get("quality", {}).get("follows", {}).get("far")
+    return told
+
+
 def _of_stage_one(report: dict[str, Any]) -> list[str]:
     if "study" not in report:
         return []
@@ -221,6 +234,18 @@ def _of_points(report: dict[str, Any]) -> str:
     return f"{points['count']}{made}, r = {points['spacing_mm']:.4g} {unit}"
 
 
+def _of_smooth(report: dict[str, Any]) -> list[str]:
+    """Say how far smoothing has moved the vertices."""
+    if "smooth" not in report:
+        return []
+    told, unit = report["smooth"], unit_in_words(report)
+    change = "" if told["volume_change"] is None else f", volume {100 * told['volume_change']:+.2g} %"
+    return [
+        f"smooth    vertices moved by {told['moved_mean_mm']:.3g} on average, 95 % at most {told['moved_p95_mm']:.3g}, "
+        f"the most {told['moved_max_mm']:.3g} {unit}{change}"
+    ]
+
+
 def _of_filled(report: dict[str, Any]) -> str:
     """Say what share of the mesh lies where a cloud has no points."""
     if report.get("fit", {}).get("converged") is None or "filled_faces" not in report["fit"]:
@@ -240,7 +265,7 @@ def _of_rings(quality: dict[str, Any]) -> str:
 
 
 def _ending(report: dict[str, Any], output: str) -> list[str]:
-    warnings = [f"warning   {warning}" for warning in report["warnings"]]
+    warnings = [f"warning   {warning}" for warning in report["warnings"] if warning != _far(report)]
     notes = report.get("study", report["points"]).get("notes", [])
     told = [f"note      {'; '.join(notes)}"] if notes else []
     return [*told, *warnings[:SHOWN], f"written   {output}, computed in {report['timings']['total_s']:.2f} s"]

@@ -209,7 +209,7 @@ def _kept_side(samples: Samples, spanned: Bridges, found: Borders, cell: Floats,
         both = exposed_faces(shell)
         ring = OneRing.of_quads(both.quads, len(both.corners), settings.run.threads)
         lattice = lowest + both.corners * cell
-        smoothed = ring.smoothed(lattice, settings.cubes.smoothing)
+        smoothed = ring.smoothed(lattice, settings.cubes.low_pass)
         start = smoothed - edge * ring.normals(smoothed)
         side = one_side(start, ring, samples, apron, share >= TIP, edge, largest=settings.cubes.largest)
         if side is not None:

@@ -16,6 +16,7 @@ from ..measure.intersections import CrossingFaces
 from ..model.lattice import lattice
 from ..model.mesh import TriMesh
 from ..model.networks import SpaceNetwork
+from ..settings import SURFACES
 from ..som.fit import fit
 from ..som.starts import start_positions
 from .signal import closed
@@ -42,6 +43,13 @@ def is_wall(mask: NDArray[np.bool_]) -> bool:
     """Tell whether a window (K, J, I) is a wall around something, like a skull, whose middle the network shall take."""
     enclosed = sum(int(np.count_nonzero(closed(plane)[0])) for plane in mask if plane.any())
     return enclosed > HOLLOW * int(np.count_nonzero(mask))
+
+
+def sees_boundary(mask: NDArray[np.bool_], asked: NetworkSettings) -> bool:
+    """Tell whether a network sees a window's boundary; a torus, which has a hole of its own, is no wall."""
+    if asked.signal != "auto" or asked.network not in SURFACES:
+        return asked.signal == "boundary"
+    return asked.network == "torus" or not is_wall(mask)
 
 
 def pieces_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], int]:

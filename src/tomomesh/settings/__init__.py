@@ -145,7 +145,7 @@ class Settings:
 
         Examples
         --------
-        >>> Settings.json_schema()["properties"]["cubes"]["properties"]["smoothing"]["maximum"]
+        >>> Settings.json_schema()["properties"]["cubes"]["properties"]["low_pass"]["maximum"]
         1000
         """
         groups = {entry.name: schema_of(getattr(cls(), entry.name)) for entry in fields(cls)}

@@ -57,4 +57,4 @@ class CubeSettings(Group):
         "divide the voxels of thick slices into such as are nearly cubes, and move what is in each to where its "
         "neighbors have theirs; without, levels are interpolated linearly from slice to slice",
     )
-    smoothing: int = param(3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000)
+    low_pass: int = param(3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000)

@@ -24,6 +24,7 @@ MATTERS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "even": {"network": ("chain", "ring")},
     "units": POINTS,
     "local_origin": POINTS,
+    "allow_far": {"input": ("gray", "color", "stack")},
 }
 """Parameter to the values of others, or the inputs (gray or color study, cloud or stack), beside which it changes
 anything."""

@@ -32,6 +32,13 @@ class RunSettings(Group):
     local_origin: bool = param(
         False, "count a cloud's coordinates from its lowest corner, which report and file name: for STL far from 0"
     )
+    smooth: float = param(
+        0.0, "length below which detail is taken from the mesh, in a cloud's unit; its volume stays, and the report "
+        "says how far vertices moved", unit="mm", low=0,
+    )  # fmt: skip
+    allow_far: bool = param(
+        False, "write the mesh even where its volume, or its distance from the window, is far from the window's own"
+    )
     target_faces: int | None = param(
         None, "most faces of the mesh, which is made coarser where it has more", kind=int, unit="faces", low=4
     )

@@ -177,7 +177,7 @@ def _smoothed(shell: Shell, settings: Settings) -> Rough:
     faces = shell.leak_test.faces.only(shell.taken(settings))
     ring = OneRing.of_quads(faces.quads, len(faces.corners), settings.run.threads)
     lattice = shell.lowest + faces.corners * shell.cell
-    vertices = ring.smoothed(lattice, settings.cubes.smoothing)
+    vertices = ring.smoothed(lattice, settings.cubes.low_pass)
     return Rough(faces, lattice, ring, TriMesh(vertices, _halves(faces.quads)))
 
 

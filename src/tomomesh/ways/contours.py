@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import EmptyError
+from ..followed import Followed, boundary_followed, components_followed
 from ..isosurface.crossings import Levels
 from ..isosurface.voxels import Boundary, boundary, voxel_surface
 from ..measure.rings import assess_contours
@@ -62,11 +63,21 @@ def surface_by_contours(found: Segmentation[Contours], settings: Settings, progr
     made = bounded.value
     meshed = measured("fit", voxel_surface, made, settings.fit, threads=run.threads, progress=progress)
     rest = meshed.value
+    follows = measured("quality", _followed, found, run.threads)
     surface = Surface(
         found.points, made.cuberille, rest.smoothed, rest.mesh, NOTHING, cavities=made.cavities,
         encloses=Enclosed("rings", found.sampling.volume_mm3).or_more(Enclosed.window(found)),
+        follows=follows.value,
     )  # fmt: skip
-    return folded(surface, bounded, meshed, boundary_found(made, rest))
+    return folded(surface, bounded, meshed, follows, boundary_found(made, rest))
+
+
+def _followed(found: Segmentation[Contours], threads: int) -> Followed:
+    """Return what of the window the contours are to follow."""
+    if found.source.kind != "components":
+        return boundary_followed(found.mask, found.volume)
+    outlined = all(one.outlined for one in found.source.contours)
+    return components_followed(found.mask, found.volume, outlined=outlined, threads=threads)
 
 
 def boundary_of_rings(

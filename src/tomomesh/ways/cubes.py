@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..cuberille.leak_test import LeakTest
+    from ..followed import Followed
     from ..model.cubes import CubeGrid
     from ..model.mesh import QuadMesh
     from ..model.points import PointSet
@@ -54,11 +55,12 @@ class Shell:
 
 @dataclass(frozen=True)
 class Inside:
-    """What is known of the inside of a surface: the volume of its rings, and its window; nothing of a cloud's."""
+    """What is known of the inside of a surface: its rings, its window, and what it follows; nothing of a cloud's."""
 
     rings_mm3: float = 0.0
     window_mm3: float = 0.0
     mask: NDArray[np.bool_] | None = None
+    follows: Followed | None = None
 
     @property
     def may_be_flat(self) -> bool:
@@ -132,7 +134,7 @@ def surface_on_cubes(
     tracked = measured("cuberille", _track, shell.value)
     walls = _walls(shell.value, points.positions, settings, asked)
     cubes, cuberille, _ = tracked.value
-    smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.smoothing)
+    smoothed = measured("smooth", _smoothed, cuberille, settings.cubes.low_pass)
     grid, taken = shell.value.grid, shell.value.taken
     encloses = asked.or_more(hollow(shell.value.leak_test, taken, len(grid.keys), grid.cell_mm))
     drawn = tracked.value, smoothed.value, points.positions, samples, settings, progress
@@ -146,7 +148,7 @@ def surface_on_cubes(
     made = Surface(
         points, cuberille, smoothed.value, rest.value.mesh, fitted.nearest, cubes, fitted.trace, fitted.filled,
         cavities=int((shell.value.leak_test.faces.inward & taken).sum()), crossing=rest.value.crossing,
-        encloses=encloses if walls.value == 1 else None,
+        encloses=encloses if walls.value == 1 else None, follows=asked.follows if walls.value == 1 else None,
     )  # fmt: skip
     return folded(made, shell, tracked, walls, smoothed, rest)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..stage import Stage, folded
 from .cubes import surface_on_cubes
 from .rings import BETWEEN, inside_of, of_networks, segment_by_rings
 from .sections import body_of_cubes, networks_on_slices
@@ -14,12 +15,13 @@ if TYPE_CHECKING:
     from ..progress import Progress
     from ..results import Segmentation, Surface
     from ..settings import Settings
-    from ..stage import Stage
 
 
 def surface_by_networks(found: Segmentation[Networks], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Turn the neurons of all slices into a closed surface."""
-    return surface_on_cubes(found.points, found.sampling.spacing_mm, settings, progress, inside_of(found))
+    inside = inside_of(found, settings)
+    made = surface_on_cubes(found.points, found.sampling.spacing_mm, settings, progress, inside.value)
+    return folded(made.value, inside, made)
 
 
 RINGS = {"network": ("ring",)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..followed import outline_followed
 from ..isosurface.crossings import Levels
 from ..measure.rings import assess_contours
 from ..results import Enclosed, Segmentation
@@ -13,7 +14,7 @@ from ..segmentation.training import regions, train_study
 from ..segmentation.under_rings import surface_under
 from ..segmentation.window import by_layer
 from ..som.schedules import schedule_warning
-from ..stage import Stage, folded, measured
+from ..stage import Stage, folded, measured, timed
 from .cubes import Inside, surface_on_cubes
 from .sections import body_of_cubes, missed, networks_on_slices, sampling_found
 from .way import CUBES, POINTS, TRAINING, Way, parameters
@@ -61,15 +62,21 @@ def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> 
 def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress: Progress) -> Stage[Surface]:
     """Turn the rings of all slices into a closed surface."""
     under = measured("points", surface_under, found.source, found.sampling, found.volume)
+    inside = inside_of(found, settings)
     made = surface_on_cubes(
-        found.points, found.sampling.spacing_mm, settings, progress, inside_of(found), under.value
+        found.points, found.sampling.spacing_mm, settings, progress, inside.value, under.value
     )  # fmt: skip
-    return folded(made.value, under, made)
+    return folded(made.value, under, inside, made)
 
 
-def inside_of(found: Segmentation[Networks]) -> Inside:
-    """Tell what is known of the inside of networks."""
-    return Inside(found.sampling.volume_mm3, Enclosed.window(found).volume, found.mask)
+@timed("quality")
+def inside_of(found: Segmentation[Networks], settings: Settings) -> Stage[Inside]:
+    """Tell what is known of the inside of networks, and what of the window they are to follow."""
+    follows = outline_followed(
+        found.mask, found.volume, outlined=bool(found.source.outlined), threads=settings.run.threads
+    )  # fmt: skip
+    follows = follows if settings.cubes.caps else follows.as_closed(follows.what)
+    return Stage(Inside(found.sampling.volume_mm3, Enclosed.window(found).volume, found.mask, follows))
 
 
 def levels_of(kept: Selected, settings: Settings) -> Levels:

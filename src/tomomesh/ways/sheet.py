@@ -54,7 +54,7 @@ WAY = Way(
     applies=lambda settings, input: input in POINTS and settings.cubes.open,
     because=lambda settings, input: "with --open",
     reads=parameters(
-        "cell_mm", "cell_factor", "largest", "smoothing", "stacks", "open", "attraction", "damping", "step"
+        "cell_mm", "cell_factor", "largest", "low_pass", "stacks", "open", "attraction", "damping", "step"
     ),
     surface=surface_of_sheet,
     of_body=body_of_cubes,

@@ -15,6 +15,7 @@ from ..dynamics.moving_least_squares import fit_to_surface
 from ..dynamics.subdivision import squares_of
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError, UsageError
+from ..followed import Followed, outline_followed
 from ..isosurface.voxels import boundary
 from ..measure.intersections import CrossingFaces
 from ..model.columns import any_of
@@ -23,7 +24,7 @@ from ..model.points import PointSet
 from ..pointcloud.samples import settle_points
 from ..results import Enclosed, Segmentation, Surface
 from ..segmentation.sample import Sampling
-from ..segmentation.space import is_wall, pieces_of, regions_in_space, train_space, untangled
+from ..segmentation.space import is_wall, pieces_of, regions_in_space, sees_boundary, train_space, untangled
 from ..settings import SURFACES
 from ..stage import Stage, folded, measured, timed
 from .sections import fit_found, points_found
@@ -58,19 +59,22 @@ class SpaceFound:
     network : SpaceNetwork
     places : (n, 3) float array
         The window's boundary or its voxels in patient millimeters, all of them.
+    follows : Followed
     """
 
     network: SpaceNetwork
     places: Floats
+    follows: Followed
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What a network is shown: voxels (n, 3) in patient millimeters, or the boundary around them."""
+    """What a network is shown: voxels (n, 3) in patient millimeters, or the boundary around them; what it follows."""
 
     voxels: Floats
     places: Floats
     outlined: bool
+    follows: Followed
 
 
 def require_surface(settings: Settings) -> None:
@@ -101,7 +105,7 @@ def segment_in_space(kept: Selected, settings: Settings, progress: Progress) -> 
     progress("networks", 1, 1)
     labels = measured("regions", regions_in_space, mask, voxels, trained.value, run.threads)
     network, sampling = trained.value, _sampled(trained.value)
-    source = SpaceFound(network, places)
+    source = SpaceFound(network, places, shown.value.follows)
     found = Segmentation(kept.study, kept.plane, kept.mask, labels.value, sampling.points, sampling, source)
     inside = not outlined and settings.network.network in SURFACES and not is_wall(mask)
     dropped = int(np.count_nonzero(kept.mask) - np.count_nonzero(mask))
@@ -111,14 +115,15 @@ def segment_in_space(kept: Selected, settings: Settings, progress: Progress) -> 
 
 def _shown(kept: Selected, mask: NDArray[np.bool_], settings: Settings) -> Shown:
     voxels = kept.study.to_mm(np.argwhere(mask)[:, ::-1].astype(np.float64))
-    if not _outlined(mask, settings):
-        return Shown(voxels, voxels, outlined=False)
+    if not sees_boundary(mask, settings.network):
+        follows = outline_followed(mask, kept.study, threads=settings.run.threads).as_closed("space")
+        return Shown(voxels, voxels, False, follows)
     chosen = kept.chosen
     found = boundary(
         chosen.volume, mask, lower=chosen.lower, upper=chosen.upper, layers=settings.window.layers, surface="outer",
         divide=settings.cubes.divide, threads=settings.run.threads,
     )  # fmt: skip
-    return Shown(voxels, found.points.positions, outlined=True)
+    return Shown(voxels, found.points.positions, True, Followed.in_space(found, mask))
 
 
 def _network_found(
@@ -146,14 +151,6 @@ def _network_found(
     if dropped > LEFT_OUT * voxels:
         warnings.append(f"{dropped} of {voxels} voxels of the window lie in small pieces, and were left out")
     return Stage(None, stats, tuple(warnings))
-
-
-def _outlined(mask: NDArray[np.bool_], settings: Settings) -> bool:
-    """Tell whether the network sees the window's boundary; a torus, which has a hole of its own, is no wall."""
-    asked = settings.network
-    if asked.signal != "auto" or asked.network not in SURFACES:
-        return asked.signal == "boundary"
-    return asked.network == "torus" or not is_wall(mask)
 
 
 def _sampled(network: SpaceNetwork) -> Sampling:
@@ -190,6 +187,7 @@ def surface_in_space(found: Segmentation[SpaceFound], settings: Settings, progre
     surface = Surface(
         found.points, rough, rough.triangulated(), made, np.empty(0, np.int32), trace=rest.value.trace,
         filled=rest.value.filled, crossing=crossing, rests_on=found.source.places, encloses=Enclosed.window(found),
+        follows=found.source.follows,
     )  # fmt: skip
     fitted = fit_found(rest.value.trace, len(rough.vertices), taken_back=taken_back, filled=rest.value.filled)
     return folded(surface, apart, faces, rest, mesh, fitted)

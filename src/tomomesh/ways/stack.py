@@ -66,7 +66,7 @@ def surface_of_slices(
     made = closed.value
     surface = Surface(
         cloud, made.boundary.cuberille, made.rest.smoothed, made.mesh, made.rest.nearest, filled=made.filled,
-        cavities=made.boundary.cavities, encloses=encloses or Enclosed("slices", _least(made, slices)),
+        cavities=made.boundary.cavities, encloses=encloses or _least(made, slices),
     )  # fmt: skip
     spaced = points_found(cloud, slices.spacing, unit=unit, bridged=bridged)
     left = int((cloud.kinds[slices.labels < 0] == NEURON).sum())
@@ -74,14 +74,15 @@ def surface_of_slices(
     return folded(surface, closed, spaced, boundary_found(made.boundary, made.rest), told)
 
 
-def _least(made: ContourSurface, slices: Slices) -> float:
+def _least(made: ContourSurface, slices: Slices) -> Enclosed:
     """Return the volume of the frusta; of several structures, which may lie in each other, that of the largest."""
     stack = made.stack
     if not slices.rings:
-        return float(stack.frusta.sum())
+        return Enclosed("slices", float(stack.frusta.sum()))
     _, first = np.unique(stack.body, return_index=True)
     groups = slices.groups[[stack.parts[n].plane for n in first]]
-    return float(np.bincount(groups, stack.frusta).max())
+    volumes = np.bincount(groups, stack.frusta)
+    return Enclosed("slices", float(volumes.max()), whole=int(np.count_nonzero(volumes)) < 2)
 
 
 def _stack_found(made: ContourSurface, slices: Slices, *, left: int, of_study: bool) -> Stage[None]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..followed import Followed
 from ..isosurface.voxels import Boundary, boundary, voxel_surface
 from ..model.points import PointSet
 from ..results import Segmentation, Surface
@@ -47,6 +48,7 @@ def surface_by_voxels(found: Segmentation[Boundary], settings: Settings, progres
     made = meshed.value
     surface = Surface(
         found.points, source.cuberille, made.smoothed, made.mesh, made.nearest, cavities=source.cavities,
+        follows=Followed("voxels", source.affine, source.crossings.positions, float(source.volumes.sum())),
     )  # fmt: skip
     return folded(surface, meshed, boundary_found(source, made))
 

@@ -99,7 +99,7 @@ TRAINING = parameters(
     "alpha_power", "radius", "radius_fall", "radius_power", "least_move", "trim", "seed",
 )  # fmt: skip
 """What every way reads that trains networks."""
-CUBES = parameters("cell_mm", "cell_factor", "closing", "largest", "allow_leaks", "surface", "smoothing")
+CUBES = parameters("cell_mm", "cell_factor", "closing", "largest", "allow_leaks", "surface", "low_pass")
 """What every way reads that goes by cubes."""
 SPRINGS = parameters("stiffness", "damping", "step", "springs", "limit", "allow_returns")
 """What every way reads whose mesh hangs on springs between masses."""
