@@ -33,7 +33,7 @@ OTHER: dict[str, Any] = {
     "stacks": "none", "allow_leaks": True, "open": True, "low_pass": 0, "attraction": "surface", "stiffness": 0.9,
     "damping": 0.9, "step": 0.5, "springs": "triangles", "limit": "shorten", "allow_returns": True,
     "units": "cm", "local_origin": True, "allow_far": True,
-    "largest": True, "surface": "outer", "seed": 99, "cell_from": "nearest", "tracking": "faces",
+    "largest": True, "surface": "outer", "divide": False, "seed": 99, "cell_from": "nearest", "tracking": "faces",
 }  # fmt: skip
 """Another value of each parameter that may be without effect."""
 SOMETIMES = {*MATTERS, *(name for way in TABLE for name in way_of(way).reads)}
@@ -70,9 +70,12 @@ WAYS = [*(("gray", asked) for asked in STUDY.values()), *(("cloud", asked) for a
 
 
 def ball() -> Volume:
-    """Return a ball of radius 6 mm, its gray levels falling outward."""
-    offset = np.indices((16, 16, 16)) - 7.5
-    return Volume.from_stored((100 - 10 * np.sqrt((offset**2).sum(axis=0))).astype(np.float32), np.eye(4))
+    """Return a ball of radius 6 mm, its gray levels falling outward, in slices thick enough to be divided."""
+    offset = (np.indices((11, 16, 16)) - np.array([5, 7.5, 7.5])[:, None, None, None]) * np.array([1.5, 1, 1])[
+        :, None, None, None
+    ]
+    levels = 100 - 10 * np.sqrt((offset**2).sum(axis=0))
+    return Volume.from_stored(levels.astype(np.float32), np.diag([1.0, 1.0, 1.5, 1.0]))
 
 
 def sphere() -> PointSet:

@@ -280,7 +280,9 @@ WAY = Way(
     applies=lambda settings, input: input not in POINTS and settings.network.in_space,
     because=_because,
     reads=TRAINING
-    | parameters("allow_leaks", "attraction", "damping", "step", stiffness=NEAREST, springs=NEAREST, limit=NEAREST),
+    | parameters(
+        "allow_leaks", "divide", "attraction", "damping", "step", stiffness=NEAREST, springs=NEAREST, limit=NEAREST
+    ),
     segment=segment_in_space,
     surface=surface_in_space,
     require=require_surface,

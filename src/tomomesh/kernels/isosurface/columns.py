@@ -190,7 +190,7 @@ def lies_between(distances: Values, k: int, s: int, j: int, i: int) -> bool:
     left, right = max(i - 1, 0), min(i + 1, distances.shape[2] - 1)
     along = (distances[k, after, i] - distances[k, before, i]) * (distances[s, after, i] - distances[s, before, i])
     across = (distances[k, j, right] - distances[k, j, left]) * (distances[s, j, right] - distances[s, j, left])
-    return along + across < 0
+    return bool(along + across < 0)
 
 
 @kernel("f8(f4[:,:,::1], i8, i8, i8, f8, f8)")

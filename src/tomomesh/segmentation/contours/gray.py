@@ -40,7 +40,7 @@ def tempered(insides: Insides, levels: Levels | None, mask: NDArray[np.bool_]) -
         As the depths of `insides`.
     """
     depths = insides.depths
-    if levels is None or np.ndim(levels.voxels) > 3 or _stepped(levels, mask):
+    if levels is None or len(levels.voxels.shape) > 3 or _stepped(levels, mask):
         return depths
     seen = insides.over(np.asarray(levels.voxels), np.nan)
     over = np.nan_to_num(np.minimum(seen - levels.lower, levels.upper - seen), nan=-np.inf)
