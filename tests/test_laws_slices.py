@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds, size
+from tomomesh.contours.assembly import MARGIN
 from tomomesh.contours.curves import DENSE, field_of, fine_curve, moments_of
 from tomomesh.contours.rings import outline
-from tomomesh.contours.assembly import MARGIN
 from tomomesh.contours.slices import find_slices
 from tomomesh.contours.stack import contour_surface
 from tomomesh.measure.topology import check_promise
