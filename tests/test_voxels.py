@@ -409,7 +409,10 @@ class TestWay:
         assert {f"{name}.{key}" for name, found in sections.items() for key in found} <= described
 
     def test_the_plane_of_the_slices_does_not_move_the_surface(self) -> None:
-        made = [reconstruct(ball(6), lower=0.0, network="none", slices=plane) for plane in ("axial", "sagittal")]
+        made = [
+            reconstruct(ball(6), lower=0.0, network="none", slices=plane, remesh=False)
+            for plane in ("axial", "sagittal")
+        ]
         one, other = (np.round(surface.mesh.vertices, 9) + 0.0 for surface in made)
         np.testing.assert_array_equal(one[np.lexsort(one.T)], other[np.lexsort(other.T)])
         assert all(topology(surface.mesh).sound for surface in made)

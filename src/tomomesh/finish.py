@@ -1,4 +1,4 @@
-"""What becomes of a mesh at the end of every way: judged, made coarser, checked, made a part to print, measured."""
+"""What becomes of a mesh at the end of every way: judged, made even, checked, made a part to print, measured."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .decimation import decimate, faces_under
 from .dynamics.fairing import fair
 from .dynamics.low_pass import OneRing
 from .dynamics.untangle import untangle
@@ -17,6 +16,7 @@ from .measure.intersections import CrossingFaces
 from .measure.report import assess, compare
 from .measure.topology import check_promise
 from .printing.part import make_part
+from .remeshing.remesh import faces_under, remesh
 from .stage import Stage, folded, timed
 
 if TYPE_CHECKING:
@@ -49,14 +49,14 @@ def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage
         Where it is not what is promised.
     """
     judged = _judge(made, settings)
-    coarse = _coarsen(made, settings)
-    even = _smooth(coarse.value, settings)
-    part = _print(even.value, settings, progress)
+    even = _even(made, settings, progress)
+    smooth = _smooth(even.value, settings)
+    part = _print(smooth.value, settings, progress)
     surface = part.value
     later: list[Later] = [partial(_measure, surface, settings, progress)]
     if surface.part is not None:
         later.append(partial(_judge_part, surface))
-    return folded(surface, judged, coarse, even, part), tuple(later)
+    return folded(surface, judged, even, smooth, part), tuple(later)
 
 
 @timed("truth")
@@ -76,23 +76,24 @@ def _check(made: Surface) -> None:
     check_promise(made.mesh, cavities=made.cavities, open_=made.borders)
 
 
-def _coarsen(made: Surface, settings: Settings) -> Stage[Surface]:
-    """Leave the mesh the faces that were asked for."""
-    most = settings.run.target_faces
-    if most is None or len(made.mesh.faces) <= most:
-        return Stage(made)
-    return _decimate(made, most, settings)
+def _even(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:
+    """Give the mesh even triangles, and no more faces than were asked for."""
+    return _remesh(made, settings, progress) if settings.run.even else Stage(made)
 
 
-@timed("decimate")
-def _decimate(made: Surface, most: int, settings: Settings) -> Stage[Surface]:
-    mesh = decimate(made.mesh, most, cavities=made.cavities, threads=settings.run.threads)
-    coarse = replace(made, mesh=mesh, nearest=np.empty(0, np.int32), crossing=None)
-    _check(coarse)
+@timed("remesh")
+def _remesh(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:
+    run = settings.run
+    found = remesh(
+        made.mesh, edge=run.edge, most=run.target_faces, crossing=made.crossing, threads=run.threads, progress=progress
+    )
+    mesh, stats = found.mesh, {"remesh": found.report}
+    even = replace(made, mesh=mesh, nearest=np.empty(0, np.int32), crossing=found.crossing)
+    _check(even)
     if made.filled is None:
-        return Stage(coarse)
+        return Stage(even, stats, found.warnings)
     filled = made.filled[faces_under(mesh, made.mesh)]
-    return Stage(replace(coarse, filled=filled), {"fit": {"filled_faces": int(filled.sum())}})
+    return Stage(replace(even, filled=filled), stats | {"fit": {"filled_faces": int(filled.sum())}}, found.warnings)
 
 
 def _smooth(made: Surface, settings: Settings) -> Stage[Surface]:

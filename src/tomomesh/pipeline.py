@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from .decimation import require_decimation
 from .finish import compare_with, finish
 from .model.points import PointSet
 from .printing.part import require_printing
@@ -151,7 +150,6 @@ def reconstruct_points(
 def _settled(settings: Settings | None, changes: dict[str, Any]) -> Settings:
     """Return the settings of a run; refuse those whose packages are not installed."""
     settings = (settings or Settings()).replace(**changes)
-    require_decimation(settings.run.target_faces)
     require_printing(settings)
     return settings
 

@@ -113,9 +113,9 @@ class Surface(Reported):
     points : PointSet
     cuberille : QuadMesh
     smoothed, mesh : TriMesh
-        The surface before and after the fit, with the same faces unless `mesh` was decimated.
+        The surface before and after the fit, with the same faces unless `mesh` was remeshed.
     nearest : (n,) int32 array
-        The point that draws each vertex of `mesh`, -1 where there is none; empty for clouds and decimated meshes.
+        The point that draws each vertex of `mesh`, -1 where there is none; empty for clouds and remeshed meshes.
     cubes : CubeGrid or None
         The cubes that hold the points, on ways that go by them.
     trace : Trace or None

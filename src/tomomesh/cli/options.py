@@ -37,7 +37,7 @@ SHELLS = ("bash", "zsh", "fish", "tcsh")
 
 CUTS = ("scale", "flat_base", "hollow", "drain")
 """Parameters that change a part."""
-MESH_ONLY = ("local_origin", "smooth", "allow_far", "target_faces")
+MESH_ONLY = ("local_origin", "smooth", "allow_far", "remesh", "edge", "target_faces")
 """Parameters of the run that matter to meshes alone."""
 STUDY_ONLY = ("frame",)
 """Parameters of the run that matter to studies alone."""
@@ -133,7 +133,7 @@ def build_parser() -> argparse.ArgumentParser:
     part.add_argument("--json", action="store_true", help="print the report as JSON in place of the summary")
     part.add_argument("--quiet", action="store_true", help="print nothing but errors")
     _add_settings(
-        part, ("printing", "run"), without=("seed", "local_origin", "target_faces", "print_check", *STUDY_ONLY),
+        part, ("printing", "run"), without=("seed", "print_check", *MESH_ONLY, *STUDY_ONLY),
         paper=False,
     )  # fmt: skip
 

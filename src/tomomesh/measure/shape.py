@@ -89,9 +89,12 @@ def shapes_of_faces(links: Links, *, threads: int = 0) -> dict[str, float]:
         face_shapes(links.vertices, links.faces, smallest, largest, aspect, start, stop)
 
     in_blocks(work, len(smallest), block=BLOCK, threads=threads)
+    p1, p5, median = np.percentile(smallest, [1, 5, 50])
     return {
         "smallest_angle_deg": float(np.degrees(smallest.min())),
-        "p5_smallest_angle_deg": float(np.degrees(np.percentile(smallest, 5))),
+        "p1_smallest_angle_deg": float(np.degrees(p1)),
+        "p5_smallest_angle_deg": float(np.degrees(p5)),
+        "median_smallest_angle_deg": float(np.degrees(median)),
         "mean_smallest_angle_deg": float(np.degrees(smallest.mean())),
         "largest_angle_deg": float(np.degrees(largest.max())),
         "mean_aspect": float(aspect.mean()),

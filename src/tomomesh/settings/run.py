@@ -39,6 +39,22 @@ class RunSettings(Group):
     allow_far: bool = param(
         False, "write the mesh even where its volume, or its distance from the window, is far from the window's own"
     )
-    target_faces: int | None = param(
-        None, "most faces of the mesh, which is made coarser where it has more", kind=int, unit="faces", low=4
+    remesh: bool = param(
+        True, "make the triangles of the mesh even, along the same surface: leave those that its way has made",
+        paper=False,
+    )  # fmt: skip
+    edge: float | None = param(
+        None,
+        "usual edge of an even triangle, shorter where the surface bends and longer where it is flat; by default as "
+        "the mesh has faces",
+        unit="mm",
+        above=0,
     )
+    target_faces: int | None = param(
+        None, "most faces of the mesh, whose edges are made longer where it has more", kind=int, unit="faces", low=4
+    )
+
+    @property
+    def even(self) -> bool:
+        """Whether even triangles are asked for."""
+        return self.remesh or self.edge is not None or self.target_faces is not None

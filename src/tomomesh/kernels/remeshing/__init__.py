@@ -1,0 +1,1 @@
+"""Loops over a mesh whose triangles are made even."""

@@ -1,0 +1,83 @@
+"""Sharp edges of a surface that are long and straight enough to be kept."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ..kernels.remeshing.links import CREASE, FIXED, FREE, KEPT
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.mesh import TriMesh
+
+    Ints = NDArray[np.int32]
+    Marks = NDArray[np.bool_]
+
+SHARP = np.cos(np.radians(50.0))
+"""Cosine of the turn between two faces from which their edge is sharp."""
+STRAIGHT = np.cos(np.radians(45.0))
+"""Cosine of the turn from one sharp edge to the next up to which they are one crease."""
+LONG = 4.0
+"""Least length of a crease, in edges: what is shorter is roughness, and even triangles matter more."""
+ROUNDS = 2
+"""Rounds in which short creases are left out: where one ends, two others may become one."""
+
+
+def find_creases(
+    mesh: TriMesh, twins: Ints, normals: NDArray[np.float64], edge: float
+) -> tuple[Marks, NDArray[np.uint8]]:
+    """Find the half edges along creases, (3 m,), and the kinds of vertices, (n,).
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    twins : (3 m,) int32 array
+        The half edge that runs the other way; -1 at a border.
+    normals : (m, 3) float array
+        Unit normals.
+    edge : float
+        What the length of a crease is compared with.
+    """
+    starts, ends = mesh.half_edges.T
+    half = np.arange(len(twins))
+    turn = np.einsum("ij,ij->i", normals[half // 3], normals[np.maximum(twins, 0) // 3])
+    found = np.flatnonzero((turn < SHARP) & (half < twins))
+    kinds = np.full(len(mesh.vertices), FREE, np.uint8)
+    for _ in range(ROUNDS):
+        found = found[_lengths(mesh, starts[found], ends[found]) >= LONG * edge]
+    creases = np.zeros(len(twins), np.bool_)
+    creases[found], creases[twins[found]] = True, True
+    kinds[starts[found]] = kinds[ends[found]] = FIXED
+    kinds[_passed(mesh, starts[found], ends[found])[2]] = CREASE
+    border = twins < 0
+    kinds[starts[border]] = kinds[ends[border]] = KEPT
+    return creases, kinds
+
+
+def _lengths(mesh: TriMesh, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the length of the crease that each sharp edge (e,) belongs to."""
+    one, other, _ = _passed(mesh, starts, ends)
+    joined = coo_array((np.ones(len(one), np.int8), (one, other)), shape=(len(starts), len(starts)))
+    count, crease = connected_components(joined, directed=False)
+    steps = mesh.vertices[ends] - mesh.vertices[starts]
+    lengths = np.sqrt((steps**2).sum(axis=1))
+    return np.asarray(np.bincount(crease, lengths, count)[crease])
+
+
+def _passed(
+    mesh: TriMesh, starts: NDArray[np.int64], ends: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Find where two sharp edges, and no third, meet in a nearly straight line: both, and their vertex."""
+    at, far = np.concatenate([starts, ends]), np.concatenate([ends, starts])
+    order = np.argsort(at, kind="stable")
+    at, far, edge = at[order], far[order], order % max(len(starts), 1)
+    two = np.flatnonzero((np.bincount(at, minlength=1)[at] == 2) & (np.diff(at, append=-1) == 0))
+    there, back = (mesh.vertices[far[n]] - mesh.vertices[at[n]] for n in (two, two + 1))
+    size = np.sqrt((there**2).sum(axis=1) * (back**2).sum(axis=1))
+    straight = two[(there * back).sum(axis=1) <= -STRAIGHT * size]
+    return edge[straight], edge[straight + 1], at[straight]

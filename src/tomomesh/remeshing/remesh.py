@@ -1,0 +1,196 @@
+"""Even triangles in place of those that a way has left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import GeometryError
+from ..measure.intersections import self_intersections
+from ..measure.tree import Tree
+from ..model.columns import any_of
+from ..progress import Progress, silent
+from .ground import Ground, even_edge
+from .making import Making
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.mesh import TriMesh
+
+    Marks = NDArray[np.bool_]
+
+ROUNDS = 4
+"""Rounds of splits, collapses, flips and moves."""
+LAST = 2
+"""Moves after the last round, each with flips."""
+TRIES = 4
+"""How often the surface is remeshed anew where faces pass through others, with what is under those kept as it was."""
+REACH = 2
+"""Rings of faces around such places that are kept too, on the mesh before."""
+SPECK = 48
+"""Faces that a component has at least, about, where no number was asked for: with fewer even ones it would lose its
+shape."""
+ROUND = 0.1
+"""Roundness of such a component under which it is kept as it is: it is as flat as a leaf, and its two sides
+would pass through each other."""
+AIM = 0.97
+"""Share of the most faces that is aimed at, for the number that a length of edges leads to varies by some percent."""
+COARSER = 12
+"""Most rounds in which edges become longer until there are no more faces than asked for."""
+
+
+@dataclass(frozen=True)
+class Remeshed:
+    """A mesh of even triangles.
+
+    Attributes
+    ----------
+    mesh : TriMesh
+    crossing : (m,) bool array
+        Faces that pass through others.
+    edge : float
+        Length of the edge of an even triangle of the mean area of its faces.
+    kept : int
+        Vertices of the mesh before that are kept, as even triangles would pass through others there.
+    before : TriMesh
+        The mesh before.
+    """
+
+    mesh: TriMesh
+    crossing: Marks
+    edge: float
+    kept: int
+    before: TriMesh
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """What is told of it."""
+        moved = self.mesh is not self.before
+        return {"done": moved, "edge_mm": self.edge, "faces_before": len(self.before.faces), "kept_vertices": self.kept}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What must be known of it."""
+        said = "the triangles are not even: even ones would pass through each other where sheets nearly touch"
+        return (said,) if self.mesh is self.before else ()
+
+
+def remesh(
+    mesh: TriMesh,
+    *,
+    edge: float | None = None,
+    most: int | None = None,
+    crossing: Marks | None = None,
+    threads: int = 0,
+    progress: Progress = silent,
+) -> Remeshed:
+    """Replace the triangles of a mesh by even ones.
+
+    Edges that are longer than they should be are split, shorter ones collapse, others are flipped where that makes
+    angles larger, and vertices move evenly among their neighbors along the surface before, round after round (Botsch &
+    Kobbelt 2004), with shorter edges where the surface bends (Dunyach et al. 2013). Borders stay; creases are kept.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        A manifold, closed or with borders.
+    edge : float, optional
+        Length of edges. Where it is not given, as many faces as there are now suffice.
+    most : int, optional
+        Most faces.
+    crossing : (m,) bool array, optional
+        Faces that pass through others before, where that is known.
+    threads : int
+    progress : callable
+        Told how far the stage ``remesh`` is.
+
+    Returns
+    -------
+    Remeshed
+        Of as many components and handles, and no more faces that pass through others.
+
+    Raises
+    ------
+    GeometryError
+        Where the shape cannot be kept with so few faces; names how many it takes.
+    """
+    ground, best = _ground(mesh, edge, most), None
+    found = np.zeros(len(mesh.vertices), np.bool_)
+    for _ in range(TRIES):
+        making = _made(ground, found, most or np.inf, threads, progress)
+        made, under = making.mesh()
+        crosses = self_intersections(made, threads=threads)
+        if (best is None or crosses.sum() < best.crossing.sum()) and len(made.faces) <= (most or np.inf):
+            best = Remeshed(made, crosses, even_edge(made, len(made.faces)), int(found.sum()), mesh)
+        if not crosses.any():
+            break
+        found = found | _under(ground, made, under, crosses)
+    if best is None:
+        raise GeometryError(
+            "the mesh cannot be kept closed and manifold with so few faces",
+            found=f"--target-faces = {most}",
+            expected=f"about {len(made.faces)} or more",
+            hint="more faces, or a coarser study (--resample-slices, --cell)",
+        )
+    if best.crossing.any() and (most is None or len(mesh.faces) <= most):
+        crosses = self_intersections(mesh, threads=threads) if crossing is None else crossing
+        if crosses.sum() < best.crossing.sum():
+            return Remeshed(mesh, crosses, even_edge(mesh, len(mesh.faces)), len(mesh.vertices), mesh)
+    return best
+
+
+def faces_under(made: TriMesh, before: TriMesh) -> NDArray[np.int32]:
+    """Return the face of the mesh before that lies nearest to the middle of each face of another, (m,)."""
+    return Tree.of_faces(before).nearest(made.corners.mean(axis=1))[1]
+
+
+def _ground(mesh: TriMesh, edge: float | None, most: int | None) -> Ground:
+    """Look at the surface, and choose lengths of edges for as many faces as there are, or are asked for, at most."""
+    usual = edge or even_edge(mesh, min(len(mesh.faces), most or len(mesh.faces)))
+    ground = Ground.of(mesh, usual)
+    if edge is not None and most is None:
+        return ground.scaled(edge / even_edge(mesh, ground.forecast())).with_specks(SPECK, ROUND)
+    fewest = min(len(mesh.faces), AIM * (most or np.inf))
+    ground = ground.scaled(max(ground.forecast() / fewest, 1.0) ** 0.5)
+    return ground if most is not None else ground.with_specks(SPECK, ROUND)
+
+
+def _made(ground: Ground, kept: Marks, most: float, threads: int, progress: Progress) -> Making:
+    """Go round after round, and on with longer edges while there are too many faces."""
+    making = Making(ground, kept, threads)
+    for count in range(ROUNDS):
+        progress("remesh", count, ROUNDS)
+        _round(making, moves=1 if count < ROUNDS - 1 else LAST)
+    progress("remesh", ROUNDS, ROUNDS)
+    for _ in range(COARSER):
+        if len(making.faces) <= most:
+            break
+        ground = ground.scaled((len(making.faces) / (AIM * most)) ** 0.5)
+        making.rescaled(ground)
+        _round(making, moves=LAST)
+    making.lift()
+    return making
+
+
+def _round(making: Making, moves: int) -> None:
+    making.split()
+    making.collapse()
+    making.flip()
+    for _ in range(moves):
+        making.move()
+        making.flip()
+
+
+def _under(ground: Ground, made: TriMesh, under: NDArray[np.int32], marked: Marks) -> Marks:
+    """Mark the vertices (n,) of the mesh before under some faces (m,) and around them."""
+    near = np.zeros(len(made.vertices), np.bool_)
+    near[made.faces[marked]] = True
+    near[made.faces[any_of(near[made.faces])]] = True
+    found = np.zeros(len(ground.mesh.vertices), np.bool_)
+    found[ground.faces[under[near]]] = True
+    for _ in range(REACH):
+        found[ground.faces[any_of(found[ground.faces])]] = True
+    return found

@@ -1,0 +1,51 @@
+"""How long edges should be: shorter where the surface bends, longer where it is flat."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.remeshing.ground import find_bends, grade_sizes, mix_normals
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..model.mesh import TriMesh
+
+SAG = 0.015
+"""How far the middle of a face may lie from the surface, in edges, where the surface bends."""
+SHORTEST, LONGEST = 0.7, 1.2
+"""Limits of a length, in edges: a factor of two between the finest faces and the coarsest."""
+SLOPE = 0.5
+"""How fast lengths grow along the surface. Dunyach et al. (2013) let them grow as fast as the distance."""
+ROUNDS = 2
+"""Rounds in which normals are mixed with their neighbors' before the surface's bend is taken from them, so that
+steps of one voxel count for little."""
+
+
+def wanted_sizes(mesh: TriMesh, faces: NDArray[np.int32], edge: float) -> NDArray[np.float64]:
+    """Return the length that edges should have at each vertex, (n,).
+
+    An edge of length L on a surface of curvature k leaves the middle of its face k L^2 / 6 off the surface (Dunyach
+    et al. 2013).
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    faces : (m, 3) int32 array
+        Its own.
+    edge : float
+        Where the surface is as usual.
+    """
+    normals = mesh.vertex_normals
+    for _ in range(ROUNDS):
+        mixed = np.empty_like(normals)
+        mix_normals(faces, normals, mixed)
+        normals = mixed
+    bends = np.empty(len(normals))
+    find_bends(mesh.vertices, faces, normals, bends)
+    flat = 6 * SAG * edge / (LONGEST * edge) ** 2
+    sizes = np.maximum(np.sqrt(6 * SAG * edge / np.maximum(bends, flat)), SHORTEST * edge)
+    grade_sizes(mesh.vertices, faces, sizes, SLOPE)
+    return sizes
