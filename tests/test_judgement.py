@@ -34,7 +34,7 @@ LABELS = SHARED / "derived" / "dev54_synth_t1" / "dev54_synth_t1_labels.nii.gz"
 MR = SHARED / "derived" / "dev54_t1" / "dev54_t1.nii.gz"
 CT = SHARED / "dicom2stl" / "ct_example.nii.gz"
 ASKED: dict[str, dict[str, Any]] = {
-    "rings": {}, "loops": {"contours": "loops"}, "components": {"contours": "components"},
+    "rings": {"way": "ring"}, "loops": {"contours": "loops"}, "components": {"contours": "components"},
     "voxels": {"network": "none"}, "sphere": {"network": "sphere", "neurons": 162},
 }  # fmt: skip
 
@@ -102,7 +102,7 @@ class TestMeasure:
         affine[:3, :3], affine[:3, 3] = turn * spacing, rng.normal(size=3) * 100
         volume = Volume.from_stored(mask.astype(np.uint8), affine)
         follows = boundary_followed(volume.voxels > 0, volume)
-        box = reconstruct(volume, lower=0.5, network="none").segmentation
+        box = reconstruct(volume, lower=0.5, network="none", divide=False).segmentation
         assert box is not None
         cube = box.source.cuberille.triangulated()
         apart = follows.apart(cube)
@@ -259,7 +259,7 @@ class TestCommand:
     ) -> None:
         study, mesh = tmp_path / "two.nii", tmp_path / "mesh.ply"
         write_nifti(study, balls(*TWO, radius=6.0).voxels, np.eye(4))
-        line = ["reconstruct", str(study), "-o", str(mesh), "--lower", "50"]
+        line = ["reconstruct", str(study), "-o", str(mesh), "--lower", "50", "--way", "ring"]
         assert main(line) == 5
         said = capsys.readouterr().err.splitlines()
         assert [n for n, one in enumerate(said, 1) if one.startswith("error: ")] == [len(said)]
@@ -270,7 +270,7 @@ class TestCommand:
         assert out.startswith("far       the mesh does not follow its window: ")
         assert out.count("does not follow") == 1
         assert mesh.exists()
-        assert main([*line, "--network", "none"]) == 0
+        assert main([*line[:-1], "voxels"]) == 0
         assert capsys.readouterr().out.startswith("study")
 
 
@@ -290,11 +290,11 @@ class TestStudies:
         volume = read_volume(path)
         for settings in (Settings(), Settings.for_paper()):
             with pytest.raises(GeometryError, match="follow"):
-                reconstruct(volume, settings, **asked)
+                reconstruct(volume, settings.replace(way="ring"), **asked)
         assert followed(reconstruct(volume, network="none", **asked))["far"] is None
 
     def test_skin_has_a_ring_a_slice_and_none_inside_of_it(self) -> None:
         volume = read_volume(MR)
-        assert followed(reconstruct(volume))["far"] is None
+        assert followed(reconstruct(volume, way="ring"))["far"] is None
         with pytest.raises(GeometryError, match="70% of the volume"):
             reconstruct(volume, Settings.for_paper())
