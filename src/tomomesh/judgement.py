@@ -78,7 +78,7 @@ LIMITS = {
     "voxels": Limits(1.25, 2.0, 2.0),
     "contours": Limits(1.25, 5.0, 5.0),
     "outline": Limits(1.25, 4.0, 4.0),
-    "wall": Limits(1.6, 3.0, 3.0),
+    "wall": Limits(1.6, 2.0, 2.0),
     "space": Limits(1.25, 5.0, 5.0),
     "closed wall": Limits(1.6, np.inf, 5.0),
     "slices": Limits(1.25),
