@@ -55,7 +55,7 @@ class TestHead:
             ({"caps": False}, False),
             ({"caps": False, "cell_factor": 1.5}, False),
             ({"caps": False, "cell_factor": 2.0}, False),
-            ({"caps": False, "cell_factor": 3.0}, True),
+            ({"caps": False, "cell_factor": 3.0}, False),
             ({"caps": True, "cell_factor": 2.0}, True),
             ({"caps": True, "contours": "loops"}, True),
             ({"caps": True, "network": "sphere"}, True),
