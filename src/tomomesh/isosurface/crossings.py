@@ -120,15 +120,17 @@ class LevelCrossings:
         voxel that is not in the window.
     stepped : bool
         Whether the gray levels are those of a mask.
-    stiffer : float or None
-        How many times as stiff as set the springs of a net are that is drawn to them; None where all are half way
-        between two voxels, and the net is evened out instead.
+    drawing : bool
+        Whether a net is drawn to them; where all are half way between two voxels it is evened out instead.
+    bending : float
+        How stiff such a net is against bends, over the stiffness that is set; 0 for one that resists being stretched.
     """
 
     positions: NDArray[np.float64]
     kinds: NDArray[np.uint8]
     stepped: bool
-    stiffer: float | None = 1.0
+    drawing: bool = True
+    bending: float = 0.0
 
 
 def crossings(
@@ -159,5 +161,5 @@ def crossings(
     kinds = np.where(added, ADDED, np.where(beyond, BORDER, CROSSING)).astype(np.uint8)
     positions = inner + share[:, None] * steps
     if thin is None:
-        return LevelCrossings(positions, kinds, even, None if even else 1.0)
-    return LevelCrossings(positions, kinds, thin.of_mask, thin.stiffer)
+        return LevelCrossings(positions, kinds, even, not even)
+    return LevelCrossings(positions, kinds, thin.of_mask, bending=thin.bending)

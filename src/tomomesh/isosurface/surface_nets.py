@@ -38,6 +38,8 @@ Chosen: half and twice of it change the distance by 0.0 %."""
 TENSION = 2.4
 """Stiffness of the springs at a setting of 1. Measured on a CT and an MR at the default setting: more would turn less
 than marching cubes by more than a tenth, and lie farther from them than 0.06 and 0.09 voxel."""
+SAFE = 0.95
+"""Share of the longest step that never overshoots. Derived: at 1 a net that goes up and down would do so for ever."""
 BENDING, BENDS = 0.4, 40
 """Share of the bending force that is followed in a step: a net that goes up and down from vertex to vertex keeps 1 - 4b
 of its height, and half would never rest. And the most steps: more would move it on for hundreds of them, by less than
@@ -150,9 +152,10 @@ def settle(
     """Draw the middles of the squares to their crossings, while springs even the net out.
 
     At rest  mean(p - c) + s mean(x_j - x) = 0  for every vertex x: p are the crossings and c the middles of the
-    squares around it, x_j its neighbors, s the stiffness. No vertex leaves its cell. Where the gray levels are those
-    of a mask, nothing is drawn, and the net loses its bends instead:  x <- x - b mean(l_j - l),  l = mean(x_j - x),
-    in `BENDS` steps at most, whether it is then at rest or not.
+    squares around it, x_j its neighbors, s the stiffness. No vertex leaves its cell. Around the parts of thick voxels
+    the springs resist bends, with  b (l - mean l_j)  in place of  s l,  l = mean(x_j - x). Where the gray levels are
+    those of a mask, nothing is drawn, and the net loses its bends alone:  x <- x + b (l - mean l_j),  in `BENDS` steps
+    at most, whether it is then at rest or not.
 
     Parameters
     ----------
@@ -168,7 +171,7 @@ def settle(
     NetFit
     """
     start = _means(crossings.positions, net.fans, threads)
-    most = min(settings.max_steps, BENDS) if crossings.stiffer is None else settings.max_steps
+    most = settings.max_steps if crossings.drawing else min(settings.max_steps, BENDS)
     state, trace = iterate(_NetSteps(net, crossings, start, settings, threads), most, progress)
     return NetFit(start, state.position, trace)
 
@@ -207,41 +210,60 @@ class _NetSteps:
             low, moves = self.net.low[at], state.moves[at]
             move_in_cells(steps, state.position[at], low, MARGIN, moves, sums[at.start // BLOCK], 0, len(steps))
 
-        forced = self._unbent if self.crossings.stiffer is None else self._drawn
+        forced = self._drawn if self.crossings.drawing else self._unbent
         position = forced(state.position, move)
         speed, change = sums[:, :2].max(axis=0)
         return _NetState(position, state.moves), Motion(speed, change, sums[:, 2].sum())
 
     def _drawn(self, position: Floats, move: Finish) -> Floats:
-        """Move every vertex by the pull of its crossings and of its neighbors.
+        """Move every vertex by the pull of its crossings and by what the springs resist.
 
-        Both pulls together are at most 1 + 2 s times a vertex' distance from rest, and no step up to twice the inverse
-        overshoots.
+        Both together are at most 1 + r times a vertex' distance from rest, r from the springs, and no step up to twice
+        the inverse overshoots.
         """
 
         def pull(middle: Floats, at: slice) -> None:
             np.subtract(self.crossings.positions[at], middle, out=middle)
 
         def add(pulled: Floats, at: slice) -> None:
-            pulled += stiffness * tension[at]
+            pulled += resisted[at]
             pulled *= share
             move(pulled, at)
 
-        stiffness = TENSION * self.settings.stiffness * (self.crossings.stiffer or 0.0)
-        share = min(1.0, 2 / (1 + 2 * stiffness))
-        tension = self._tension(position)
+        resisted, most = self._resisted(position)
+        share = min(1.0, SAFE * 2 / (1 + most))
         return _means(_means(position, self.net.quads, self.threads, pull), self.net.fans, self.threads, add)
+
+    def _resisted(self, position: Floats) -> tuple[Floats, float]:
+        """Return the force of the springs on every vertex, and the most it is over the vertex' distance from rest.
+
+        They resist being stretched by  s l,  or bends by  b (l - mean l_j).
+        """
+        bending, tension = self.crossings.bending * self.settings.stiffness, self._tension(position)
+        if not bending:
+            tension *= TENSION * self.settings.stiffness
+            return tension, 2 * TENSION * self.settings.stiffness
+        bends = self._bends(tension)
+        bends *= bending
+        return bends, 4 * bending
 
     def _unbent(self, position: Floats, move: Finish) -> Floats:
         """Move every vertex to where the net bends as it does around."""
 
-        def relax(around: Floats, at: slice) -> None:
-            np.subtract(tension[at], around, out=around)
-            around *= BENDING
-            move(around, at)
+        def relax(bends: Floats, at: slice) -> None:
+            bends *= BENDING
+            move(bends, at)
 
-        tension = self._tension(position)
-        return _means(tension, self.net.links, self.threads, relax)
+        return self._bends(self._tension(position), relax)
+
+    def _bends(self, tension: Floats, finish: Finish = lambda found, at: None) -> Floats:
+        """Return how much more every vertex is drawn to its neighbors than these are to theirs."""
+
+        def less(around: Floats, at: slice) -> None:
+            np.subtract(tension[at], around, out=around)
+            finish(around, at)
+
+        return _means(tension, self.net.links, self.threads, less)
 
     def _tension(self, position: Floats) -> Floats:
         def less(around: Floats, at: slice) -> None:

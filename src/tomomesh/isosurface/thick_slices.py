@@ -30,13 +30,14 @@ BLOCK, SLICES = 4_000, 1
 """Columns and slices handled in one call: far below 100 ms."""
 WIDEST = 8
 """Most that a border is taken to move sideways from slice to slice, pixels."""
-RAMP, SHARPEST = 1 / 3, 10.0
+RAMP, SHARPEST = 1 / 3, 5.0
 """Share of a border's height between two pixels where it is a ramp over four, the least sharp that can be told; and
 the greatest sharpness."""
 OF_MASK = 2.0
 """Sharpness of what comes from a mask, which tells nothing of it."""
-OF_LEVELS, OF_STEPS = 2.0, 4.0
-"""How many times as stiff a net is around thin voxels, and around those that are all but wholly in or out."""
+OF_LEVELS, OF_STEPS = 12.0, 22.0
+"""How stiff a net is against bends, over the stiffness that is set, around thin voxels, and around those that are all
+but wholly in or out, whose steps it shall not follow."""
 UPRIGHT = 90
 """Percentile of the shares that tells how sharp borders are: where they slant, pixels hold a part of both sides, and
 look less sharp than they are."""
@@ -93,8 +94,8 @@ class Thinned:
         Into how many each voxel was divided.
     of_mask : bool
         Whether the levels come from a mask.
-    stiffer : float
-        How many times as stiff as set a net is around them.
+    bending : float
+        How stiff a net around them is against bends, over the stiffness that is set.
     """
 
     levels: Levels
@@ -102,7 +103,7 @@ class Thinned:
     affine: NDArray[np.float64]
     parts: int
     of_mask: bool
-    stiffer: float
+    bending: float
 
 
 def parts_of(affine: NDArray[np.float64]) -> tuple[int, int]:
@@ -147,14 +148,14 @@ def thinned(levels: Levels, mask: Mask, affine: NDArray[np.float64], threads: in
         return None
     axis = 2 - along
     turned = np.ascontiguousarray(np.moveaxis(mask, axis, 0))
-    whole, bounds, sharpness, stiffer = _told(levels, mask, turned, axis, threads)
+    whole, bounds, sharpness, bending = _told(levels, mask, turned, axis, threads)
     columns = _divided(turned, whole)
     index = np.full(turned.shape, -1, np.int32)
     index[tuple(columns.T)] = np.arange(len(columns), dtype=np.int32)
     parts = _moved(whole, index, columns, times, sharpness, threads)
     thin = Levels(Columns(whole, index, parts, axis), bounds.lower, bounds.upper)
     kept = np.moveaxis(_kept(bounds, turned, whole, columns, parts), 0, axis)
-    return Thinned(thin, np.ascontiguousarray(kept), _finer(affine, along, times), times, bounds is not levels, stiffer)
+    return Thinned(thin, np.ascontiguousarray(kept), _finer(affine, along, times), times, bounds is not levels, bending)
 
 
 def _told(levels: Levels, mask: Mask, turned: Mask, axis: int, threads: int) -> tuple[Values, Levels, float, float]:
@@ -165,7 +166,7 @@ def _told(levels: Levels, mask: Mask, turned: Mask, axis: int, threads: int) -> 
         return _averages(turned, threads), Levels(voxels, 0.5, np.inf), OF_MASK, OF_STEPS
     whole = np.ascontiguousarray(np.moveaxis(voxels, axis, 0), np.float32)
     high = float(np.percentile(shares, UPRIGHT)) if len(shares) else 1.0
-    sharpness = min(1 + max(high - RAMP, 0) / max(1 - high, 1e-9), SHARPEST)
+    sharpness = min(1 + max(high - RAMP, 0) / max(2 * (1 - high), 1e-9), SHARPEST)
     return whole, levels, sharpness, OF_STEPS if high > STEPPED else OF_LEVELS
 
 
