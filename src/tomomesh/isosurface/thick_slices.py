@@ -20,27 +20,34 @@ if TYPE_CHECKING:
     Index = NDArray[np.int32]
 
 THICK = 1.5
-"""Slice distance over the width of a pixel from which voxels are divided: from there on, two parts are nearer to cubes
-than one."""
+"""Slice distance over the width of a pixel from which voxels are divided. Derived: from there on, two parts are nearer to
+cubes than one."""
 MOST_PARTS = 16
 """Parts of a voxel at most, so that their number stays bounded. Chosen: slices ten pixels apart are rare."""
-ROUNDS = 3
-"""Times that the parts follow their neighbors."""
+ROUNDS = 2
+"""Times that the parts follow their neighbors. Chosen on slabs of a label head and of an MR, as all numbers below: half
+changes the distance to the thin study by +0.8 to +3.4 %, twice by less than 1 %."""
 BLOCK, SLICES = 4_000, 1
 """Columns and slices handled in one call: far below 100 ms."""
 WIDEST = 8
-"""Most that a border is taken to move sideways from slice to slice, pixels."""
+"""Most that a border is taken to move sideways from slice to slice, pixels. Chosen: half changes the distance of slabs
+that are a mask by +11 %, twice by -3 %, and takes more off the ends of balls."""
 RAMP, SHARPEST = 1 / 3, 5.0
 """Share of a border's height between two pixels where it is a ramp over four, the least sharp that can be told; and
-the greatest sharpness."""
+the greatest sharpness. Chosen: half of the latter changes the distance of partial volumes by +4 %, twice by -0.5 %, and
+turns 7 % more."""
 OF_MASK = 2.0
-"""Sharpness of what comes from a mask, which tells nothing of it."""
+"""Sharpness of what comes from a mask, which tells nothing of it. Chosen: half changes the distance by +11 %, twice by
+-0.8 % with 5 % more turns."""
 OF_LEVELS, OF_STEPS = 12.0, 22.0
 """How stiff a net is against bends, over the stiffness that is set, around thin voxels, and around those that are all
-but wholly in or out, whose steps it shall not follow."""
+but wholly in or out, whose steps it shall not follow. Chosen where faces turn as much as after a windowed sinc filter:
+half of the first changes the distance by -1 % and the turns by +7 %, twice by +3 and -5 %; half of the second by -12
+and +33 %, twice by +11 and -22 %."""
 UPRIGHT = 90
 """Percentile of the shares that tells how sharp borders are: where they slant, pixels hold a part of both sides, and
-look less sharp than they are."""
+look less sharp than they are. Chosen: 75 and 95 change the distance by 1 % at most; 75 turns 16 % more on partial
+volumes."""
 
 
 @dataclass(frozen=True)
