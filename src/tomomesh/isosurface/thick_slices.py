@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     Index = NDArray[np.int32]
 
 THICK = 1.5
-"""Slice distance over the width of a pixel from which voxels are divided. Derived: from there on, two parts are nearer to
-cubes than one."""
+"""Slice distance over the width of a pixel from which voxels are divided. Derived: from there on, two parts are nearer
+to cubes than one."""
 MOST_PARTS = 16
 """Parts of a voxel at most, so that their number stays bounded. Chosen: slices ten pixels apart are rare."""
 ROUNDS = 2
