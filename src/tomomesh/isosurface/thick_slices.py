@@ -37,8 +37,8 @@ RAMP, SHARPEST = 1 / 3, 5.0
 the greatest sharpness. Chosen: half of the latter changes the distance of partial volumes by +4 %, twice by -0.5 %, and
 turns 7 % more."""
 OF_MASK, EVENED = 2.0, 44.0
-"""Sharpness of what comes from a mask, which tells nothing of it, and how stiff a net around that is against bends, over
-the stiffness that is set. Chosen: half of the first changes the distance by +11 %, twice by -0.8 % with 5 % more turns;
+"""Sharpness of what comes from a mask, which tells nothing of it, and how stiff a net around that is against bends,
+over the stiffness that is set. Chosen: half of the first changes the distance by +11 %, twice by -0.8 % with 5 % more turns;
 half of the second by -1 %, with 15 % more turns."""
 OF_LEVELS, OF_STEPS = 12.0, 22.0
 """How stiff a net is against bends, over the stiffness that is set, around thin voxels, and around those that are all
