@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 ROUNDS = 4
 """Most rounds of splits, collapses, flips and moves."""
 FEW = 0.1
-"""Splits and collapses a vertex in a round after which there is no other. Chosen: voxels' meshes take three rounds. With half
-of it they take a fourth, which adds a tenth to the time and 0.5 degrees to the smallest angles (1 %); with twice
-as much two, which cost 1 degree and leave 3 % more faces."""
+"""Splits and collapses a vertex in a round after which there is no other. Chosen: voxels' meshes take three rounds.
+With half of it they take a fourth, which adds a tenth to the time and 0.5 degrees to the smallest angles (1 %); with
+twice as much two, which cost 1 degree and leave 3 % more faces."""
 LAST = 1
 """Moves after the last round, each with flips."""
 TRIES = 4

@@ -162,8 +162,8 @@ def project(
 
 
 @kernel(
-    "void(f8[:,::1], i4[:,::1], i4[::1], i4[::1], i4[::1], f8[:,::1], f8[:,::1], i4[::1], u1[::1], i4[::1], f8[::1], i8, "
-    "i8)"
+    "void(f8[:,::1], i4[:,::1], i4[::1], i4[::1], i4[::1], f8[:,::1], f8[:,::1], i4[::1], u1[::1], i4[::1], f8[::1], "
+    "i8, i8)"
 )
 def find_sags(
     surface: Floats, faces: Ints, twins: Ints, fans: Ints, first: Ints, begun: Floats, places: Floats, corners: Ints,
