@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ..kernels.remeshing.flips import flip_edges
 from ..kernels.remeshing.ground import find_sags, project
 from ..kernels.remeshing.links import KEPT
 from ..kernels.remeshing.moves import accept, lift, relax
-from ..kernels.remeshing.splits import count_long, split_edges
+from ..kernels.remeshing.splits import mark_long, split_edges
 from ..kernels.threads import in_blocks
 from ..model.mesh import TriMesh
 
@@ -32,7 +32,7 @@ FEW = 0.01
 LIFTS = 3
 """Rounds in which vertices leave the surface before, so that faces do not all lie inside of it where it bends."""
 ROOM = 3
-"""New vertices that there is room for, for each edge that is too long: the halves of one may be too long again."""
+"""New vertices that room is made for, for each edge that is too long: the halves of one may be too long again."""
 
 
 class Making:
@@ -51,6 +51,11 @@ class Making:
         along = np.flatnonzero(ground.creases)
         self.under[self.corners[along]] = along // 3
         self.counts = np.array([len(self.places), len(self.corners) // 3])
+
+    @property
+    def vertices(self) -> int:
+        """Number of vertices."""
+        return int((self.outs[: self.counts[0]] >= 0).sum())
 
     @property
     def faces(self) -> NDArray[np.int32]:
@@ -72,30 +77,36 @@ class Making:
         under = np.maximum(self.under, 0)
         self.sizes = ground.sizes[ground.faces[under]].mean(axis=1)
 
-    def split(self) -> None:
-        """Split edges that are too long."""
+    def split(self) -> int:
+        """Split edges that are too long; return how many."""
+        begun = int(self.counts[0])
+        marks: NDArray[np.bool_] = np.zeros(len(self.corners), np.bool_)
+
+        def mark(start: int, stop: int) -> None:
+            mark_long(self.places, self.corners, self.twins, self.kinds, self.sizes, marks, start, stop)
+
+        in_blocks(mark, 3 * int(self.counts[1]), block=BLOCK, threads=self._threads)
         for _ in range(SPLITS):
-            long = 0
+            long = np.flatnonzero(marks)
+            if not len(long):
+                break
+            self._make_room(len(long))
+            marks = _longer(marks, len(self.corners))
+            self._split(marks, long)
+        return int(self.counts[0]) - begun
 
-            def count(start: int, stop: int) -> None:
-                nonlocal long
-                long += count_long(self.places, self.corners, self.twins, self.kinds, self.sizes, start, stop)
+    def _split(self, marks: NDArray[np.bool_], long: NDArray[np.int64]) -> None:
+        def work(start: int, stop: int) -> None:
+            split_edges(
+                self.places, self.corners, self.twins, self.outs, self.valence, self.kinds, self.sharp, self.sizes,
+                self.under, self.counts, marks, long, start, stop,
+            )  # fmt: skip
 
-            self._over_edges(count)
-            if long == 0:
-                return
-            self._make_room(ROOM * long)
-            self._over_edges(lambda start, stop: self._split(start, stop))
+        in_blocks(work, len(long), block=BLOCK, threads=1)
 
-    def _split(self, start: int, stop: int) -> None:
-        split_edges(
-            self.places, self.corners, self.twins, self.outs, self.valence, self.kinds, self.sharp, self.sizes,
-            self.under, self.counts, start, stop,
-        )  # fmt: skip
-
-    def collapse(self) -> None:
-        """Collapse edges that are too short."""
-        stamps = np.full(len(self.outs), -1, np.int32)
+    def collapse(self) -> int:
+        """Collapse edges that are too short; return how many."""
+        stamps, total = np.full(len(self.outs), -1, np.int32), 0
         for _ in range(COLLAPSES):
             made = 0
 
@@ -107,8 +118,10 @@ class Making:
                 )  # fmt: skip
 
             self._over_edges(work)
+            total += made
             if made < FEW * self.counts[0]:
-                return
+                break
+        return total
 
     def flip(self) -> None:
         """Flip edges where that makes angles larger."""
@@ -132,8 +145,8 @@ class Making:
 
         def lay(start: int, stop: int) -> None:
             project(
-                ground.mesh.vertices, ground.faces, ground.creases.reshape(-1, 3), ground.fans, ground.first,
-                ground.sizes, self.outs, self.kinds, moved, self.under, self.sizes, start, stop,
+                ground.mesh.vertices, ground.faces, ground.creases.reshape(-1, 3), ground.twins, ground.fans,
+                ground.first, ground.sizes, self.outs, self.kinds, moved, self.under, self.sizes, start, stop,
             )  # fmt: skip
 
         self._over_vertices(work)
@@ -142,17 +155,17 @@ class Making:
 
     def lift(self) -> None:
         """Move vertices off the surface before, so that each face lies on both its sides."""
-        begun = self.places.copy()
+        begun, below = self.places.copy(), self.under[self.corners[::3]]
         for _ in range(LIFTS):
-            self._lift(begun)
+            self._lift(begun, below)
 
-    def _lift(self, begun: NDArray[np.float64]) -> None:
+    def _lift(self, begun: NDArray[np.float64], below: NDArray[np.int32]) -> None:
         moved, ground, sags = np.empty_like(self.places), self._ground, np.zeros(len(self.corners) // 3)
 
         def find(start: int, stop: int) -> None:
             find_sags(
-                ground.mesh.vertices, ground.faces, ground.creases.reshape(-1, 3), ground.fans, ground.first, begun,
-                self.places, self.corners, self.under, sags, start, stop,
+                ground.mesh.vertices, ground.faces, ground.twins, ground.fans, ground.first, begun, self.places,
+                self.corners, self.kinds, below, sags, start, stop,
             )  # fmt: skip
 
         def work(start: int, stop: int) -> None:
@@ -183,13 +196,16 @@ class Making:
     def _make_room(self, vertices: int) -> None:
         """Have room for so many vertices more, and two faces for each."""
         n, m = int(self.counts[0]) + vertices, 3 * (int(self.counts[1]) + 2 * vertices)
+        if n <= len(self.outs) and m <= len(self.corners):
+            return
+        n, m = n + (ROOM - 1) * vertices, m + 6 * (ROOM - 1) * vertices
         for name in ("places", "outs", "valence", "kinds", "sizes", "under"):
             setattr(self, name, _longer(getattr(self, name), n))
         for name in ("corners", "twins", "sharp"):
             setattr(self, name, _longer(getattr(self, name), m))
 
 
-def _longer(rows: NDArray[np.generic], count: int) -> NDArray[np.generic]:
+def _longer(rows: NDArray[Any], count: int) -> NDArray[Any]:
     """Return an array with as many rows at least."""
     if len(rows) >= count:
         return rows

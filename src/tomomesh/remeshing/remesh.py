@@ -23,8 +23,12 @@ if TYPE_CHECKING:
     Marks = NDArray[np.bool_]
 
 ROUNDS = 4
-"""Rounds of splits, collapses, flips and moves."""
-LAST = 2
+"""Most rounds of splits, collapses, flips and moves."""
+FEW = 0.1
+"""Splits and collapses a vertex in a round after which there is no other. Chosen: voxels' meshes take three rounds.
+With half of it they take a fourth, which adds a tenth to the time and 0.5 degrees to the smallest angles (1 %); with
+twice as much two, which cost 1 degree and leave 3 % more faces."""
+LAST = 1
 """Moves after the last round, each with flips."""
 TRIES = 4
 """How often the surface is remeshed anew where faces pass through others, with what is under those kept as it was."""
@@ -163,23 +167,31 @@ def _made(ground: Ground, kept: Marks, most: float, threads: int, progress: Prog
     making = Making(ground, kept, threads)
     for count in range(ROUNDS):
         progress("remesh", count, ROUNDS)
-        _round(making, moves=1 if count < ROUNDS - 1 else LAST)
+        if _round(making) < FEW:
+            break
     progress("remesh", ROUNDS, ROUNDS)
+    _move(making, LAST)
     for _ in range(COARSER):
         if len(making.faces) <= most:
             break
         ground = ground.scaled((len(making.faces) / (AIM * most)) ** 0.5)
         making.rescaled(ground)
-        _round(making, moves=LAST)
+        _round(making)
+        _move(making, LAST)
     making.lift()
     return making
 
 
-def _round(making: Making, moves: int) -> None:
-    making.split()
-    making.collapse()
+def _round(making: Making) -> float:
+    """Change edges and move vertices; return the splits and collapses a vertex."""
+    changes = making.split() + making.collapse()
     making.flip()
-    for _ in range(moves):
+    _move(making, 1)
+    return changes / making.vertices
+
+
+def _move(making: Making, times: int) -> None:
+    for _ in range(times):
         making.move()
         making.flip()
 

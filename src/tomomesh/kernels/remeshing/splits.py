@@ -1,6 +1,6 @@
 """Edges of a mesh in the making that are too long are split. See `tomomesh.kernels.remeshing.links`.
 
-Every loop goes over half edges from `start` to `stop`, one of each pair, in their order.
+Edges are marked at the first of their half edges, and split in the order of these.
 """
 
 from __future__ import annotations
@@ -20,17 +20,21 @@ if TYPE_CHECKING:
     Bools = NDArray[np.bool_]
 
 
-@kernel("i8(f8[:,::1], i4[::1], i4[::1], u1[::1], f8[::1], i8, i8)")
-def count_long(places: Floats, corners: Ints, twins: Ints, kinds: Bytes, sizes: Floats, start: int, stop: int) -> int:
-    """Count the edges that are too long."""
-    count = 0
+@kernel("b1(f8[:,::1], i4[::1], u1[::1], f8[::1], i8)")
+def is_long(places: Floats, corners: Ints, kinds: Bytes, sizes: Floats, half: int) -> bool:
+    """Tell whether an edge is too long, and may be split."""
+    u, v = corners[half], corners[after(half)]
+    most = LONG * 0.5 * (sizes[u] + sizes[v])
+    return bool(squared_length(places, u, v) > most * most and not kinds[u] == KEPT == kinds[v])
+
+
+@kernel("void(f8[:,::1], i4[::1], i4[::1], u1[::1], f8[::1], b1[::1], i8, i8)")
+def mark_long(
+    places: Floats, corners: Ints, twins: Ints, kinds: Bytes, sizes: Floats, marks: Bools, start: int, stop: int
+) -> None:
+    """Mark the edges that are too long, each at the first of its half edges."""
     for half in range(start, stop):
-        if corners[half] < 0 or twins[half] < half:
-            continue
-        u, v = corners[half], corners[after(half)]
-        most = LONG * 0.5 * (sizes[u] + sizes[v])
-        count += squared_length(places, u, v) > most * most and not kinds[u] == KEPT == kinds[v]
-    return count
+        marks[half] = corners[half] >= 0 and twins[half] > half and is_long(places, corners, kinds, sizes, half)
 
 
 @kernel("b1(f8[:,::1], i4[::1], i8)")
@@ -57,26 +61,21 @@ def split_face(corners: Ints, twins: Ints, outs: Ints, sharp: Bools, half: int, 
     outs[v] = one + 1
 
 
-@kernel("i8(f8[:,::1], i4[::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], i4[::1], i8[::1], i8, i8)")
+@kernel(
+    "void(f8[:,::1], i4[::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], i4[::1], i8[::1], b1[::1], "
+    "i8[::1], i8, i8)"
+)
 def split_edges(
     places: Floats, corners: Ints, twins: Ints, outs: Ints, valence: Ints, kinds: Bytes, sharp: Bools, sizes: Floats,
-    under: Ints, counts: NDArray[np.int64], start: int, stop: int,
-) -> int:  # fmt: skip
-    """Split edges that are too long, as far as there is room."""
-    made = 0
-    for half in range(start, stop):
+    under: Ints, counts: NDArray[np.int64], marks: Bools, long: NDArray[np.int64], start: int, stop: int,
+) -> None:  # fmt: skip
+    """Split edges that were marked as too `long`, for which there is room, and mark those that are too long then."""
+    for n in range(start, stop):
+        half = long[n]
         other = twins[half]
-        if corners[half] < 0 or other < half:
+        if not (marks[half] and is_longest(places, corners, half) and is_longest(places, corners, other)):
             continue
-        u, v = corners[half], corners[after(half)]
-        most = LONG * 0.5 * (sizes[u] + sizes[v])
-        if squared_length(places, u, v) <= most * most or kinds[u] == KEPT == kinds[v]:
-            continue
-        if not (is_longest(places, corners, half) and is_longest(places, corners, other)):
-            continue
-        m, g = counts[0], counts[1]
-        if m + 1 > len(outs) or 3 * (g + 2) > len(corners):
-            break
+        u, v, m, g = corners[half], corners[after(half)], counts[0], counts[1]
         for axis in range(3):
             places[m, axis] = 0.5 * (places[u, axis] + places[v, axis])
         sizes[m] = 0.5 * (sizes[u] + sizes[v])
@@ -93,5 +92,7 @@ def split_edges(
         twins[other], twins[one] = one, other
         outs[m] = one
         counts[0], counts[1] = m + 1, g + 2
-        made += 1
-    return made
+        for face in (half // 3, other // 3, g, g + 1):
+            for side in range(3 * face, 3 * face + 3):
+                if twins[side] >= 0:
+                    marks[min(side, twins[side])] = is_long(places, corners, kinds, sizes, side)
