@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 NEAR = {"skull": (0.25, 0.42), "ventricles": (0.24, 0.32), "white matter": (0.28, 0.37)}
-"""Mean distances to and from marching cubes, mm, that ``--network none`` had when the marks were set."""
+"""Mean distances to and from marching cubes, mm, that ``--way voxels`` had when the marks were set."""
 CONTOURS: dict[str, Any] = {"contours": "loops"}
 CT = "dicom2stl/ct_example.nii.gz"
 BODY, BODY_LABELS = "totalsegmentator/example_ct_dicom", "totalsegmentator/example_seg_dicom.nii.gz"

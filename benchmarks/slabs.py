@@ -39,8 +39,8 @@ STUDIES: dict[str, tuple[str, tuple[int, ...]]] = {
 """Label heads, of which the skull is taken, and a head of gray levels, whose skin is what lies above Otsu's level."""
 WAYS: dict[str, dict[str, Any]] = {
     "defaults": {},
-    "--network none": {"network": "none"},
-    "--contours loops": {"contours": "loops"},
+    "--way voxels": {"way": "voxels"},
+    "--way contours": {"way": "contours"},
 }
 COMMON = 12
 """Slices that every thickness divides: of the thin study as many are left as whole slabs of each hold."""

@@ -28,7 +28,7 @@ FILES = {"CT, bone": ("dicom2stl/ct_example.nii.gz", 300.0), "MR, skin": ("volre
 
 
 def main() -> None:
-    header("--network none: from a volume to a checked mesh", "vtk", "scikit-image")
+    header("--way voxels: from a volume to a checked mesh", "vtk", "scikit-image")
     for name, volume, lower in studies():
         times(name, volume, lower)
         distances(name, volume, lower)

@@ -91,7 +91,7 @@ def boundary_of_rings(
     if not inside.any():
         raise EmptyError(
             "the contours enclose no pixel", found=f"{len(contours)} contours", expected="contours wider than a pixel",
-            hint="--contours loops",
+            hint="--way contours",
         )  # fmt: skip
     outer = "outer" if surface == "outer" else "all"
     return boundary(filled, inside, lower=0.0, surface=outer, threads=threads)

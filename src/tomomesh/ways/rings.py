@@ -124,7 +124,7 @@ def _overlooked(networks: Networks, kept: Selected, settings: Settings) -> list[
         )
     share = share_of_holes(kept.mask, threads) if networks.outlined else 0.0
     if share > HOLES:
-        warnings.append(f"holes of {share:.0%} of the window's area are filled: --contours loops follows them too")
+        warnings.append(f"holes of {share:.0%} of the window's area are filled: --way contours follows them too")
     return warnings
 
 

@@ -200,7 +200,7 @@ def _require_volume(mesh: TriMesh, neurons: int) -> None:
         raise GeometryError(
             "the network bounds nothing: its surface has fallen flat or turned inside out",
             found=f"{neurons} neurons, volume = {volume:.4g} mm^3", expected="a volume over 0",
-            hint="other --neurons, --network or --start; --network none takes the window's boundary",
+            hint="other --neurons, --network or --start; --way voxels takes the window's boundary",
         )  # fmt: skip
 
 
