@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..kernels.threads import in_blocks
+from ..model.cubics import cubic, limited, parabolic
 from ..progress import Progress, silent
 from .assembly import MARGIN
 from .curves import Field, field_of
@@ -22,13 +23,9 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Values = NDArray[np.float32]
-    Array = TypeVar("Array", Floats, Values)
 
 FAR = np.float32(1e4)
 """Distance far outside, in voxels. Farther than volumes are wide, and exact in 32 bits."""
-LIMIT = 3.0
-"""Slopes are at most this many times the smaller change: then nothing overshoots (Fritsch & Carlson 1980). Chosen: half
-of it changes the distance by +0.1 %, twice by -0.4 %."""
 
 
 @dataclass(frozen=True)
@@ -154,18 +151,18 @@ class _Span:
             last = self.shapes[before]
             step_before = one.height - last.height
             earlier = (f - last.field.over(low, high)) / step_before
-            slopes[0] = _limited(earlier, change, step_before, step)
-            ways[0] = _parabolic((one.center - last.center) / step_before, way, step_before, step)
+            slopes[0] = limited(earlier, change, step_before, step)
+            ways[0] = parabolic((one.center - last.center) / step_before, way, step_before, step)
         if after:
             next_ = self.shapes[after]
             step_after = next_.height - other.height
             later = (next_.field.over(low, high) - g) / step_after
-            slopes[1] = _limited(change, later, step, step_after)
-            ways[1] = _parabolic(way, (next_.center - other.center) / step_after, step, step_after)
+            slopes[1] = limited(change, later, step, step_after)
+            ways[1] = parabolic(way, (next_.center - other.center) / step_after, step, step_after)
         for layer in self.layers:
             t = float(self.height[layer] - one.height) / step
-            values = _cubic(t, step, f, g, *slopes)
-            center = _cubic(t, step, one.center, other.center, *ways)
+            values = cubic(t, step, f, g, *slopes)
+            center = cubic(t, step, one.center, other.center, *ways)
             self._lay(volume[layer], values, low, center)
 
     def _fill_end(self, volume: Values) -> None:
@@ -187,22 +184,3 @@ class _Span:
         top, left = max(-row - 1, 0), max(-column - 1, 0)
         at = layer[row + 1 + top : row + 1 + j, column + 1 + left : column + 1 + i]
         np.minimum(at, moved[top : top + at.shape[0], left : left + at.shape[1]], out=at)
-
-
-def _cubic(t: float, step: float, f: Array, g: Array, start: Array, stop: Array) -> Array:
-    """Interpolate between two values of given slopes (Hermite)."""
-    u = 1 - t
-    moved = u * u * (1 + 2 * t) * f + t * t * (1 + 2 * u) * g + step * t * u * (u * start - t * stop)
-    return np.asarray(moved, f.dtype)
-
-
-def _parabolic(earlier: Array, later: Array, before: float, after: float) -> Array:
-    """Return the slope of the parabola through three values, from the changes before and after the middle one."""
-    return np.asarray((after * earlier + before * later) / (before + after), earlier.dtype)
-
-
-def _limited(earlier: Values, later: Values, before: float, after: float) -> Values:
-    """Return that slope, limited so that the values between do not overshoot."""
-    most = LIMIT * np.minimum(np.abs(earlier), np.abs(later))
-    slope = np.clip(_parabolic(earlier, later, before, after), -most, most)
-    return np.asarray(np.where(earlier * later > 0, slope, 0), np.float32)

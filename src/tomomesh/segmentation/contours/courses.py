@@ -10,6 +10,7 @@ import numpy as np
 
 from ...kernels.contours.between import match_rings
 from ...kernels.threads import in_blocks
+from ...model.cubics import cubic, limited
 from ...som.even_spacing import along, evenly
 
 if TYPE_CHECKING:
@@ -29,9 +30,6 @@ WINDOW, STRETCH = 4, 2.0
 """Points before and after one over which a ring must not grow or shrink by more than this factor: where it does, a bay
 opens or closes, and its bottom does not come from its mouth. Chosen: half and twice of the points change the distance
 by +0.2 %, a factor of 1 by +0.7 % and of 4 by 0.0 %."""
-LIMIT = 3.0
-"""Slopes are at most this many times the smaller change: then nothing overshoots (Fritsch & Carlson 1980). Chosen:
-half of it changes the distance by -0.3 %, twice by +0.3 %."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +54,7 @@ class Course:
 
         A cubic of given slopes (Hermite), so that rings bend over more than two slices.
         """
-        t, u = share, 1 - share
-        ends = u * u * (1 + 2 * t) * self.below + t * t * (1 + 2 * u) * self.above
-        points = ends + t * u * (u * self.rising - t * self.reaching)
+        points = cubic(share, 1.0, self.below, self.above, self.rising, self.reaching)
         return points, np.concatenate([self.below - points, self.above - points], axis=1)
 
 
@@ -118,7 +114,7 @@ def _slopes(points: list[dict[int, Floats]], pairs: list[dict[int, Indices]]) ->
             way = points[k + 1][track][b] - points[k][track][a]
             ups[k][track], downs[k + 1][track] = _means(way, a), _means(way, b)
     return [
-        {**up, **down, **{t: _limited(up[t], down[t]) for t in up.keys() & down.keys()}}
+        {**up, **down, **{t: limited(up[t], down[t]) for t in up.keys() & down.keys()}}
         for up, down in zip(ups, downs, strict=True)
     ]
 
@@ -127,12 +123,6 @@ def _means(way: Floats, at: Indices) -> Floats:
     """Average ways (p, 2) over the points that they are of, of which each has one at least."""
     count = np.bincount(at)
     return np.stack([np.bincount(at, axis) / count for axis in way.T], axis=1)
-
-
-def _limited(one: Floats, other: Floats) -> Floats:
-    """Return the mean of two ways, limited so that nothing overshoots."""
-    most = LIMIT * np.minimum(np.abs(one), np.abs(other))
-    return np.where(one * other > 0, np.clip((one + other) / 2, -most, most), 0.0)
 
 
 def _course(
