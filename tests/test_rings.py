@@ -258,7 +258,7 @@ class TestSurface:
     )
     def test_is_that_of_other_shapes(self, distance: Distance, half_width: float, mean: float, p95: float) -> None:
         """Pixels are 1 mm wide, slices 3 mm apart. The nearest neurons, .11 to .31 mm and .25 to .67."""
-        made = reconstruct(study(distance, half_width=half_width), lower=100.0)
+        made = reconstruct(study(distance, half_width=half_width), lower=100.0, way="ring")
         off = off_side(made, distance)
         assert off.mean() < mean
         assert np.quantile(off, 0.95) < p95

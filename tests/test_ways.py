@@ -100,7 +100,7 @@ class TestToy:
         assert re.search(r"hull +a study, as a toy: its convex hull", capsys.readouterr().out)
 
     def test_is_seen_in_report_and_warnings(self) -> None:
-        found = reconstruct(ball(), lower=20.0, network="grid", neurons=9, stiffness=0.5)
+        found = reconstruct(ball(), lower=20.0, network="grid", neurons=9, stiffness=0.5, remesh=False)
         assert found.report["way"]["name"] == "hull"
         assert found.report["way"]["because"] == "asked for by --network grid"
         assert found.report["toy"]["corners"] == len(found.mesh.vertices)
