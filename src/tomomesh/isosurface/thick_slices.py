@@ -20,10 +20,11 @@ if TYPE_CHECKING:
     Index = NDArray[np.int32]
 
 THICK = 1.5
-"""Slice distance over the width of a pixel from which voxels are divided. Derived: from there on, two parts are nearer
-to cubes than one."""
+"""Slice distance over the width of a pixel from which voxels are divided. Derived: the number of parts
+is that ratio, rounded, and from there on it is two."""
 MOST_PARTS = 16
-"""Parts of a voxel at most, so that their number stays bounded. Chosen: slices ten pixels apart are rare."""
+"""Parts of a voxel at most, so that the thin voxels of a window, a byte each, stay bounded. Chosen: slices of 4 mm on
+pixels of .25 mm have as many; half leaves their parts twice as high as wide, twice changes thicker slices alone."""
 ROUNDS = 2
 """Times that the parts follow their neighbors. Chosen on slabs of a label head and of an MR, as all numbers below: half
 changes the distance to the thin study by +0.8 to +3.4 %, twice by less than 1 %."""

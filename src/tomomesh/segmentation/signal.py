@@ -22,7 +22,8 @@ heads 0.7 to 1.
 """
 
 STEPPED_ON = 8
-"""Slices at least on which the gray levels are looked at."""
+"""Slices at least, of those that hold something, on which the gray levels are looked at. Chosen: they are alike in all
+slices of a study."""
 NARROW = 0.06
 """Width of the openings that the outside does not pass, over the square root of the window's area. Chosen: half of it
 changes the distance by +62.7 %, twice nothing."""
@@ -99,9 +100,12 @@ def crossings_around(plane: NDArray[np.bool_], levels: Levels, k: int) -> NDArra
 
 
 def is_stepped(mask: NDArray[np.bool_], levels: Levels) -> bool:
-    """Tell whether the gray levels at the border of a window are those of a mask, and so no finer than it."""
-    every = max(1, len(mask) // STEPPED_ON)
-    found = [(k, *border_pairs(np.pad(mask[k], 1))) for k in range(0, len(mask), every)]
+    """Tell whether the gray levels at the border of a window in its slices are those of a mask, no finer than it."""
+    full = np.flatnonzero(mask.any(axis=(1, 2)))
+    some = full[:: max(1, len(full) // STEPPED_ON)]
+    if len(some) == 0:
+        return False
+    found = [(k, *border_pairs(np.pad(mask[k], 1))) for k in some]
     inner = np.concatenate([np.column_stack([pixels - 1, np.full(len(pixels), k)]) for k, pixels, _ in found])
     steps = np.concatenate([np.pad(step, ((0, 0), (0, 1))) for _, _, step in found])
     return len(inner) > 0 and levels.stepped(inner.astype(np.int32), steps.astype(np.int32))

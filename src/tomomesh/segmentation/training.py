@@ -15,7 +15,7 @@ from ..measure.polygon import side_lengths
 from ..model.lattice import lattice
 from ..model.networks import Networks
 from ..progress import Progress, silent
-from ..settings import IN_SLICE
+from ..settings import IN_SLICE, MOST_NEURONS
 from ..som.even_spacing import bridged_edges, even_spacing
 from ..som.fit import fit, match, radii, shape_of
 from .contours.curved import evened
@@ -38,8 +38,6 @@ distance by -1.2 %, twice by -1.9 %."""
 MUCH = 1.5
 """Neurons over those of a ring up to which what it asks for is believed: its sides' errors, taken for parabolas, are
 those of a cubic, and 1.5^2 times as small."""
-MOST_NEURONS = 4_096
-"""As many as can be asked for."""
 CHORD = 0.1
 """Most that the middle of a side may be off the line, pixels, where the number of neurons follows from the outlines:
 twice what the pixels' noise moves a neuron (measured, 0.04 px). Chosen: half of it changes the distance by -3.2 %, with

@@ -15,7 +15,7 @@ from .crop import CropSettings
 from .cubes import CubeSettings
 from .fit import FitSettings
 from .matters import MATTERS
-from .network import FALLS, IN_SLICE, IN_SPACE, OF_STUDIES, SURFACES, NetworkSettings
+from .network import FALLS, IN_SLICE, IN_SPACE, MOST_NEURONS, OF_STUDIES, SURFACES, NetworkSettings
 from .parameter import LAYERS, MANY, UNSET, asked_by, limits_of, option_of
 from .printing import PrintSettings
 from .read import ReadSettings
@@ -30,6 +30,7 @@ __all__ = [
     "LAYERS",
     "MANY",
     "MATTERS",
+    "MOST_NEURONS",
     "OF_STUDIES",
     "SURFACES",
     "UNSET",

@@ -22,6 +22,8 @@ OF_STUDIES = ("ring", "contours", "voxels", "sphere")
 IN_SLICE, IN_SPACE = 58, 2562
 """Neurons where none are asked for: the paper's of a slice, and those of an icosahedron with edges divided 16-fold:
 10 x 16^2 + 2."""
+MOST_NEURONS = 4_096
+"""Neurons of a slice at most."""
 FALLS = ("linear", "power", "exponential", "inverse")
 """How a learning rate or a radius may fall."""
 
@@ -79,7 +81,7 @@ class NetworkSettings(Group):
     )
     neurons: int | None = param(
         None, "neurons a slice; auto is what the length and the curvature of the outlines want for a ring in batch, "
-        "58 for others, and 2562 in space", kind=int, low=3, high=4_096, auto=True,
+        "58 for others, and 2562 in space", kind=int, low=3, high=MOST_NEURONS, auto=True,
     )  # fmt: skip
     training: str = param(
         "batch", "one presentation at a time, or all at once", choices=("online", "batch"), paper="online"

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..signal import is_stepped
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -40,7 +42,7 @@ def tempered(insides: Insides, levels: Levels | None, mask: NDArray[np.bool_]) -
         As the depths of `insides`.
     """
     depths = insides.depths
-    if levels is None or len(levels.voxels.shape) > 3 or _stepped(levels, mask):
+    if levels is None or len(levels.voxels.shape) > 3 or is_stepped(mask, levels):
         return depths
     seen = insides.over(np.asarray(levels.voxels), np.nan)
     over = np.nan_to_num(np.minimum(seen - levels.lower, levels.upper - seen), nan=-np.inf)
@@ -53,10 +55,3 @@ def tempered(insides: Insides, levels: Levels | None, mask: NDArray[np.bool_]) -
             here = side * depths > 0
             deep[here] *= np.clip(side * over[here] / full, 0, 1)
     return np.clip(depths, -deep, deep)
-
-
-def _stepped(levels: Levels, mask: NDArray[np.bool_]) -> bool:
-    """Tell whether the gray levels along the rows are those of a mask."""
-    z, y, x = np.nonzero(mask[:, :, :-1] & ~mask[:, :, 1:])
-    inner = np.stack([x, y, z], axis=1).astype(np.int32)
-    return levels.stepped(inner, np.broadcast_to(np.array([1, 0, 0], np.int32), inner.shape))

@@ -14,8 +14,10 @@ from ...kernels.threads import in_blocks
 from ...model.contours import Contour, Contours
 from ...model.lattice import lattice
 from ...progress import Progress, silent
+from ...settings import MOST_NEURONS
 from ...som.even_spacing import bridged_edges, evenly
 from ...som.fit import fit, radii
+from ..signal import is_stepped
 from .curved import evened, unshrunk
 from .inputs import FEWEST, SHORTEST, Inputs, components_of, inputs_of_loops, solids
 from .loops import trace
@@ -29,14 +31,11 @@ if TYPE_CHECKING:
 
     from ...isosurface.crossings import Levels
     from ...settings import NetworkSettings
-    from .loops import Loop
 
     Floats = NDArray[np.float64]
 
 T = TypeVar("T")
 
-MOST = 4_096
-"""Neurons of a slice at most where none are asked for, as many as can be asked for."""
 REFINED = (2.0, 0.7)
 """First and last radius of a ring that starts near its place, hops: measured, a start at 4 fails on two-sided walls."""
 
@@ -55,11 +54,11 @@ def train_contours(
 
     ``settings.neurons`` are shared among the contours of a slice by the lengths of their outlines: `FEWEST` each at
     least (a loop: one for `SIDES_MOST` pixel sides at least), and at most one for two pixel sides, or a small loop's
-    sides. Where none are asked for, each loop gets as many as its length and curvature want, `MOST` a slice at most.
-    Every loop has a ring, down to one pixel; components and walls of fewer than `SHORTEST` sides have none. First the
-    inputs of every slice are found, then the contours are linked from slice to slice by what they enclose, then each
-    track is trained from its first slice to its last, every ring with its first neuron next to that of the ring before
-    it.
+    sides. Where none are asked for, each loop gets as many as its length and curvature want, `MOST_NEURONS` a slice at
+    most. Every loop has a ring, down to one pixel; components and walls of fewer than `SHORTEST` sides have none. First
+    the inputs of every slice are found, then the contours are linked from slice to slice by what they enclose, then
+    each track is trained from its first slice to its last, every ring with its first neuron next to that of the ring
+    before it.
 
     Parameters
     ----------
@@ -124,9 +123,9 @@ def shared(inputs: Sequence[Inputs], neurons: int) -> list[int]:
 
 
 def wanted(inputs: Sequence[Inputs]) -> list[int]:
-    """Return how many neurons the loops of a slice want: at most `MOST` in all, as far as each has its least."""
+    """Return how many neurons the loops of a slice want, at most `MOST_NEURONS` in all, but each its least."""
     each = [one.wanted for one in inputs]
-    share = min(1.0, MOST / max(sum(each), 1))
+    share = min(1.0, MOST_NEURONS / max(sum(each), 1))
     return [min(max(FEWEST, round(share * n)), one.most) for n, one in zip(each, inputs, strict=True)]
 
 
@@ -147,21 +146,13 @@ def _inputs(
 def _inputs_of_loops(mask: NDArray[np.bool_], levels: Levels | None, threads: int) -> list[list[Inputs]]:
     """Show each loop where the gray levels cross the window's bounds; half way where those are a mask's."""
     loops, _ = _in_slices(len(mask), lambda k: (trace(mask[k]), 0), threads)
-    if levels is not None and _stepped(levels, loops):
+    if levels is not None and is_stepped(mask, levels):
         levels = None
 
     def find(k: int) -> tuple[list[Inputs], int]:
         return inputs_of_loops(loops[k], None if levels is None else partial(_crossed, levels, k)), 0
 
     return _in_slices(len(mask), find, threads)[0]
-
-
-def _stepped(levels: Levels, loops: Sequence[Sequence[Loop]]) -> bool:
-    """Tell whether the gray levels along loops of all slices are those of a mask."""
-    sides = [(k, *loop.pixels) for k, row in enumerate(loops) for loop in row]
-    inner = np.concatenate([np.zeros((0, 3), np.int32), *(_placed(pixels, k) for k, pixels, _ in sides)])
-    outer = np.concatenate([np.zeros((0, 3), np.int32), *(_placed(pixels, k) for k, _, pixels in sides)])
-    return levels.stepped(inner, outer - inner)
 
 
 def _crossed(levels: Levels, k: int, inner: NDArray[np.int64], outer: NDArray[np.int64]) -> Floats:
