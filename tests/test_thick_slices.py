@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from conftest import law, seeds
+from tomomesh.isosurface import averages
 from tomomesh.isosurface.crossings import Levels
 from tomomesh.isosurface.thick_slices import Columns, Thinned, parts_of, thinned
 from tomomesh.isosurface.voxels import boundary, voxel_surface
@@ -181,6 +182,15 @@ class TestTwins:
                 away = ndimage.distance_transform_edt(side) if not side.all() else np.full(side.shape, 99.0)
                 expected = np.minimum(away, reach) - 0.5
                 assert np.allclose((sign * one)[side], expected[side], atol=1e-5)
+
+    @law(30)
+    @given(levels=studies(), around=st.integers(0, 5))
+    def test_averages_of_a_mask_are_found_in_its_box_alone(self, levels: Floats, around: int) -> None:
+        mask = np.pad(levels > 0.5, around)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(averages, "MARGIN", max(mask.shape))
+            everywhere = averages.averages_of(mask, 1)
+        assert (averages.averages_of(mask, 2) == everywhere).all()
 
 
 class TestNearer:

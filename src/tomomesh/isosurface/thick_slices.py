@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.isosurface.columns import distances_in_slices, move_within_columns, ranges_around, shares_inside
+from ..kernels.isosurface.columns import move_within_columns, ranges_around
 from ..kernels.threads import in_blocks
+from .averages import averages_of, beside_border
 from .crossings import SAMPLES, STEPPED, Levels
 
 if TYPE_CHECKING:
@@ -28,19 +29,16 @@ pixels of .25 mm have as many; half leaves their parts twice as high as wide, tw
 ROUNDS = 2
 """Times that the parts follow their neighbors. Chosen on slabs of a label head and of an MR, as all numbers below: half
 changes the distance to the thin study by +0.8 to +3.4 %, twice by less than 1 %."""
-BLOCK, SLICES = 4_000, 1
-"""Columns and slices handled in one call: far below 100 ms."""
-WIDEST = 16
-"""Most that a border is taken to move sideways from slice to slice, pixels. Chosen: half changes the distance of slabs
-that are a mask by +0.4 to +1 %, 24 by +1 %."""
+BLOCK = 4_000
+"""Columns handled in one call: far below 100 ms."""
 RAMP, SHARPEST = 1 / 3, 5.0
 """Share of a border's height between two pixels where it is a ramp over four, the least sharp that can be told; and
 the greatest sharpness. Chosen: half of the latter changes the distance of partial volumes by +4 %, twice by -0.5 %, and
 turns 7 % more."""
 OF_MASK, EVENED = 2.0, 44.0
 """Sharpness of what comes from a mask, which tells nothing of it, and how stiff a net around that is against bends,
-over the stiffness that is set. Chosen: half of the first changes the distance by +11 %, twice by -0.8 % with 5 % more turns;
-half of the second by -1 %, with 15 % more turns."""
+over the stiffness that is set. Chosen: half of the first changes the distance by +11 %, twice by -0.8 % with 5 % more
+turns; half of the second by -1 %, with 15 % more turns."""
 OF_LEVELS, OF_STEPS = 12.0, 22.0
 """How stiff a net is against bends, over the stiffness that is set, around thin voxels, and around those that are all
 but wholly in or out, whose steps it shall not follow. Chosen where faces turn as much as after a windowed sinc filter:
@@ -172,7 +170,7 @@ def _told(levels: Levels, mask: Mask, turned: Mask, axis: int, threads: int) -> 
     voxels = np.asarray(levels.voxels)
     shares = _shares(levels, mask, axis) if voxels.ndim == 3 else np.ones(1)
     if _are_steps(shares):
-        return _averages(turned, threads), Levels(voxels, 0.5, np.inf), OF_MASK, EVENED
+        return averages_of(turned, threads), Levels(voxels, 0.5, np.inf), OF_MASK, EVENED
     whole = np.ascontiguousarray(np.moveaxis(voxels, axis, 0), np.float32)
     high = float(np.percentile(shares, UPRIGHT)) if len(shares) else 1.0
     sharpness = min(1 + max(high - RAMP, 0) / max(2 * (1 - high), 1e-9), SHARPEST)
@@ -218,23 +216,11 @@ def _are_steps(shares: NDArray[np.float64]) -> bool:
     return len(shares) > 0 and bool(np.median(shares) > STEPPED)
 
 
-def _beside_border(mask: Mask) -> Mask:
-    """Tell which voxels have both sides of the border among the 27 around them; beyond the volume is neither."""
-    some, every = mask.copy(), mask.copy()
-    for axis in range(3):
-        for found, join in ((some, np.logical_or), (every, np.logical_and)):
-            moved = np.moveaxis(found, axis, 0)
-            before = moved.copy()
-            join(moved[1:], before[:-1], out=moved[1:])
-            join(moved[:-1], before[1:], out=moved[:-1])
-    return some & ~every
-
-
 def _divided(mask: Mask, whole: Values) -> Index:
     """Return the voxels (m, 3) that are divided: those beside the border, if all levels around are known."""
-    beside, known = _beside_border(mask), np.isfinite(whole)
+    beside, known = beside_border(mask), np.isfinite(whole)
     if not known.all():
-        beside &= known & ~_beside_border(known)
+        beside &= known & ~beside_border(known)
     return np.ascontiguousarray(np.argwhere(beside), np.int32)
 
 
@@ -256,22 +242,6 @@ def _finer(affine: NDArray[np.float64], along: int, times: int) -> NDArray[np.fl
     fine[:3, along] /= times
     fine[:3, 3] -= 0.5 * (times - 1) * fine[:3, along]
     return fine
-
-
-def _averages(mask: Mask, threads: int) -> Values:
-    """Return how much of each voxel of a mask lies inside, if borders go on between the slices."""
-    distances, whole = np.empty(mask.shape, np.float32), mask.astype(np.float32)
-    in_blocks(
-        lambda a, b: distances_in_slices(mask, WIDEST + 1, distances, a, b), len(mask), block=SLICES, threads=threads
-    )  # fmt: skip
-    columns = np.ascontiguousarray(np.argwhere(_beside_border(mask)), np.int32)
-    shares = np.empty(len(columns), np.float32)
-    in_blocks(
-        lambda a, b: shares_inside(distances, columns, 1.0, float(WIDEST), shares, a, b), len(columns), block=BLOCK,
-        threads=threads,
-    )  # fmt: skip
-    whole[tuple(columns.T)] = shares
-    return whole
 
 
 def _interpolated(whole: Values, columns: Index, times: int) -> Values:
