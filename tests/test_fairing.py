@@ -115,19 +115,30 @@ class TestEveryWay:
     @pytest.mark.parametrize("way", WAYS)
     def test_a_study_is_smoothed_and_told_of(self, way: str) -> None:
         self.judged(
-            reconstruct(gray_ball(), lower=100.0, smooth=4.0, **WAYS[way]),
-            reconstruct(gray_ball(), lower=100.0, **WAYS[way]),
+            reconstruct(gray_ball(), lower=100.0, remesh=False, smooth=4.0, **WAYS[way]),
+            reconstruct(gray_ball(), lower=100.0, remesh=False, **WAYS[way]),
         )
 
     @pytest.mark.parametrize("asked", [{}, {"attraction": "nearest"}])
     def test_so_is_a_cloud(self, asked: dict[str, Any]) -> None:
-        self.judged(reconstruct_points(cloud(), smooth=4.0, **asked), reconstruct_points(cloud(), **asked))
+        made, before = (reconstruct_points(cloud(), remesh=False, smooth=length, **asked) for length in (4.0, 0.0))
+        self.judged(made, before)
 
     def test_so_is_a_stack(self) -> None:
         angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
         ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
         points = np.concatenate([np.column_stack([(12 - z) * ring, np.full(60, 2.0 * z)]) for z in range(8)])
-        self.judged(reconstruct_points(points, smooth=4.0), reconstruct_points(points))
+        self.judged(*(reconstruct_points(points, remesh=False, smooth=length) for length in (4.0, 0.0)))
+
+    def test_triangles_are_even_after_it(self) -> None:
+        smoothed, even = (
+            reconstruct(gray_ball(), lower=100.0, network="none", remesh=remesh, smooth=8.0) for remesh in (False, True)
+        )
+        quality = even.report["quality"]
+        assert quality["p1_smallest_angle_deg"] >= 30
+        assert quality["median_smallest_angle_deg"] >= 45
+        assert quality["self_intersections"] == 0
+        assert quality["volume_mm3"] == pytest.approx(smoothed.report["quality"]["volume_mm3"], rel=1e-3)
 
     def judged(self, made: Any, before: Any) -> None:
         told = made.report["smooth"]

@@ -80,6 +80,7 @@ class TestShape:
         apart = compare(found.mesh, before)
         assert apart["mean_mm"] <= 0.03 * found.edge
         assert apart["back_mean_mm"] <= 0.03 * found.edge
+        assert found.mesh.face_volumes.sum() == pytest.approx(before.face_volumes.sum(), rel=0.01)
 
     @law(10)
     @given(seed=seeds)
@@ -209,9 +210,9 @@ class TestMarks:
 
 
 class TestDoor:
-    def test_the_report_is_that_of_the_coarse_mesh(self, tmp_path: Path) -> None:
+    def test_the_report_is_that_of_the_coarse_mesh(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         np.save(tmp_path / "c.npy", sphere(1000))
-        line = ["surface", str(tmp_path / "c.npy"), "-o", str(tmp_path / "m.ply"), "--target-faces", "300", "--quiet"]
+        line = ["surface", str(tmp_path / "c.npy"), "-o", str(tmp_path / "m.ply"), "--target-faces", "300"]
         assert main([*line, "--report", str(tmp_path / "r.json")]) == 0
         first = (tmp_path / "m.ply").read_bytes()
         report = json.loads((tmp_path / "r.json").read_text())
@@ -221,6 +222,7 @@ class TestDoor:
         assert report["quality"]["p1_smallest_angle_deg"] >= 25
         assert report["remesh"]["faces_before"] > 300
         assert report["timings"]["remesh_s"] > 0
+        assert f"triangles edges of {report['remesh']['edge_mm']:.3g} mm, smallest angles" in capsys.readouterr().out
         assert main([*line, "--threads", "1"]) == 0
         assert first == (tmp_path / "m.ply").read_bytes()
 

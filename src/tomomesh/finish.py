@@ -1,4 +1,4 @@
-"""What becomes of a mesh at the end of every way: judged, made even, checked, made a part to print, measured."""
+"""What becomes of a mesh at the end of every way: judged, smoothed, made even, checked, a part to print, measured."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage
         Where it is not what is promised.
     """
     judged = _judge(made, settings)
-    even = _even(made, settings, progress)
-    smooth = _smooth(even.value, settings)
-    part = _print(smooth.value, settings, progress)
+    smooth = _smooth(made, settings)
+    even = _even(smooth.value, settings, progress)
+    part = _print(even.value, settings, progress)
     surface = part.value
     later: list[Later] = [partial(_measure, surface, settings, progress)]
     if surface.part is not None:
         later.append(partial(_judge_part, surface))
-    return folded(surface, judged, even, smooth, part), tuple(later)
+    return folded(surface, judged, smooth, even, part), tuple(later)
 
 
 @timed("truth")

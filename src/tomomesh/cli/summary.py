@@ -30,6 +30,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
         *way_of(report["way"]["name"]).of_body(report),
         f"fit       {_of_fit(report)}{_of_filled(report)}",
         *_of_smooth(report),
+        *_of_even(report),
         f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}, "
         f"{quality['self_intersections'] or 'no'} face(s) pass through others",
         f"          {quality['components']} component(s), genus {quality['genus']}, "
@@ -243,6 +244,19 @@ def _of_smooth(report: dict[str, Any]) -> list[str]:
     return [
         f"smooth    vertices moved by {told['moved_mean_mm']:.3g} on average, 95 % at most {told['moved_p95_mm']:.3g}, "
         f"the most {told['moved_max_mm']:.3g} {unit}{change}"
+    ]
+
+
+def _of_even(report: dict[str, Any]) -> list[str]:
+    """Say how long and how even the triangles are."""
+    if not report.get("remesh", {}).get("done"):
+        return []
+    least = report["quality"]["p1_smallest_angle_deg"]
+    kept = report["remesh"]["kept_vertices"]
+    left = f", {kept} vertices left where sheets nearly touch" if kept else ""
+    return [
+        f"triangles edges of {report['remesh']['edge_mm']:.3g} {unit_in_words(report)}, smallest angles {least:.0f} "
+        f"degrees (1 %){left}"
     ]
 
 
