@@ -199,8 +199,8 @@ def shift_between_slices(distances: Values, k: int, j: int, i: int, least: float
 
     Of the slices below and above, those count in which the pixel lies nearer to the other side, or on it. One between
     a part of this slice and a part of the next is passed by a part that moves by more than its own width: there the
-    shift is the most. Where the next slice has no border within the most, a part ends, over a quarter of that. Elsewhere
-    the border does not come here, and the shift is the least.
+    shift is the most. Where the next slice has no border within the most, a part ends, over a quarter of that.
+    Elsewhere the border does not come here, and the shift is the least.
     """
     shift, side = np.inf, 1.0 if distances[k, j, i] > 0 else -1.0
     for s in (k - 1, k + 1):
