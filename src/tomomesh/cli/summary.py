@@ -191,9 +191,9 @@ def _of_stage_one(report: dict[str, Any]) -> list[str]:
 def _of_kept(window: dict[str, Any]) -> list[str]:
     """Say what was left out of the window, and filled in it, in shares of its voxels."""
     whole = window["window_voxels"]
-    left = {"no body": "dropped_voxels", "air of the room": "room_voxels"}
-    left |= {f"{window['specks']} speck(s)": "speck_voxels"}
-    filled = {f"{window['filled_pores']} pore(s)": "filled_pore_voxels", "what it encloses": "filled_lining_voxels"}
+    left = {"outside the body": "dropped_voxels", "of air of the room": "room_voxels"}
+    left |= {f"in {window['specks']} speck(s)": "speck_voxels"}
+    filled = {f"in {window['filled_pores']} pore(s)": "filled_pore_voxels", "what it encloses": "filled_lining_voxels"}
     told = [f"{window[key] / whole:.2%} {name} left out" for name, key in left.items() if window[key]]
     told += [f"{window[key] / whole:.2%} {name} filled" for name, key in filled.items() if window[key]]
     told += [f"{window['padding_voxels']} voxels of padding made background"] if window["padding_voxels"] else []
@@ -205,14 +205,13 @@ def of_way(way: dict[str, Any]) -> list[str]:
     if not way["chosen"]:
         return []
     _, name = way["option"].split()
-    return [f"way       {name}: {way['because']} (--way {'|'.join(way['others'])} for another)"]
+    others = "|".join(other for other, told in way["others"].items() if told["applies"])
+    return [f"way       {name}: {way['because']} (--way {others} for another)"]
 
 
 def _of_fit(report: dict[str, Any]) -> str:
-    """Say whether the mesh has come to rest; around a mask it is evened out for a number of rounds, and never rests."""
+    """Say whether the mesh has come to rest."""
     fit = report.get("fit", {"converged": None})
-    if not report.get("voxels", {"interpolated": True})["interpolated"]:
-        return f"evened out in {fit['iterations']} rounds"
     if fit["converged"] is None:
         return "none"
     return f"{fit['iterations']} steps, {'at rest' if fit['converged'] else 'NOT at rest'}"

@@ -40,11 +40,6 @@ TENSION = 2.4
 than marching cubes by more than a tenth, and lie farther from them than 0.06 and 0.09 voxel."""
 SAFE = 0.95
 """Share of the longest step that never overshoots. Derived: at 1 a net that goes up and down would do so for ever."""
-BENDING, BENDS = 0.4, 40
-"""Share of the bending force that is followed in a step: a net that goes up and down from vertex to vertex keeps 1 - 4b
-of its height, and half would never rest. And the most steps: more would move it on for hundreds of them, by less than
-0.01 voxel each, and round off what the mask shows. Chosen: half of the share changes the distance by +4.8 %, twice by
-+205 %; half of the steps by +4.7 %, twice by -3.3 %."""
 
 STEPS = np.array([key_step(direction) for direction in DIRECTIONS])
 MIXED = np.array([0 < case < 255 for case in range(256)])
@@ -153,9 +148,7 @@ def settle(
 
     At rest  mean(p - c) + s mean(x_j - x) = 0  for every vertex x: p are the crossings and c the middles of the
     squares around it, x_j its neighbors, s the stiffness. No vertex leaves its cell. Around the parts of thick voxels
-    the springs resist bends, with  b (l - mean l_j)  in place of  s l,  l = mean(x_j - x). Where the gray levels are
-    those of a mask, nothing is drawn, and the net loses its bends alone:  x <- x + b (l - mean l_j),  in `BENDS` steps
-    at most, whether it is then at rest or not.
+    and around a mask the springs resist bends, with  b (l - mean l_j)  in place of  s l,  l = mean(x_j - x).
 
     Parameters
     ----------
@@ -171,8 +164,8 @@ def settle(
     NetFit
     """
     start = _means(crossings.positions, net.fans, threads)
-    most = settings.max_steps if crossings.drawing else min(settings.max_steps, BENDS)
-    state, trace = iterate(_NetSteps(net, crossings, start, settings, threads), most, progress)
+    steps = _NetSteps(net, crossings, start, settings, threads)
+    state, trace = iterate(steps, settings.max_steps, progress)
     return NetFit(start, state.position, trace)
 
 
@@ -210,8 +203,7 @@ class _NetSteps:
             low, moves = self.net.low[at], state.moves[at]
             move_in_cells(steps, state.position[at], low, MARGIN, moves, sums[at.start // BLOCK], 0, len(steps))
 
-        forced = self._drawn if self.crossings.drawing else self._unbent
-        position = forced(state.position, move)
+        position = self._drawn(state.position, move)
         speed, change = sums[:, :2].max(axis=0)
         return _NetState(position, state.moves), Motion(speed, change, sums[:, 2].sum())
 
@@ -247,21 +239,11 @@ class _NetSteps:
         bends *= bending
         return bends, 4 * bending
 
-    def _unbent(self, position: Floats, move: Finish) -> Floats:
-        """Move every vertex to where the net bends as it does around."""
-
-        def relax(bends: Floats, at: slice) -> None:
-            bends *= BENDING
-            move(bends, at)
-
-        return self._bends(self._tension(position), relax)
-
-    def _bends(self, tension: Floats, finish: Finish = lambda found, at: None) -> Floats:
+    def _bends(self, tension: Floats) -> Floats:
         """Return how much more every vertex is drawn to its neighbors than these are to theirs."""
 
         def less(around: Floats, at: slice) -> None:
             np.subtract(tension[at], around, out=around)
-            finish(around, at)
 
         return _means(tension, self.net.links, self.threads, less)
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..kernels.isosurface.columns import move_within_columns, ranges_around
 from ..kernels.threads import in_blocks
 from .averages import averages_of, beside_border
-from .crossings import SAMPLES, STEPPED, Levels
+from .crossings import EVENED, SAMPLES, STEPPED, Levels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,10 +35,9 @@ RAMP, SHARPEST = 1 / 3, 5.0
 """Share of a border's height between two pixels where it is a ramp over four, the least sharp that can be told; and
 the greatest sharpness. Chosen: half of the latter changes the distance of partial volumes by +4 %, twice by -0.5 %, and
 turns 7 % more."""
-OF_MASK, EVENED = 2.0, 44.0
-"""Sharpness of what comes from a mask, which tells nothing of it, and how stiff a net around that is against bends,
-over the stiffness that is set. Chosen: half of the first changes the distance by +11 %, twice by -0.8 % with 5 % more
-turns; half of the second by -1 %, with 15 % more turns."""
+OF_MASK = 2.0
+"""Sharpness of what comes from a mask, which tells nothing of it. Chosen: half changes the distance by +11 %, twice by
+-0.8 % with 5 % more turns."""
 OF_LEVELS, OF_STEPS = 12.0, 22.0
 """How stiff a net is against bends, over the stiffness that is set, around thin voxels, and around those that are all
 but wholly in or out, whose steps it shall not follow. Chosen where faces turn as much as after a windowed sinc filter:
@@ -195,7 +194,8 @@ def _shares_of(levels: Levels, inner: Index, steps: Index, across: Index) -> NDA
     before, after, *seen = (levels.at(place)[:, 0] for place in places)
     height = np.fmax.reduce([before, after, *seen]) - np.fmin.reduce([before, after, *seen])
     clear = levels.inside(before[:, None]) & ~levels.inside(after[:, None]) & (height > 0)
-    return np.asarray(np.abs(seen[0] - seen[1])[clear] / height[clear])
+    shares = np.abs(seen[0] - seen[1])[clear] / height[clear]
+    return np.asarray(shares[np.isfinite(shares)])
 
 
 def _faces_across(mask: Mask, axis: int) -> tuple[Index, Index]:

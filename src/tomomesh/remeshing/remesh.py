@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import GeometryError
+from ..errors import GeometryError, ResourceError
 from ..measure.intersections import self_intersections
 from ..measure.tree import Tree
 from ..model.columns import any_of
 from ..progress import Progress, silent
-from .ground import Ground, even_edge
+from .ground import EVEN, Ground, even_edge
 from .making import Making
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ ROUND = 0.1
 would pass through each other."""
 AIM = 0.97
 """Share of the most faces that is aimed at, for the number that a length of edges leads to varies by some percent."""
+MOST_FACES = 40_000_000
+"""Faces over which edges are refused as too short: they would take some 16 gigabytes."""
 COARSER = 12
 """Most rounds in which edges become longer until there are no more faces than asked for."""
 
@@ -121,6 +123,7 @@ def remesh(
     GeometryError
         Where the shape cannot be kept with so few faces; names how many it takes.
     """
+    _require_room(mesh, edge)
     ground, best = _ground(mesh, edge, most), None
     found = np.zeros(len(mesh.vertices), np.bool_)
     for _ in range(TRIES):
@@ -137,13 +140,29 @@ def remesh(
             "the mesh cannot be kept closed and manifold with so few faces",
             found=f"--target-faces = {most}",
             expected=f"about {len(made.faces)} or more",
-            hint="more faces, or a coarser study (--resample-slices, --cell)",
+            hint="more faces, or --smooth, which takes small detail away first",
         )
     if best.crossing.any() and (most is None or len(mesh.faces) <= most):
         crosses = self_intersections(mesh, threads=threads) if crossing is None else crossing
         if crosses.sum() < best.crossing.sum():
             return Remeshed(mesh, crosses, even_edge(mesh, len(mesh.faces)), len(mesh.vertices), mesh)
     return best
+
+
+def _require_room(mesh: TriMesh, edge: float | None) -> None:
+    """Refuse edges so short that the faces would not fit into the memory.
+
+    Raises
+    ------
+    ResourceError
+        Naming how many faces there would be, and which edges would do.
+    """
+    area = float(mesh.face_areas.sum())
+    if edge is not None and area > MOST_FACES * EVEN * edge**2:
+        raise ResourceError(
+            "edges so short make too many faces", found=f"--edge = {edge:g}, {area / (EVEN * edge**2):.3g} faces",
+            expected=f"at least {(area / (EVEN * MOST_FACES)) ** 0.5:.3g}, for {MOST_FACES} faces",
+        )  # fmt: skip
 
 
 def faces_under(made: TriMesh, before: TriMesh) -> NDArray[np.int32]:

@@ -153,7 +153,8 @@ class NetworkSettings(Group):
                 found=f"--contours = {self.contours}, --network = {self.network}, --space = {self.space}",
                 expected="--network ring in slices, or --contours one",
             )
-        if self.way in OF_STUDIES and self.detailed not in ("", self.way):
+        one_ring = "ring" if self.way == "paper" else self.way
+        if self.way != "auto" and self.detailed not in ("", one_ring):
             raise UsageError(
                 "a way and its details are at odds", found=f"--way = {self.way}, {self.details}",
                 expected=f"--way {self.detailed}, or no {self.details.split()[0]}",
