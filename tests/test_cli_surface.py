@@ -111,7 +111,8 @@ class TestBesideTheMesh:
         from test_end_to_end import ball
 
         write_nifti(tmp_path / "ball.nii", ball(), np.eye(4))
-        assert main(["reconstruct", str(tmp_path / "ball.nii"), "-o", str(folder / "m.ply"), "--quiet"]) == 0
+        line = ["reconstruct", str(tmp_path / "ball.nii"), "-o", str(folder / "m.ply"), "--way", "ring", "--quiet"]
+        assert main(line) == 0
         mesh = trimesh.load(folder / "m.ply", process=False)
         filled = mesh.metadata["_ply_raw"]["face"]["data"]["filled"].astype(bool).ravel()
         height = mesh.triangles_center[:, 2]
@@ -159,9 +160,9 @@ class TestFarFromZero:
     def test_without_it_the_mesh_is_the_shifted_one(
         self, near: NDArray[np.float64], folder: Path, tmp_path: Path
     ) -> None:
-        one, report = surfaced(saved(near, tmp_path), folder)
+        one, report = surfaced(saved(near, tmp_path), folder, "--no-remesh")
         assert report["points"]["origin"] == near.min(axis=0).tolist()
-        other, _ = surfaced(saved(near + FAR, tmp_path), folder)
+        other, _ = surfaced(saved(near + FAR, tmp_path), folder, "--no-remesh")
         np.testing.assert_array_equal(one.faces, other.faces)
         np.testing.assert_allclose(other.vertices - FAR, one.vertices, rtol=0, atol=4e-7)
 

@@ -92,7 +92,7 @@ def _remesh(made: Surface, settings: Settings, progress: Progress) -> Stage[Surf
         made.mesh, edge=run.edge, most=run.target_faces, crossing=made.crossing, threads=run.threads, progress=progress
     )
     mesh, stats = found.mesh, {"remesh": found.report}
-    if not made.borders and not run.allow_far:
+    if (run.edge or run.target_faces) and not (made.borders or run.allow_far):
         _require_likeness(mesh, made.mesh)
     even = replace(made, mesh=mesh, nearest=np.empty(0, np.int32), crossing=found.crossing)
     _check(even)
@@ -113,7 +113,7 @@ def _require_likeness(mesh: TriMesh, before: TriMesh) -> None:
     if not 1 / LIKE <= share <= LIKE:
         raise GeometryError(
             "the shape is lost with so few or so large faces",
-            found=f"{share:.0%} of the volume, {len(mesh.faces)} faces", expected=f"{1 / LIKE:.0%} to {LIKE:.0%}", 
+            found=f"{share:.0%} of the volume, {len(mesh.faces)} faces", expected=f"{1 / LIKE:.0%} to {LIKE:.0%}",
             hint="more --target-faces, a shorter --edge, or --allow-far",
         )  # fmt: skip
 

@@ -164,8 +164,8 @@ def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any
     if part is not None or not io.keeps(output, "filled", on_faces=True):
         return at_vertices, {}
     filled = surface.filled
-    if filled is None and surface.segmentation is not None:
-        filled = surface.cap_faces
+    if surface.segmentation is not None:
+        filled = surface.cap_faces if filled is None else surface.cap_faces | filled
     return at_vertices, {} if filled is None else {"filled": filled}
 
 

@@ -142,7 +142,7 @@ def thinned(levels: Levels, mask: Mask, affine: NDArray[np.float64], threads: in
     Returns
     -------
     Thinned or None
-        None where no axis is thick.
+        None where no axis is thick, or no voxel lies beside the border.
 
     Notes
     -----
@@ -156,6 +156,8 @@ def thinned(levels: Levels, mask: Mask, affine: NDArray[np.float64], threads: in
     turned = np.ascontiguousarray(np.moveaxis(mask, axis, 0))
     whole, bounds, sharpness, bending = _told(levels, mask, turned, axis, threads)
     columns = _divided(turned, whole)
+    if not len(columns):
+        return None
     index = np.full(turned.shape, -1, np.int32)
     index[tuple(columns.T)] = np.arange(len(columns), dtype=np.int32)
     parts = _moved(whole, index, columns, times, sharpness, threads)
