@@ -21,6 +21,8 @@ from .remeshing.remesh import faces_under, remesh
 from .stage import Stage, folded, timed
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from .model.mesh import TriMesh
     from .progress import Progress
     from .results import Surface
@@ -88,10 +90,11 @@ def _even(made: Surface, settings: Settings, progress: Progress) -> Stage[Surfac
 @timed("remesh")
 def _remesh(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:
     run = settings.run
+    low, near = (np.zeros(3), made.mesh) if made.borders else _from_corner(made.mesh)
     found = remesh(
-        made.mesh, edge=run.edge, most=run.target_faces, crossing=made.crossing, threads=run.threads, progress=progress
+        near, edge=run.edge, most=run.target_faces, crossing=made.crossing, threads=run.threads, progress=progress
     )
-    mesh, stats = found.mesh, {"remesh": found.report}
+    mesh, stats = found.mesh.moved(found.mesh.vertices + low), {"remesh": found.report}
     if (run.edge or run.target_faces) and not (made.borders or run.allow_far):
         _require_likeness(mesh, made.mesh)
     even = replace(made, mesh=mesh, nearest=np.empty(0, np.int32), crossing=found.crossing)
@@ -100,6 +103,17 @@ def _remesh(made: Surface, settings: Settings, progress: Progress) -> Stage[Surf
         return Stage(even, stats, found.warnings)
     filled = made.filled[faces_under(mesh, made.mesh)]
     return Stage(replace(even, filled=filled), stats | {"fit": {"filled_faces": int(filled.sum())}}, found.warnings)
+
+
+def _from_corner(mesh: TriMesh) -> tuple[NDArray[np.float64], TriMesh]:
+    """Count a mesh from its lowest corner, in steps of 2^-32 of its size, so that its place changes no face of it.
+
+    The last bits of the numbers would, which differ from place to place, where edges are equally long. Borders of a
+    sheet are to stay where they are, to the last bit.
+    """
+    low = mesh.vertices.min(axis=0)
+    step = 2.0 ** (np.ceil(np.log2(max(float(np.ptp(mesh.vertices, axis=0).max()), 1e-300))) - 32)
+    return low, mesh.moved(np.round((mesh.vertices - low) / step) * step)
 
 
 def _require_likeness(mesh: TriMesh, before: TriMesh) -> None:

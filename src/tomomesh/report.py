@@ -12,7 +12,7 @@ from .settings import Settings
 from .stage import Later, Stage, folded
 
 BEFORE = ("way", "study", "window", "networks", "rings", "points", "cubes", "stack", "voxels", "space")
-AFTER = ("surface", "fit", "smooth", "quality", "written", "mask", "print", "truth")
+AFTER = ("surface", "fit", "smooth", "remesh", "quality", "written", "mask", "print", "truth")
 """Sections in their order; what a way has of its own stands between the two."""
 PACKAGES = ("tomomesh", "numpy", "scipy", "numba")
 """What the result depends on."""

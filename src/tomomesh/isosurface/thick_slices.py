@@ -142,7 +142,7 @@ def thinned(levels: Levels, mask: Mask, affine: NDArray[np.float64], threads: in
     Returns
     -------
     Thinned or None
-        None where no axis is thick, or no voxel lies beside the border.
+        None where no axis is thick, no voxel lies beside the border, or voxels have several layers.
 
     Notes
     -----
@@ -150,7 +150,7 @@ def thinned(levels: Levels, mask: Mask, affine: NDArray[np.float64], threads: in
     that volumes stay: here the volume of each voxel does.
     """
     along, times = parts_of(affine)
-    if times == 1:
+    if times == 1 or len(levels.voxels.shape) > 3:
         return None
     axis = 2 - along
     turned = np.ascontiguousarray(np.moveaxis(mask, axis, 0))
@@ -169,7 +169,7 @@ def thinned(levels: Levels, mask: Mask, affine: NDArray[np.float64], threads: in
 def _told(levels: Levels, mask: Mask, turned: Mask, axis: int, threads: int) -> tuple[Values, Levels, float, float]:
     """Return what voxels hold, the bounds on that, how sharp its borders are, and how stiff a net is around them."""
     voxels = np.asarray(levels.voxels)
-    shares = _shares(levels, mask, axis) if voxels.ndim == 3 else np.ones(1)
+    shares = _shares(levels, mask, axis)
     if _are_steps(shares):
         return averages_of(turned, threads), Levels(voxels, 0.5, np.inf), OF_MASK, EVENED
     whole = np.ascontiguousarray(np.moveaxis(voxels, axis, 0), np.float32)
