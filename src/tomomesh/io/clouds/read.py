@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from ...errors import EmptyError
 from ...settings import CloudSettings
 from ..dicom import is_dicom
-from ..dicom.objects.structures import read_structure
 from ..fields import point_set
 from ..files.source import existing_file, reader_of, suffix_of, whole
 from ..finite import check_finite
@@ -73,6 +72,8 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
     """
     path = existing_file(path)
     if suffix_of(path) not in POINT_READERS and is_dicom(path):
+        from ..dicom.objects.structures import read_structure  # its columns of contours load SciPy and the kernels
+
         return read_structure(path, settings or CloudSettings())
     positions, fields = reader_of(path, POINT_READERS)(path)
     if len(positions) == 0:
