@@ -189,7 +189,7 @@ class TestTold:
         assert adds_up(window)
         assert window["dropped_components"] == 2
         [line] = [one for one in of_points(dict(found.report), "x") if one.startswith("kept")]
-        assert f"{window['dropped_voxels'] / window['window_voxels']:.2%} no body left out" in line
+        assert f"{window['dropped_voxels'] / window['window_voxels']:.2%} outside the body left out" in line
         assert "what it encloses filled" in line
 
     def test_nothing_is_said_where_nothing_was_changed(self) -> None:

@@ -333,7 +333,7 @@ class TestEndToEnd:
         assert not told["way"]["others"]["ring"]["applies"]
         said = [one for one in capsys.readouterr().out.splitlines() if one.startswith("way ")]
         assert said == [
-            "way       voxels: labels are drawn to the voxel (--way ring|contours|sphere|paper for another)"
+            "way       voxels: labels are drawn to the voxel (--way contours|sphere for another)"
         ]
 
     def test_the_library_takes_the_same_way_as_the_command(self, tmp_path: Path) -> None:

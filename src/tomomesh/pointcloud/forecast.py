@@ -27,7 +27,7 @@ SETTLED = 480
 sum."""
 MEASURED = 100
 """Bytes for each point while the distances to the mesh are measured."""
-FACE = 1150
+FACE = 1600
 """Bytes for each face of the cuberille; most of them while its triangles are made even."""
 SIDES = 0.5
 """Mean, over all directions of a plane, of its extent along an axis."""
