@@ -332,9 +332,7 @@ class TestEndToEnd:
         assert set(told["way"]["others"]) == {"ring", "contours", "sphere", "paper"}
         assert not told["way"]["others"]["ring"]["applies"]
         said = [one for one in capsys.readouterr().out.splitlines() if one.startswith("way ")]
-        assert said == [
-            "way       voxels: labels are drawn to the voxel (--way contours|sphere for another)"
-        ]
+        assert said == ["way       voxels: labels are drawn to the voxel (--way contours|sphere for another)"]
 
     def test_the_library_takes_the_same_way_as_the_command(self, tmp_path: Path) -> None:
         mask = skull()
