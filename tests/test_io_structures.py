@@ -307,6 +307,6 @@ def test_contours_of_any_order_and_direction_give_one_mesh(tmp_path: Path) -> No
     turned: list[Floats] = [one[::-1] if rng.random() < 0.5 else one for one in EVEN]
     rng.shuffle(order := np.arange(len(EVEN)))
     one, other = (surface_of(tmp_path, each).mesh for each in (EVEN, [turned[n] for n in order]))
-    middles = [each.face_areas @ each.corners.mean(axis=1) / each.face_areas.sum() for each in (one, other)]
-    np.testing.assert_allclose(*middles, atol=1e-3)
+    first, second = (each.face_areas @ each.corners.mean(axis=1) / each.face_areas.sum() for each in (one, other))
+    np.testing.assert_allclose(first, second, atol=1e-3)
     assert abs(len(one.faces) - len(other.faces)) < 0.01 * len(one.faces)
