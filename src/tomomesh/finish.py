@@ -101,7 +101,7 @@ def _remesh(made: Surface, settings: Settings, progress: Progress) -> Stage[Surf
     _check(even)
     if made.filled is None:
         return Stage(even, stats, found.warnings)
-    filled = made.filled[faces_under(mesh, made.mesh)]
+    filled = made.filled[faces_under(mesh, made.mesh, run.threads)]
     return Stage(replace(even, filled=filled), stats | {"fit": {"filled_faces": int(filled.sum())}}, found.warnings)
 
 

@@ -165,9 +165,9 @@ def _require_room(mesh: TriMesh, edge: float | None) -> None:
         )  # fmt: skip
 
 
-def faces_under(made: TriMesh, before: TriMesh) -> NDArray[np.int32]:
+def faces_under(made: TriMesh, before: TriMesh, threads: int = 0) -> NDArray[np.int32]:
     """Return the face of the mesh before that lies nearest to the middle of each face of another, (m,)."""
-    return Tree.of_faces(before).nearest(made.corners.mean(axis=1))[1]
+    return Tree.of_faces(before).nearest(made.corners.mean(axis=1), threads=threads)[1]
 
 
 def _ground(mesh: TriMesh, edge: float | None, most: int | None) -> Ground:
