@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 ON_DARK = "#ff9a4d"
 PALE = (0.76, 0.80, 0.83)
-BELOW = 0.6
-"""How far below the darkest pixel that is kept what is not is drawn, in spans of the kept ones: dark structures show."""
 
 
 @styled
@@ -34,9 +32,9 @@ def draw_window(image: Pixels, mask: Pixels, plane: Plane = PIXELS, *, note: str
     figure, axes = panels(8.6, 2, plane.place(np.array(levels.shape[::-1])), 0.45)
     plane.draw(axes[0], levels, contrast(levels))
     heading(axes[0], "a  Slice", note or f"{levels.shape[1]} x {levels.shape[0]} pixels")
-    low, high = contrast(levels[mask]) if mask.any() else contrast(levels)
-    dark = low - BELOW * max(high - low, 1.0)
-    plane.draw(axes[1], np.where(mask, levels, dark), (dark, high))
+    # up to the brightest that is kept: what is dark in the slice shows too
+    brightest = contrast(levels[mask] if mask.any() else levels)[1]
+    plane.draw(axes[1], np.where(mask, levels, levels.min()), (levels.min(), brightest))
     heading(axes[1], "b  Window", f"{np.count_nonzero(mask):,} pixels kept")
     plane.rule(axes)
     return figure
