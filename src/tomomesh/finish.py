@@ -1,4 +1,4 @@
-"""What becomes of a mesh at the end of every way: judged, smoothed, made even, checked, a part to print, measured."""
+"""What becomes of a mesh at the end of every way: checked, smoothed, made even, judged, a part to print, measured."""
 
 from __future__ import annotations
 
@@ -54,9 +54,10 @@ def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage
     InternalCheckError
         Where it is not what is promised.
     """
-    judged = _judge(made, settings)
+    _check(made)
     smooth = _smooth(made, settings)
     even = _even(smooth.value, settings, progress)
+    judged = _judge(even.value, settings)
     part = _print(even.value, settings, progress)
     surface = part.value
     later: list[Later] = [partial(_measure, surface, settings, progress)]
@@ -73,8 +74,7 @@ def compare_with(surface: Surface, truth: TriMesh) -> Stage[None]:
 
 @timed("quality")
 def _judge(made: Surface, settings: Settings) -> Stage[None]:
-    """Refuse a mesh that is not closed as promised, or that does not follow what it was made from."""
-    _check(made)
+    """Refuse a mesh that does not follow what it was made from, as it is to be written."""
     return judge(made, settings)
 
 
