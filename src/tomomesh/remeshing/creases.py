@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from ..kernels.remeshing.links import CREASE, FIXED, FREE, KEPT
 
@@ -24,6 +25,10 @@ STRAIGHT = np.cos(np.radians(45.0))
 """Cosine of the turn from one sharp edge to the next up to which they are one crease."""
 LONG = 4.0
 """Least length of a crease, in edges: what is shorter is roughness, and even triangles matter more."""
+BESIDE, PARALLEL = 0.5, 0.9
+"""How near two sharp edges run beside each other, in edges, and the cosine of the angle between them, that are none:
+between them, as on a corner that is cut off, no even triangle has room. Derived: half an edge is less than the height
+of an even triangle, .87; the cosine is that of 26 degrees."""
 ROUNDS = 2
 """Rounds in which short creases are left out: where one ends, two others may become one."""
 
@@ -48,6 +53,7 @@ def find_creases(
     turn = np.einsum("ij,ij->i", normals[half // 3], normals[np.maximum(twins, 0) // 3])
     found = np.flatnonzero((turn < SHARP) & (half < twins))
     kinds = np.full(len(mesh.vertices), FREE, np.uint8)
+    found = found[~_doubled(mesh, starts[found], ends[found], BESIDE * edge)]
     for _ in range(ROUNDS):
         found = found[_lengths(mesh, starts[found], ends[found]) >= LONG * edge]
     creases = np.zeros(len(twins), np.bool_)
@@ -57,6 +63,21 @@ def find_creases(
     border = twins < 0
     kinds[starts[border]] = kinds[ends[border]] = KEPT
     return creases, kinds
+
+
+def _doubled(mesh: TriMesh, starts: NDArray[np.int64], ends: NDArray[np.int64], near: float) -> Marks:
+    """Tell which sharp edges (e,) have another beside them, that is nearer than `near` and runs alike."""
+    ways = mesh.vertices[ends] - mesh.vertices[starts]
+    ways /= np.maximum(np.sqrt((ways**2).sum(axis=1)), 1e-300)[:, None]
+    middles = 0.5 * (mesh.vertices[ends] + mesh.vertices[starts])
+    one, other = cKDTree(middles).query_pairs(near, output_type="ndarray").T
+    apart = middles[other] - middles[one]
+    along = np.abs(np.einsum("ij,ij->i", apart, ways[one]))
+    beside = along < 0.5 * np.sqrt((apart**2).sum(axis=1))
+    beside &= np.abs(np.einsum("ij,ij->i", ways[one], ways[other])) > PARALLEL
+    doubled = np.zeros(len(starts), np.bool_)
+    doubled[one[beside]] = doubled[other[beside]] = True
+    return doubled
 
 
 def _lengths(mesh: TriMesh, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
