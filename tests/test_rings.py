@@ -20,7 +20,7 @@ from tomomesh.model.points import BRIDGE, CAP, NEURON
 from tomomesh.segmentation.contours.shrinking import bell_variance, unshrunk
 from tomomesh.segmentation.sample import sample
 from tomomesh.segmentation.signal import border_pairs, crossings_around, is_stepped
-from tomomesh.segmentation.training import CHORD, train_study, wanted
+from tomomesh.segmentation.training import CHORD, neurons_for, train_study
 from tomomesh.segmentation.under_rings import surface_under
 from tomomesh.settings import NetworkSettings
 
@@ -127,7 +127,7 @@ class TestNeurons:
     @law(40)
     @given(count=st.integers(30, 300), size=st.floats(10.0, 200.0), pixel=st.floats(0.3, 2.0))
     def test_keep_the_chords_of_a_circle_within_a_share_of_a_pixel(self, count: int, size: float, pixel: float) -> None:
-        needed = wanted(circle(count, size), np.zeros(count, bool), pixel)
+        needed = neurons_for(circle(count, size), np.zeros(count, bool), pixel)
         sagitta = size * (1 - np.cos(np.pi / max(needed, 6)))
         assert needed < 12 or 0.9 < sagitta / (CHORD * pixel) < 1.1 + 12 / needed
 

@@ -225,7 +225,7 @@ class Slices:
         return float(fitted.kept.sum()) * self.pixel_area / (2 * self.times_shown * max(length, 1e-300))
 
     def enough(self) -> int:
-        """Return how many neurons a ring needs to follow the outlines of all slices; see `wanted`.
+        """Return how many neurons a ring needs to follow the outlines of all slices; see `neurons_for`.
 
         Some slices are looked at, evenly spaced: a ring of `IN_SLICE` is trained on each, and the one that it asks for
         where that is much larger, for it may show bends which the first could not.
@@ -241,11 +241,11 @@ class Slices:
         while asked >= FEWEST and asked > MUCH * count:
             count, graph = asked, lattice("ring", asked)
             ring, gaps = self.spaced(self.fitted(k, shown, graph), graph)
-            asked = min(wanted(ring * self.pixel_mm, gaps, min(self.pixel_mm)), most)
+            asked = min(neurons_for(ring * self.pixel_mm, gaps, min(self.pixel_mm)), most)
         return asked
 
 
-def wanted(ring: NDArray[np.float64], gaps: NDArray[np.bool_], pixel: float) -> int:
+def neurons_for(ring: NDArray[np.float64], gaps: NDArray[np.bool_], pixel: float) -> int:
     """Return how many neurons follow the line of a ring (u, 2) to a `CHORD` of a pixel.
 
     A chord of length s on curvature c is s^2 c / 8 off in its middle; from the cubic through the neurons around it,

@@ -79,7 +79,7 @@ class Inputs:
         return min(max(self.perimeter // SIDES_EACH, min(self.perimeter, FEWEST)), len(self.shown))
 
     @property
-    def wanted(self) -> int:
+    def neurons(self) -> int:
         """Neurons that follow its line to `OFF` pixels, by its length and curvature.
 
         A side of length s on curvature c is off by s^2 c / 8 in the middle, so  sqrt(c / (8 OFF))  neurons a pixel do,

@@ -92,7 +92,7 @@ def train_contours(
         )
     tracks = track([[one.inside for one in row] for row in inputs], [[one.side for one in row] for row in inputs])
     counted = settings.contours == "loops" and settings.neurons is None
-    shares = [wanted(row) if counted else shared(row, settings.neuron_count) for row in inputs]
+    shares = [neurons_of(row) if counted else shared(row, settings.neuron_count) for row in inputs]
     members = tracks.members
     trained: list[list[Contour]] = [[] for _ in members]
 
@@ -122,9 +122,9 @@ def shared(inputs: Sequence[Inputs], neurons: int) -> list[int]:
     return [min(max(one.least, round(neurons * one.perimeter / whole)), one.most) for one in inputs]
 
 
-def wanted(inputs: Sequence[Inputs]) -> list[int]:
+def neurons_of(inputs: Sequence[Inputs]) -> list[int]:
     """Return how many neurons the loops of a slice want, at most `MOST_NEURONS` in all, but each its least."""
-    each = [one.wanted for one in inputs]
+    each = [one.neurons for one in inputs]
     share = min(1.0, MOST_NEURONS / max(sum(each), 1))
     return [min(max(FEWEST, round(share * n)), one.most) for n, one in zip(each, inputs, strict=True)]
 
