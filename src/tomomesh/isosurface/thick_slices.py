@@ -154,28 +154,41 @@ def thinned(levels: Levels, mask: Mask, affine: NDArray[np.float64], threads: in
         return None
     axis = 2 - along
     turned = np.ascontiguousarray(np.moveaxis(mask, axis, 0))
-    whole, bounds, sharpness, bending = _told(levels, mask, turned, axis, threads)
+    content = _content_of(levels, mask, turned, axis, threads)
+    whole, bounds = content.whole, content.bounds
     columns = _divided(turned, whole)
     if not len(columns):
         return None
     index = np.full(turned.shape, -1, np.int32)
     index[tuple(columns.T)] = np.arange(len(columns), dtype=np.int32)
-    parts = _moved(whole, index, columns, times, sharpness, threads)
+    parts = _moved(whole, index, columns, times, content.sharpness, threads)
     thin = Levels(Columns(whole, index, parts, axis), bounds.lower, bounds.upper)
     kept = np.moveaxis(_kept(bounds, turned, whole, columns, parts), 0, axis)
-    return Thinned(thin, np.ascontiguousarray(kept), _finer(affine, along, times), times, bounds is not levels, bending)
+    fine = _finer(affine, along, times)
+    return Thinned(thin, np.ascontiguousarray(kept), fine, times, content.of_mask, content.bending)
 
 
-def _told(levels: Levels, mask: Mask, turned: Mask, axis: int, threads: int) -> tuple[Values, Levels, float, float]:
-    """Return what voxels hold, the bounds on that, how sharp its borders are, and how stiff a net is around them."""
+@dataclass(frozen=True)
+class Content:
+    """What voxels hold, the first axis across the slices, the window on that, and what its borders are like."""
+
+    whole: Values
+    bounds: Levels
+    sharpness: float
+    bending: float
+    of_mask: bool = False
+
+
+def _content_of(levels: Levels, mask: Mask, turned: Mask, axis: int, threads: int) -> Content:
+    """Return the gray levels, or the averages that a mask would have."""
     voxels = np.asarray(levels.voxels)
     shares = _shares(levels, mask, axis)
     if _are_steps(shares):
-        return averages_of(turned, threads), Levels(voxels, 0.5, np.inf), OF_MASK, EVENED
+        return Content(averages_of(turned, threads), Levels(voxels, 0.5, np.inf), OF_MASK, EVENED, of_mask=True)
     whole = np.ascontiguousarray(np.moveaxis(voxels, axis, 0), np.float32)
     high = float(np.percentile(shares, UPRIGHT)) if len(shares) else 1.0
     sharpness = min(1 + max(high - RAMP, 0) / max(2 * (1 - high), 1e-9), SHARPEST)
-    return whole, levels, sharpness, OF_STEPS if high > STEPPED else OF_LEVELS
+    return Content(whole, levels, sharpness, OF_STEPS if high > STEPPED else OF_LEVELS)
 
 
 def _shares(levels: Levels, mask: Mask, axis: int) -> NDArray[np.float64]:
