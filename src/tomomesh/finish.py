@@ -12,7 +12,7 @@ from .dynamics.fairing import fair
 from .dynamics.low_pass import OneRing
 from .dynamics.untangle import untangle
 from .errors import GeometryError
-from .judgement import judge
+from .judgement import follow, require_one_wall
 from .measure.intersections import CrossingFaces
 from .measure.report import assess, compare
 from .measure.topology import check_promise
@@ -55,9 +55,10 @@ def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage
         Where it is not what is promised.
     """
     _check(made)
+    walls = require_one_wall(made, settings)
     smooth = _smooth(made, settings)
     even = _even(smooth.value, settings, progress)
-    judged = _judge(even.value, settings)
+    judged = Stage(None, warnings=walls) if walls else _judged(even.value, settings)
     part = _print(even.value, settings, progress)
     surface = part.value
     later: list[Later] = [partial(_measure, surface, settings, progress)]
@@ -73,9 +74,9 @@ def compare_with(surface: Surface, truth: TriMesh) -> Stage[None]:
 
 
 @timed("quality")
-def _judge(made: Surface, settings: Settings) -> Stage[None]:
+def _judged(made: Surface, settings: Settings) -> Stage[None]:
     """Refuse a mesh that does not follow what it was made from, as it is to be written."""
-    return judge(made, settings)
+    return follow(made, settings)
 
 
 def _check(made: Surface) -> None:

@@ -86,30 +86,19 @@ LIMITS = {
 """By what is followed: see docs/report.md for what was measured of sound runs and of wrong ones."""
 
 
-def judge(made: Surface, settings: Settings) -> Stage[None]:
-    """Refuse a mesh that has two walls, or that is far from what it was made from.
+def require_one_wall(made: Surface, settings: Settings) -> tuple[str, ...]:
+    """Refuse a mesh of which both walls rest on the same points, or say so where that was allowed.
 
     Parameters
     ----------
     made : Surface
-        As its way has left it, closed as promised.
+        As its way has left it: what is thin loses of its volume where it is smoothed and made even.
     settings : Settings
-
-    Returns
-    -------
-    Stage
-        Tells how far it is; a mesh that was let pass, or is not far from being refused, in words.
 
     Raises
     ------
     GeometryError
     """
-    walls = _two_walls(made, settings)
-    return Stage(None, warnings=walls) if walls else _follow(made, settings)
-
-
-def _two_walls(made: Surface, settings: Settings) -> tuple[str, ...]:
-    """Refuse a mesh of which both walls rest on the same points, or say so where that was allowed."""
     share = 1.0 if made.encloses is None else made.encloses.share(made.mesh)
     if made.encloses is None or share >= LEAST:
         return ()
@@ -122,8 +111,24 @@ def _two_walls(made: Surface, settings: Settings) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _follow(made: Surface, settings: Settings) -> Stage[None]:
-    """Refuse a mesh that is far from its window or its slices, or say so where that was allowed."""
+def follow(made: Surface, settings: Settings) -> Stage[None]:
+    """Refuse a mesh that is far from its window or its slices, or say so where that was allowed.
+
+    Parameters
+    ----------
+    made : Surface
+        As it is to be written.
+    settings : Settings
+
+    Returns
+    -------
+    Stage
+        Tells how far it is; a mesh that was let pass, or is not far from being refused, in words.
+
+    Raises
+    ------
+    GeometryError
+    """
     kind, found = _measured(made, settings.run.threads)
     if not found:
         return Stage(None)
