@@ -9,7 +9,7 @@ from ..dicom import Listing, is_segmentation, list_dicom, lone_object
 from ..dicom.objects.segmentation import segments_of
 from ..files.archive import unpacked_zip
 from ..files.source import existing, existing_file, suffix_of
-from .slices import slices_behind
+from .slices import ARCHIVES, slices_behind
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -40,7 +40,7 @@ def list_series(path: str | Path, *, settings: ReadSettings | None = None) -> Li
         For an archive that holds too much.
     """
     path, settings = existing(path), settings or ReadSettings()
-    if path.is_dir() or suffix_of(existing_file(path)) != ".zip":
+    if path.is_dir() or suffix_of(existing_file(path)) not in ARCHIVES:
         return _listed(path, settings, study=str(path))
     with unpacked_zip(path) as folder:
         return _listed(folder, settings, study=str(path))

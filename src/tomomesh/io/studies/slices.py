@@ -13,6 +13,9 @@ from ..volumes.images import FAMILIES
 if TYPE_CHECKING:
     from pathlib import Path
 
+ARCHIVES = (".zip", ".ozx")
+"""Suffixes of archives: zip files, and those of OME-Zarr's RFC 9, which are zip files of one image."""
+
 
 @dataclass(frozen=True)
 class Slices:

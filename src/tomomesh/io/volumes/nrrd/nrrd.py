@@ -11,21 +11,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import FormatError
-from ...model.volume import Volume
-from ..files.detached import beside, check_count, numbered
-from ..files.source import first_bytes
-from ..files.unpack import BZIP2, GZIP, PLAIN
+from ....errors import FormatError
+from ....model.volume import Volume
+from ...files.detached import beside, check_count, numbered
+from ...files.source import first_bytes
+from ...files.unpack import BZIP2, GZIP, PLAIN
+from ..raster import LONGEST_HEADER, TEXT, Raster, gray_or_color, header_bytes, read_raster, sizes_of
 from .nrrd_frame import frame_of, is_spatial
-from .raster import LONGEST_HEADER, TEXT, Raster, gray_or_color, header_bytes, read_raster, sizes_of
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from ...settings import ReadSettings
-    from .raster import HeaderFields
+    from ....settings import ReadSettings
+    from ..raster import HeaderFields
 
 TYPE_WORDS = {
     "i1": ("signed char", "int8", "int8_t"),
