@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from ..files.limits import require_memory
 from ..files.source import existing_file, suffix_of, third_party
 from .affine import required_spacing, upright
 from .gray import WHITE_IS_ZERO, bright_is_high, native, without_holes
+from .slice_names import in_order
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,7 +35,7 @@ GRAY_MODES = ("L", "I", "F", "I;16", "I;16B", "I;16L")
 
 
 def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Volume:
-    """Stack slices in the natural order of their names.
+    """Stack slices in the order of the numbers in their names.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
             expected="one kind",
         )
     spacing = required_spacing(settings.spacing, file=folder, what=f"{kinds[0]} slices hold no spacing")
-    ordered = sorted(files, key=natural)
+    ordered, told = in_order(files)
     first, turned = _pixels(ordered[0])
     require_memory(first.nbytes * len(ordered), file=folder)
     stack = np.empty((len(ordered), *first.shape), first.dtype)
@@ -79,7 +79,7 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
         stack[k], turned = pixels, turned or more
     voxels, notes = without_holes(stack, file=folder)
     note = f"{len(ordered)} {kinds[0]} slices in the order of their names: columns left, rows back, slices up"
-    return Volume.from_stored(voxels, upright(spacing), notes=(note, *turned, *notes))
+    return Volume.from_stored(voxels, upright(spacing), notes=(note, *told, *turned, *notes))
 
 
 def read_picture(path: str | Path) -> Volume:
@@ -97,12 +97,6 @@ def read_picture(path: str | Path) -> Volume:
             "the picture is of an unknown kind", file=str(path), found=found, expected="PNG, TIFF or JPEG"
         )
     return read_images([file], ReadSettings(spacing=(1.0, 1.0, 1.0)), folder=str(path))
-
-
-def natural(path: Path) -> tuple[list[tuple[int, int, str]], str]:
-    """Order names as people do: slice 2 before slice 10."""
-    parts = re.split(r"([0-9]+)", path.name)
-    return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in parts if part], str(path)
 
 
 def _pixels(path: Path) -> tuple[NDArray[Any], tuple[str, ...]]:
