@@ -105,8 +105,8 @@ def read_volume(
     settings : ReadSettings, optional
         What to do where the files leave a choice.
     select : sequence of int, optional
-        The labels that are wanted. Of a DICOM segmentation, whose segments may overlap, only these are read; any other
-        label map is read whole.
+        The labels that are wanted. Of a DICOM segmentation, or Slicer's of several layers, whose segments may overlap,
+        only these are read; any other label map is read whole.
 
     Returns
     -------
@@ -151,6 +151,8 @@ def read_volume(
         return _read_one_dicom(path, settings, select)
     if reader is _read_zip:
         return _read_zip(path, settings, select)
+    if reader is read_nrrd:
+        return read_nrrd(path, settings, select)
     if reader is None:
         raise FormatError(
             "the file is of an unknown kind",

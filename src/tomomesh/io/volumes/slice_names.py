@@ -156,7 +156,8 @@ def _gaps(rows: Sequence[tuple[Decimal, ...]]) -> tuple[str, ...]:
         return ("several slices have the same number in their names",)
     counts = [round(step / least) for step in steps]
     if any(abs(step / least - count) > EVENLY for step, count in zip(steps, counts, strict=True)):
-        return (f"the numbers in the names are {float(least):g} to {float(max(steps)):g} apart: the slices are taken as even",)
+        told = f"{float(least):g} to {float(max(steps)):g} apart"
+        return (f"the numbers in the names are {told}: the slices are taken as even",)
     gone = [
         (start + least * n) for start, count in zip(own, counts, strict=False) for n in range(1, min(count, NAMED + 2))
     ]
