@@ -13,7 +13,7 @@ from ..stage import Stage, folded, timed
 from .body import Cleaned
 from .crop import crop, inside_roi
 from .grid import onto_grid
-from .labels import doubted, labels_in
+from .labels import doubted, labels_in, whole
 from .selection import Chosen, choose
 
 if TYPE_CHECKING:
@@ -72,6 +72,8 @@ def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> S
             found=type(volume).__name__,
             expected="read_volume(path) or Volume.from_stored(array, affine)",
         )
+    if settings.window.select is not None and labels is None:
+        volume = whole(volume)
     axis = _slice_axis(volume, settings.network.slices)
     part, box = crop(volume, settings.crop, axis)
     study = part.along(axis)
@@ -99,7 +101,7 @@ def _fitting(labels: Volume, volume: Volume, settings: Settings) -> Volume:
     """Lay a label map onto the study's grid; refuse one of which no label is asked for."""
     if settings.window.select is None:
         raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
-    return onto_grid(labels, volume)
+    return onto_grid(whole(labels), volume)
 
 
 @timed("window")
