@@ -1,9 +1,10 @@
-"""Standard input and output in place of files: ``-``."""
+"""Standard input and output in place of files: ``-``; and files whose format is named in place of their suffix."""
 
 from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import sys
 from argparse import Namespace
@@ -13,14 +14,15 @@ from typing import TYPE_CHECKING
 
 from ..errors import OutputError, TomomeshError, UsageError
 from ..io.files.private import private_folder
+from ..io.files.source import existing
 from .formats import TEXTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 STREAM = "-"
-SOURCES = ("study", "cloud")
-"""Arguments that standard input may take the place of."""
+SOURCES = {"study": "nii", "cloud": "xyz"}
+"""Arguments that standard input may take the place of, and its format where none is named."""
 
 
 @contextmanager
@@ -36,7 +38,9 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
     UsageError
         For a format that is not named, and where a terminal would get bytes that are no text.
     """
-    inside = next((name for name in SOURCES if getattr(chosen, name, None) == STREAM), "")
+    given = getattr(chosen, "input_format", None)
+    typed = {name: getattr(chosen, name, None) for name in SOURCES}
+    inside = next((name for name, path in typed.items() if path == STREAM or (path and given)), "")
     each = getattr(chosen, "each", False)
     outside = getattr(chosen, "output", None) == STREAM and not each
     if getattr(chosen, "format", None) and not (outside or each):
@@ -45,11 +49,14 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
     if not inside and not outside:
         yield chosen
         return
-    with private_folder() as folder, _named_as_typed(folder):
+    source = str(typed.get(inside, STREAM))
+    with private_folder() as folder, _named_as_typed(folder, source):
         files = {}
         if inside:
-            files[inside] = _received(Path(folder, f"input.{chosen.input_format}"))
-            files["typed"] = f"{STREAM} --input-format {chosen.input_format}"
+            read = given or SOURCES[inside]
+            file = Path(folder, f"input.{read}")
+            files[inside] = _received(file) if source == STREAM else _under_suffix(Path(source), file)
+            files["typed"] = f"{shlex.quote(source)} --input-format {read}"
         if not outside:
             yield Namespace(**vars(chosen) | files)
             return
@@ -85,12 +92,24 @@ def _received(path: Path) -> str:
     return str(path)
 
 
+def _under_suffix(path: Path, file: Path) -> str:
+    """Give a file that is there another suffix, by a link, or a copy where the system has none."""
+    if existing(path).is_dir():
+        raise UsageError("--input-format names the format of a file", found=f"{path}, a folder", expected="a file")
+    try:
+        file.symlink_to(path.resolve())
+    except OSError:
+        shutil.copyfile(path, file)
+    return str(file)
+
+
 @contextmanager
-def _named_as_typed(folder: Path) -> Iterator[None]:
-    """Name streams in errors as they were typed, not the temporary files in their place."""
+def _named_as_typed(folder: Path, source: str) -> Iterator[None]:
+    """Name streams and files in errors as they were typed, not the temporary files in their place."""
+    names = {"input": source, "output": STREAM}
+    inside = rf"(?:{re.escape(f'{folder}{os.sep}')})?\b(input|output)(\.\w+)+"
     try:
         yield
     except TomomeshError as fault:
-        inside = re.escape(f"{folder}{os.sep}")
-        fault.args = (re.sub(rf"{inside}(input|output)(\.\w+)+", STREAM, str(fault)),)
+        fault.args = (re.sub(inside, lambda found: names[found[1]], str(fault)),)
         raise

@@ -48,7 +48,7 @@ def inspected(study: str, settings: Settings, *, typed: str = "") -> dict[str, A
     found |= {"series": series, "segments": dict(listing.segments), "left_out": dict(listing.left_out)}
     found["refused"] = _refusal(fault)
     if typed:
-        _rename(found, study, typed.split()[0])
+        _rename(found, study, typed.rpartition(" --input-format ")[0])
     path = f"./{study}" if study.startswith("-") else study  # else it would look like an option
     return found | {"next": next_step(found, typed or shlex.quote(path), settings, fault, listing.series)}
 
