@@ -83,7 +83,12 @@ def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> S
         notes += labels.notes
     chosen = _choose(study, labels, settings)
     kept = tuple(box[n] for n in order_along(axis))
-    section = _section(study, AXES[axis], _cropped(kept, volume.along(axis).shape), notes + _dropped(chosen, settings))
+    section = _section(
+        study,
+        AXES[axis],
+        _cropped(kept, volume.along(axis).shape),
+        notes + _dropped(chosen, settings) + _sparse(chosen),
+    )
     doubt = settings.window.select is not None and doubted(study if labels is None else labels)
     warnings = (*_doubts(chosen.value, settings), *((doubt,) if doubt else ()))
     window = {"window": _window(chosen.value, settings)}
@@ -141,6 +146,10 @@ def _dropped(chosen: Stage[Chosen], settings: Settings) -> tuple[str, ...]:
         f"{found.dropped} of {found.components} components of the window ({found.dropped_voxels} voxels) were "
         "left out, which lie in nothing that is 12 mm thick, as a scanner's table: --keep all keeps them",
     )
+
+
+def _sparse(chosen: Stage[Chosen]) -> tuple[str, ...]:
+    return (chosen.value.told,) if chosen.value.told else ()
 
 
 def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:
