@@ -43,8 +43,8 @@ BODIES = {
     "fork": (rod((0, 0, -24), (0, 0, 0), 8) | rod((0, 0, 0), (16, 0, 22), 7) | rod((0, 0, 0), (-16, 0, 22), 7), 8),
     "hollow ball": ((X**2 + J**2 + K**2 <= 24**2) & (X**2 + J**2 + K**2 > 14**2), 4),
 }
-"""Bodies, and the widest step of the labelled slices at which they are judged: at 8, more than the radius of its tube, the
-standing torus has -5.6 to 4.0 %."""
+"""Bodies, and the widest step of the labelled slices at which they are judged: at 8, more than the radius of its
+tube, the standing torus has -5.6 to 4.0 %."""
 
 
 def thinned(body: NDArray[np.bool_], step: int, first: int = 0, axis: int = 0) -> NDArray[np.bool_]:
