@@ -54,8 +54,8 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
         files = {}
         if inside:
             read = given or SOURCES[inside]
-            file = Path(folder, f"input.{read}")
-            files[inside] = _received(file) if source == STREAM else _under_suffix(Path(source), file)
+            kept = Path(folder, f"input.{read}")
+            files[inside] = _received(kept) if source == STREAM else _under_suffix(Path(source), kept)
             files["typed"] = f"{shlex.quote(source)} --input-format {read}"
         if not outside:
             yield Namespace(**vars(chosen) | files)
