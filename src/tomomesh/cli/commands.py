@@ -74,7 +74,7 @@ def _demo(chosen: Namespace) -> None:
         settings = settings.replace(lower=head.lower, upper=head.upper)
         surface = reconstruct(head.volume, settings, truth=head.truth, progress=progress)
         make_folder(folder)
-        io.write_mesh(head.truth, folder / "truth.ply")
+        io.write_mesh(head.closed_truth, folder / "truth.ply", precision=settings.run.precision)
         outputs = Namespace(
             output=folder / "mesh.stl", points=folder / "points.ply", labels=folder / "labels.nii.gz",
             report=folder / "report.json", save_settings=folder / "settings.toml", figures=folder / "figures",
@@ -226,7 +226,7 @@ def _print(chosen: Namespace) -> None:
         asked = replace(settings, printing=turned(settings.printing, named["frame"]))
         part = make_part(mesh, asked, unit=named["unit"], progress=progress)
         written = frame_of_part(named, settings.printing.scale)
-        io.write_mesh(part.mesh, chosen.output, unit=written["unit"], frame=written["frame"])
+        io.write_mesh(part.mesh, chosen.output, **written, z_up=True, precision=settings.run.precision)
     report = {"print": part.report, "written": written, "settings": settings.to_dict()}
     if chosen.report:
         io.write_document(report, chosen.report)

@@ -107,10 +107,12 @@ def build_parser() -> argparse.ArgumentParser:
     network.add_argument("--film", action="store_true", help="write the training as an animated GIF too")
     _add_outputs(network)
     _add_settings(
-        network,
-        ("window", "network", "run"),
-        without=("slices", "way", "signal", "contours", "space", "select", "keep", "units", *MESH_ONLY, *STUDY_ONLY),
-    )
+        network, ("window", "network", "run"),
+        without=(
+            "slices", "way", "signal", "contours", "space", "select", "keep", "units", "precision", *MESH_ONLY,
+            *STUDY_ONLY,
+        ),
+    )  # fmt: skip
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
     inspect.add_argument("study", metavar="STUDY", help=f"{STUDY}, or - with --input-format")
