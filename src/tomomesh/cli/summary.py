@@ -107,14 +107,25 @@ def of_check(report: dict[str, Any]) -> list[str]:
         *_parts(report),
         *_of_print(report),
     ]
-    if "mean_mm" in report:
-        lines += [
-            f"distance  to the other: mean {report['mean_mm']:.4g}, 95 % {report['p95_mm']:.4g}, "
-            f"largest {report['max_mm']:.4g}",
-            f"          from the other: mean {report['back_mean_mm']:.4g}, 95 % {report['back_p95_mm']:.4g}, "
-            f"largest {report['back_max_mm']:.4g}",
-        ]
-    return lines
+    return lines + _of_agreement(report)
+
+
+def _of_agreement(report: dict[str, Any]) -> list[str]:
+    """Say in a table how near a mesh is to what it should equal."""
+    if "against" not in report:
+        return []
+    what = {"mesh": "the other", "labels": "the labels", "window": "the window"}[report["against"]["against"]]
+    dice = "none, as what is open has no inside" if report["dice"] is None else f"{report['dice']:.4f}"
+    rows = {f"to {what}": "", f"from {what}": "back_"}
+    return [
+        f"against   {what}: Dice {dice}",
+        f"          {'distance':24}{'mean':>10}{'95 %':>10}{'largest':>10}",
+        *(
+            f"          {row:24}" + "".join(f"{report[f'{way}{key}_mm']:10.4g}" for key in ("mean", "p95", "max"))
+            for row, way in rows.items()
+        ),
+        *(f"note      {note}" for note in report["against"]["notes"]),
+    ]
 
 
 def of_part(told: dict[str, Any], output: str) -> list[str]:

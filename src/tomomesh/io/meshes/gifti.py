@@ -9,7 +9,7 @@ import numpy as np
 from ..colors import named_colors
 from ..files.atomic import replacing
 from ..volumes.nifti import FLIP
-from .attributes import single_precision
+from .attributes import MM, single_precision
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from ...model.mesh import TriMesh
     from ..fields import Fields
     from .attributes import MeshAttributes
-
-MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
-"""Millimeters in a unit; GIFTI has no other unit."""
 
 SCANNER, UNKNOWN = "NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_UNKNOWN"
 

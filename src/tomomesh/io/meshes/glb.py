@@ -12,7 +12,7 @@ import numpy as np
 
 from ..colors import linear, named_colors
 from ..files.atomic import replacing
-from .attributes import single_precision
+from .attributes import MM, single_precision
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from ...model.mesh import TriMesh
     from ..fields import Fields
     from .attributes import MeshAttributes
-
-METERS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
-"""Meters in a unit; an unknown one stays as it is."""
 
 UPRIGHT = ((1, 0, 0), (0, 0, 1), (0, -1, 0))
 """Rows of the rotation that brings z to y."""
@@ -80,7 +77,8 @@ def _at_vertices(fields: Fields) -> Fields:
 def _to_gltf(beside: MeshAttributes) -> Any:
     matrix = np.eye(4)
     usual = UPRIGHT if beside.z_up else np.eye(3)
-    matrix[:3, :3] = METERS.get(beside.unit, 1.0) * np.array(TURNS.get(beside.frame, usual))
+    meters = MM[beside.unit] / 1000 if beside.unit in MM else 1.0  # an unknown unit stays as it is
+    matrix[:3, :3] = meters * np.array(TURNS.get(beside.frame, usual))
     return matrix
 
 

@@ -1,5 +1,7 @@
 """3MF: the zip of XML that slicers for 3D printing read.
 
+In millimeters always: Slic3r, OpenSCAD and assimp pass over the unit that a model names.
+
 Written with the standard library: it is one text in a zip with two fixed companions. trimesh's exporter stamps the time
 and random ids into the file, and lib3mf is a compiled library; it judges what is written here in the tests.
 """
@@ -16,6 +18,7 @@ import numpy as np
 from ...errors import OutputError
 from ..colors import named_colors
 from ..files.atomic import replacing
+from .attributes import MM
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,9 +26,6 @@ if TYPE_CHECKING:
 
     from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
-
-MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
-"""Millimeters in a unit. Files are in millimeters always: Slic3r, OpenSCAD and assimp pass over the unit of a model."""
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 MATERIAL = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
