@@ -45,7 +45,7 @@ def block(shape: tuple[int, int, int] = (9, 10, 12)) -> NDArray[np.bool_]:
     return mask
 
 
-def on_grid(mask: NDArray[np.bool_], affine: NDArray[np.float64] = SKEWED) -> Volume:
+def on_grid(mask: NDArray[Any], affine: NDArray[np.float64] = SKEWED) -> Volume:
     """Return a volume whose canonical order is the stored one."""
     return Volume.from_stored(mask, affine)
 

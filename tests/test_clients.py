@@ -134,7 +134,8 @@ def right_places(mesh: TriMesh, suffix: str) -> NDArray[np.float64]:
     left, back, up = mesh.vertices.T
     if suffix == ".glb":
         return np.stack([left, up, -back], axis=1) / 100
-    return mesh.vertices * {".3mf": CM, ".gii": CM * np.array([-1, -1, 1])}.get(suffix, 1)
+    turns: dict[str, NDArray[np.float64]] = {".3mf": CM * np.ones(3), ".gii": CM * np.array([-1.0, -1.0, 1.0])}
+    return mesh.vertices * turns.get(suffix, np.ones(3))
 
 
 @pytest.mark.parametrize(("suffix", "client"), PAIRS, ids=[f"{suffix[1:]}-{one.__name__[3:]}" for suffix, one in PAIRS])

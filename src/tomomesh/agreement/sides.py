@@ -83,7 +83,7 @@ def _places(there: NDArray[np.bool_], shift: tuple[float, float, float]) -> Floa
 def areas_of(volume: Volume) -> Floats:
     """Return the area of a face across each axis, columns first, (3,), mm^2."""
     x, y, z = volume.affine[:3, :3].T
-    return np.linalg.norm([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1)
+    return np.asarray(np.linalg.norm([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1))
 
 
 def samples_of(mask: NDArray[np.bool_], volume: Volume, count: int) -> Floats:

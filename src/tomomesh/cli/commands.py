@@ -234,7 +234,10 @@ def _print(chosen: Namespace) -> None:
         asked = replace(settings, printing=turned(settings.printing, named["frame"]))
         part = make_part(mesh, asked, unit=named["unit"], progress=progress)
         written = frame_of_part(named, settings.printing.scale)
-        io.write_mesh(part.mesh, chosen.output, **written, z_up=True, precision=settings.run.precision)
+        io.write_mesh(
+            part.mesh, chosen.output, unit=written["unit"], frame=written["frame"], z_up=True,
+            precision=settings.run.precision,
+        )  # fmt: skip
     report = {"print": part.report, "written": written, "settings": settings.to_dict()}
     if chosen.report:
         io.write_document(report, chosen.report)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
 
     from ..model.mesh import TriMesh
-    from ..model.volume import Volume
+    from ..model.volume import Grid, Volume
     from ..settings import Settings
     from .bars import Bars
 
@@ -56,7 +56,7 @@ def compared(chosen: Namespace, mesh: TriMesh, settings: Settings) -> dict[str, 
 
     study = io.read_volume(chosen.against, settings=settings.read, select=settings.window.select)
     named = {"unit": "mm", "frame": "unknown"} | stated
-    found = compare_with_study(io.in_lps(mesh, **named, grid=study.grid), study, settings)
+    found = compare_with_study(_in_lps(mesh, named, study.grid), study, settings)
     notes = () if "frame" in stated else (f"{chosen.mesh} names no frame, and is taken for LPS (--mesh-frame)",)
     what = "labels" if settings.window.select else "window"
     return {"against": what, **found, "frame": named["frame"], "notes": [*notes, *study.notes]}
@@ -74,5 +74,9 @@ def _with_mesh(path: str, mesh: TriMesh, stated: dict[str, str]) -> dict[str, An
                 "voxel indices are no lengths", file=path, found=f"frame = {its['frame']}",
                 expected=f"frame = {own['frame']}", hint="--frame lps where the mesh is made",
             )  # fmt: skip
-        mesh, other = io.in_lps(mesh, **own), io.in_lps(other, **its)
+        mesh, other = _in_lps(mesh, own), _in_lps(other, its)
     return {"against": "mesh", **compare_with_mesh(mesh, other), "frame": own["frame"], "notes": []}
+
+
+def _in_lps(mesh: TriMesh, named: dict[str, str], grid: Grid | None = None) -> TriMesh:
+    return io.in_lps(mesh, unit=named["unit"], frame=named["frame"], grid=grid)
