@@ -16,7 +16,7 @@ from studies import rotation, write_nifti
 from test_cli import fails
 from test_end_to_end import ball
 from tomomesh import TriMesh, Volume, compare_with_study, read_mesh, write_mesh
-from tomomesh.agreement import sides
+from tomomesh.agreement import sides, voxels
 from tomomesh.agreement.meshes import compare_with_mesh
 from tomomesh.agreement.sides import areas_of, samples_of, sides_in_slabs
 from tomomesh.agreement.voxels import compare_with_voxels, distance_to_voxels
@@ -86,21 +86,23 @@ class TestSides:
 
 class TestDistance:
     @law(25)
-    @given(mask=solids(4), seed=seeds, slab=st.sampled_from([1, 2**20]))
-    def test_equals_the_distance_to_the_whole_boundary(self, mask: NDArray[np.bool_], seed: int, slab: int) -> None:
+    @given(mask=solids(6), seed=seeds, slab=st.sampled_from([1, 2**20]), side=st.integers(1, 8))
+    def test_equals_the_distance_to_the_whole_boundary(
+        self, mask: NDArray[np.bool_], seed: int, slab: int, side: int
+    ) -> None:
         rng = np.random.default_rng(seed)
         volume = on_grid(mask)
-        places = volume.to_mm(rng.uniform(-3, 8, (15, 3)))
+        places = volume.to_mm(rng.uniform(-9, 14, (15, 3)))
         parts = [part.triangles() for part in sides_in_slabs(mask)]
         starts = np.cumsum([0, *(len(corners) for corners, _ in parts)])
         corners = volume.to_mm(np.concatenate([corners for corners, _ in parts]))
         faces = np.concatenate([triangles + start for (_, triangles), start in zip(parts, starts, strict=False)])
         judge = trimesh.Trimesh(corners, faces, process=False)
         right = trimesh.proximity.closest_point_naive(judge, places)[1]
-        bound = right + rng.choice([0, 1, 1e9], len(right))
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(sides, "SLAB_VOXELS", slab)
-            np.testing.assert_allclose(distance_to_voxels(places, mask, volume, bound), right, atol=1e-6)
+            patch.setattr(voxels, "BLOCK", side)
+            np.testing.assert_allclose(distance_to_voxels(places, mask, volume), right, atol=1e-6)
 
 
 class TestVoxels:

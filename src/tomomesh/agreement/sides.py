@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,6 +46,10 @@ class Sides:
     def spanned(self) -> list[int]:
         """The two axes that each face spans."""
         return [axis for axis in range(3) if axis != self.axis]
+
+    def taking(self, some: NDArray[np.bool_]) -> Sides:
+        """Return some of the faces (n,)."""
+        return replace(self, middles=self.middles[some])
 
     def triangles(self) -> tuple[Floats, NDArray[np.int32]]:
         """Return the corners (4n, 3) as indices, and two triangles a face (2n, 3)."""
