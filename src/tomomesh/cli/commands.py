@@ -12,6 +12,7 @@ from .. import io
 from ..errors import UnreadableError, UsageError, printable
 from ..settings import Settings, option_of, parameters
 from . import summary
+from .against import compared
 from .bars import Bars
 from .batch import reconstruct_each
 from .outputs import (
@@ -28,7 +29,7 @@ from .outputs import (
     write_surface,
 )
 from .parts import frame_of_mesh, frame_of_part, turned
-from .sources import compared, read_study, sources_of
+from .sources import read_study, sources_of
 from .streams import streamed
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from ..measure.topology import FAULTS
 from ..ways import way_of
 from ..ways.samples import points_in_words
 from ..ways.sections import unit_in_words
+from .against import of_agreement
 
 WIDTHS = ("thinnest_wall_mm", "thinnest_gap_mm")
 """Keys of the widths that are told of a part."""
@@ -107,25 +108,7 @@ def of_check(report: dict[str, Any]) -> list[str]:
         *_parts(report),
         *_of_print(report),
     ]
-    return lines + _of_agreement(report)
-
-
-def _of_agreement(report: dict[str, Any]) -> list[str]:
-    """Say in a table how near a mesh is to what it should equal."""
-    if "against" not in report:
-        return []
-    what = {"mesh": "the other", "labels": "the labels", "window": "the window"}[report["against"]["against"]]
-    dice = "none, as what is open has no inside" if report["dice"] is None else f"{report['dice']:.4f}"
-    rows = {f"to {what}": "", f"from {what}": "back_"}
-    return [
-        f"against   {what}: Dice {dice}",
-        f"          {'distance':24}{'mean':>10}{'95 %':>10}{'largest':>10}",
-        *(
-            f"          {row:24}" + "".join(f"{report[f'{way}{key}_mm']:10.4g}" for key in ("mean", "p95", "max"))
-            for row, way in rows.items()
-        ),
-        *(f"note      {note}" for note in report["against"]["notes"]),
-    ]
+    return lines + of_agreement(report)
 
 
 def of_part(told: dict[str, Any], output: str) -> list[str]:
