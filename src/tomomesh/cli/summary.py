@@ -78,7 +78,7 @@ def of_row(place: str, row: dict[str, Any]) -> str:
     if row.get("passed"):
         return f"{place}: finished before"
     shape = "sound" if row["sound"] else "NOT sound"
-    return f"{place}: {row['faces']} faces, {row['components']} component(s), {shape}, {row['seconds']:.1f} s"
+    return f"{place}: {row['faces']} faces, {pieces_in_words(row)}, {shape}, {row['seconds']:.1f} s"
 
 
 def of_batch(rows: list[dict[str, Any]], output: str) -> str:
@@ -213,9 +213,10 @@ def _of_fit(report: dict[str, Any]) -> str:
 
 def pieces_in_words(quality: dict[str, Any]) -> str:
     """Count the pieces of a mesh, and the cavities in them, whose linings are components too."""
-    if not quality["cavities"]:
+    lined = quality["cavities"] or 0
+    if not lined:
         return f"{quality['components']} component(s)"
-    return f"{quality['pieces']} piece(s) with {quality['cavities']} cavity(ies)"
+    return f"{quality['components'] - lined} piece(s) with {lined} cavity(ies)"
 
 
 def limit_in_words(limit: float | list[float | None] | None) -> str:
