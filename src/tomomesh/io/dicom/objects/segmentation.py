@@ -13,8 +13,9 @@ from ....model.volume import Volume
 from ...files.limits import require_memory
 from ...files.source import third_party
 from ..headers.dataset import read_dataset
-from ..headers.header import frames_of, numbers
+from ..headers.header import frames_of
 from ..headers.names import shown
+from ..headers.values import numbers
 from ..pixels.decoder import Decoder
 from .lattice import lattice_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ...files.source import third_party
-from ..headers.header import PER_FRAME
+from ..headers.multiframe import PER_FRAME, counting
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,6 +39,10 @@ def _pairs(a: ImageFrame, b: ImageFrame) -> Iterator[tuple[str, Any, Any]]:
         values = (list(content.get("DimensionIndexValues") or []) for content in (one, other))
         yield from zip(names, *values, strict=False)
         yield "TemporalPositionIndex", one.get("TemporalPositionIndex"), other.get("TemporalPositionIndex")
+    else:
+        vectors = ((keyword, list(a.header.get(keyword) or [])) for keyword in counting(a.header))
+        whole = max(a.number, b.number)
+        yield from ((keyword, each[a.number], each[b.number]) for keyword, each in vectors if len(each) > whole)
 
 
 def _content(frame: ImageFrame) -> Any:
