@@ -33,7 +33,7 @@ FAR = 4.0
 """How many times as wide as the bulk of the levels (`segmentation.otsu.TAILS`) their whole range is from which on the
 histogram is that of the bulk. Only a picture depends on it: the bulk keeps a quarter of the bars at least."""
 AIR = PRESETS_HU["skin"][0]
-"""Where 2 % of the levels are below this, those without a unit may be Hounsfield units. Only suggestions depend on it."""
+"""Where 2 % of the levels are below this, those without a unit may be Hounsfield units. Only suggestions need it."""
 THICK = 5
 """Pixels that slices may be apart without a remark. Only a remark depends on it: steps are then seen in a mesh."""
 

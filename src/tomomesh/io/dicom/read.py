@@ -85,9 +85,7 @@ def _read(files: list[Path], settings: ReadSettings, study: str, others: Counter
     unit, in_unit = gray_unit(choice.frames)
     skipped = _left(stack) if broken or without else ()
     notes = left + broken + choice.notes + without + skipped + stack.notes + levels.notes + in_unit + _said(header)
-    study_read = Volume.from_stored(levels.voxels, stack.affine, unit=unit, notes=notes)
-    padded = {frame.padding for frame in choice.frames}
-    return replace(study_read, padding=padded.pop() if len(padded) == 1 else None)
+    return replace(Volume.from_stored(levels.voxels, stack.affine, unit=unit, notes=notes), padding=levels.padding)
 
 
 def _said(header: Any) -> tuple[str, ...]:

@@ -78,19 +78,28 @@ class ImageFrame:
 
     @property
     def padding(self) -> tuple[float, float] | None:
-        """Lowest and highest gray level that stand for nothing measured; None where the header does not tell."""
-        header = self.header
-        first = header.get("PixelPaddingValue")
-        last = header.get("PixelPaddingRangeLimit", first)
-        plain = header.get("PhotometricInterpretation") == "MONOCHROME2" and "ModalityLUTSequence" not in header
-        if not plain or not isinstance(first, int) or not isinstance(last, int):
+        """First and last decoded number that stand for nothing measured; None where the header names none."""
+        header, inverted = self.header, self.header.get("PhotometricInterpretation") == "MONOCHROME1"
+        kind = next((kind for kind in ("Float", "DoubleFloat", "") if f"{kind}PixelPaddingValue" in header), "")
+        first = header.get(f"{kind}PixelPaddingValue")
+        last = header.get(f"{kind}PixelPaddingRangeLimit", first)
+        gray = inverted or header.get("PhotometricInterpretation") == "MONOCHROME2"
+        if (
+            not gray
+            or "ModalityLUTSequence" in header
+            or not all(isinstance(end, (int, float)) for end in (first, last))
+        ):
             return None
+        signed, turned = header.get("PixelRepresentation"), inverted and header.get("Modality") != "CT"
+        if kind:
+            return (-first, -last) if turned else (first, last)
         whole = 2 ** int(header.get("BitsAllocated") or 16)
-        lowest = -whole // 2 if header.get("PixelRepresentation") else 0
+        lowest = -whole // 2 if signed else 0
         # some write the bits of a negative number as a positive one
-        ends = [(end - lowest) % whole + lowest for end in (first, last)]
-        low, high = sorted(end * self.scale[0] + self.scale[1] for end in ends)
-        return float(low), float(high)
+        ends = [(int(end) - lowest) % whole + lowest for end in (first, last)]
+        if turned:
+            ends = [(-1 if signed else 2 ** int(header.get("BitsStored") or 16) - 1) - end for end in ends]
+        return ends[0], ends[1]
 
     @property
     def instance(self) -> int | None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ...files.source import third_party
 from ..headers.multiframe import PER_FRAME, counting
 
@@ -40,9 +42,9 @@ def _pairs(a: ImageFrame, b: ImageFrame) -> Iterator[tuple[str, Any, Any]]:
         yield from zip(names, *values, strict=False)
         yield "TemporalPositionIndex", one.get("TemporalPositionIndex"), other.get("TemporalPositionIndex")
     else:
-        vectors = ((keyword, list(a.header.get(keyword) or [])) for keyword in counting(a.header))
-        whole = max(a.number, b.number)
-        yield from ((keyword, each[a.number], each[b.number]) for keyword, each in vectors if len(each) > whole)
+        vectors = ((keyword, np.atleast_1d(a.header.get(keyword))) for keyword in counting(a.header))
+        last = max(a.number, b.number)
+        yield from ((keyword, each[a.number], each[b.number]) for keyword, each in vectors if len(each) > last)
 
 
 def _content(frame: ImageFrame) -> Any:
