@@ -113,7 +113,9 @@ def build_parser() -> argparse.ArgumentParser:
     )
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
-    inspect.add_argument("study", metavar="STUDY", help=f"{STUDY}, or - with --input-format")
+    inspect.add_argument(
+        "study", metavar="STUDY", nargs="+", help=f"{STUDY}, or its slices one by one, or - with --input-format"
+    )
     _add_streams(inspect, STUDY_FORMATS)
     inspect.add_argument("--json", action="store_true", help="print the findings as JSON")
     _add_settings(inspect, ("read", "crop"), paper=False)
@@ -184,8 +186,8 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "study",
         metavar="STUDY",
-        nargs="?",
-        help=f"{STUDY}, or - with --input-format; --labels-in may stand in its place",
+        nargs="*",
+        help=f"{STUDY}, or its slices one by one, or - with --input-format; --labels-in may stand in its place",
     )
     parser.add_argument(
         "--labels-in",
@@ -201,8 +203,10 @@ def _add_streams(
     """Add the options that name formats where no suffix does."""
     group = parser.add_argument_group("Streams")
     group.add_argument(
-        "--input-format", choices=read, default=usual, help="what is read from standard input (default %(default)s)"
-    )
+        "--input-format", choices=read,
+        help=f"what is read from standard input (default {usual}), or from a file whose suffix does not tell",
+    )  # fmt: skip
+    parser.set_defaults(usual_format=usual)
     if written:
         group.add_argument("--format", choices=written, help="what is written to standard output (-o -)")
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import GeometryError, UsageError
 from ..model.volume import AXES, Volume, order_along
 from ..stage import Stage, folded, timed
 from .body import Cleaned
@@ -99,7 +99,14 @@ def _fitting(labels: Volume, volume: Volume, settings: Settings) -> Volume:
     """Lay a label map onto the study's grid; refuse one of which no label is asked for."""
     if settings.window.select is None:
         raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
-    return onto_grid(labels, volume)
+    try:
+        return onto_grid(labels, volume)
+    except GeometryError as fault:
+        if option := volume.other_frame or labels.other_frame:
+            whose = "study" if volume.other_frame else "label map"
+            fault.args = (f"{fault} Or: {option}, for the {whose} holds two frames that disagree.",)
+            fault.flags += (option.split()[0],)
+        raise
 
 
 @timed("window")
