@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 STREAM = "-"
-SOURCES = ("study", "cloud")
-"""Arguments that standard input may take the place of."""
+SOURCES = {"study": "nii", "cloud": "xyz"}
+"""Arguments that standard input may take the place of, and its format where none is named."""
 
 
 @contextmanager

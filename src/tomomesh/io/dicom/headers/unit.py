@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from .kinds import class_of
 from .multiframe import DOSE, STORAGE
-from .names import shown
+from ...names import shown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
