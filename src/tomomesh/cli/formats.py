@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-MESH_FORMATS = ("stl", "ply", "obj", "off", "glb", "vtp", "3mf", "gii")
+MESH_FORMATS = ("stl", "ply", "obj", "off", "glb", "vtp", "3mf", "gii", "surf.gii")
 POINT_FORMATS = ("ply", "xyz", "csv", "npy", "vtp")
 LABEL_FORMATS = ("nii", "nii.gz")
 CHECKED_FORMATS = ("stl", "ply", "obj", "off")

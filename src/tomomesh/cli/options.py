@@ -107,10 +107,12 @@ def build_parser() -> argparse.ArgumentParser:
     network.add_argument("--film", action="store_true", help="write the training as an animated GIF too")
     _add_outputs(network)
     _add_settings(
-        network,
-        ("window", "network", "run"),
-        without=("slices", "way", "signal", "contours", "space", "select", "keep", "units", *MESH_ONLY, *STUDY_ONLY),
-    )
+        network, ("window", "network", "run"),
+        without=(
+            "slices", "way", "signal", "contours", "space", "select", "keep", "units", "precision", *MESH_ONLY,
+            *STUDY_ONLY,
+        ),
+    )  # fmt: skip
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
     inspect.add_argument(
@@ -122,11 +124,22 @@ def build_parser() -> argparse.ArgumentParser:
 
     check = _command(commands, "check", "the quality report of any mesh")
     check.add_argument("mesh", metavar="MESH", help=CHECKED)
-    check.add_argument("--against", metavar="MESH", help="a mesh that it should equal: distances both ways")
+    check.add_argument(
+        "--against", metavar="MESH|STUDY",
+        help="what it should equal: a mesh, or the voxels of a window or of labels (--select) of a study; Dice's "
+        "coefficient, and distances both ways",
+    )  # fmt: skip
+    check.add_argument(
+        "--mesh-frame", choices=("lps", "ras", "voxel"),
+        help="what the coordinates of MESH are in, where a study is beside it (default: as its file states, else lps)",
+    )  # fmt: skip
     check.add_argument("--report", metavar="FILE.json", help="write the report")
     check.add_argument("--json", action="store_true", help="print the report as JSON")
     check.add_argument("--print", dest="print_check", action="store_true", help="tell whether it can be printed, too")
-    _add_settings(check, ("printing",), without=(*CUTS, "print_check"), paper=False)
+    _add_settings(
+        check, ("read", "crop", "window", "printing"), without=(*CUTS, "print_check"),
+        paper=False,
+    )  # fmt: skip
 
     part = _command(commands, "print", "a closed mesh in, a part to print out: scaled, cut flat, hollowed")
     part.add_argument("mesh", metavar="MESH", help=CHECKED)
