@@ -13,14 +13,17 @@ import numpy as np
 from ..errors import UsageError
 from ..kernels.som.online import INDEX_BITS
 from ..model.graph import lattice_of
-from ..model.lattice import lattice
+from ..model.lattice import lattice, other_number
+from .schedules import schedule_warnings
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
     from ..model.lattice import Lattice
+    from ..settings import NetworkSettings
+    from .schedules import Fall
 
 PARAMETERS = {"neurons": "n_neurons", "network": "topology", "iterations": "epochs"}
 """Options of the command line that the estimator calls otherwise."""
@@ -107,6 +110,14 @@ def checked_lattice(
     if len(found) > INDEX_BITS:
         raise UsageError("the network is too large", found=f"{len(found)} neurons", expected=f"{INDEX_BITS}")
     return found
+
+
+def warnings_of(
+    lattice: Lattice, asked: int | tuple[int, int] | None, settings: NetworkSettings, falls: Mapping[str, Fall]
+) -> list[str]:
+    """Return what to be warned of: falls that rise, and another number of neurons than was asked for."""
+    other = other_number(lattice, asked) if isinstance(asked, int) else None
+    return [*schedule_warnings(settings, **falls), *([f"{other} (shape sets the sides)"] if other else [])]
 
 
 def _counted(neurons: Any, shape: Any) -> tuple[int, tuple[int, int] | None]:

@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..model.lattice import other_number
 from ..settings import NetworkSettings
-from .band import area_of_each
-from .checks import as_parameters, checked_lattice, checked_matrix, checked_weights, not_fitted, seed_of
+from .checks import as_parameters, checked_lattice, checked_matrix, checked_weights, not_fitted, seed_of, warnings_of
 from .fit import fit, match
-from .inputs import flat
+from .inputs import area_of_each, flat
 from .measures import quantization_error
 from .parameters import Parametrized
 from .saving import load_network, save_network
-from .schedules import schedule_warnings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -174,16 +171,11 @@ class SOM(Parametrized):
         return self._settle(fitted.codebook, inputs, weights)
 
     def _fitted(self, inputs: NDArray[np.float64], weights: NDArray[np.float64] | None) -> Fitted:
-        """Train; warn of what makes no network come to rest, and of another number of neurons than was asked for."""
+        """Train; warn of what is likely not meant."""
         settings = self._settings(len(inputs))
-        falls: Any = {
-            name: None if isinstance(fall, str) else fall
-            for name, fall in (("alpha_fall", self.alpha_fall), ("radius_fall", self.radius_fall))
-        }
+        falls: Any = {name: f for name in ("alpha_fall", "radius_fall") if callable(f := getattr(self, name))}
         self.lattice_ = checked_lattice(self.topology, self.n_neurons, shape=self.shape, edges=self.edges)
-        asked = self.n_neurons if self.shape is None and isinstance(self.n_neurons, int) else None
-        other = other_number(self.lattice_, asked)
-        for warning in [*schedule_warnings(settings, **falls), *([f"{other} (shape sets the sides)"] if other else [])]:
+        for warning in warnings_of(self.lattice_, None if self.shape else self.n_neurons, settings, falls):
             warnings.warn(warning, stacklevel=3)
         self.seed_ = seed_of(self.random_state)
         area = area_of_each(inputs, self.lattice_, weights) if self.pixel_area is None else self.pixel_area
@@ -203,8 +195,10 @@ class SOM(Parametrized):
         inputs = self._matrix(X)
         weights = checked_weights(sample_weight, len(inputs))
         rate, reach = float(self.alpha[1]), float(self.history_.radius[-1])
+        with as_parameters():
+            own = self._settings(len(inputs))
         settings = replace(
-            self._settings(len(inputs)), training="online", iterations=len(inputs), trim=0.0, alpha=(rate, rate),
+            own, training="online", iterations=len(inputs), trim=0.0, alpha=(rate, rate),
             radius=(reach, reach), neighborhood="bubble" if self.neighborhood == "bubble" else "gaussian",
         )  # fmt: skip
         fitted = fit(

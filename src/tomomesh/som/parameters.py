@@ -6,7 +6,6 @@ import inspect
 from importlib import import_module
 from typing import Any, Self
 
-
 MOST = 60
 """Characters of a parameter up to which it is printed as it is."""
 
