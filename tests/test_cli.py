@@ -157,7 +157,9 @@ class TestOtherCommands:
         line = ["network", region, "-o", str(tmp_path / "n"), "--network", network, "--neurons", "50", "--quiet"]
         assert main(line) == 0
         maps = {"02-maps.png"} if network == "grid" else set()
-        assert {path.name for path in (tmp_path / "n").iterdir()} == {"01-topologies.png", "02-network.png"} | maps
+        assert {path.name for path in (tmp_path / "n").iterdir()} == {
+            "01-topologies.png", "02-network.png", "02-learning.png", *maps,
+        }  # fmt: skip
 
     def test_inspect_suggests_windows(self, study: Path, capsys: CaptureFixture[str]) -> None:
         assert main(["inspect", str(study)]) == 0

@@ -202,6 +202,11 @@ class TestReport:
         assert told[0] == "--alpha has no effect with --training batch"
         assert not any("even" in one for one in told)
 
+    @pytest.mark.parametrize("way", ["voxels", "contours", "ring"])
+    def test_auto_written_out_asks_for_nothing(self, way: str) -> None:
+        told = reconstruct(ball(), lower=40.0, way=way, neurons="auto").report["warnings"]
+        assert not any("neurons" in one for one in told)
+
     def test_the_command_line_tells_options_but_no_settings_file(
         self, tmp_path: Path, capsys: CaptureFixture[str]
     ) -> None:

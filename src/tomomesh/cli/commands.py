@@ -29,7 +29,7 @@ from .outputs import (
     write_surface,
 )
 from .parts import frame_of_mesh, frame_of_part, turned
-from .sources import read_study, sources_of
+from .sources import gathered, read_study, sources_of
 from .streams import streamed
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 def run(chosen: Namespace) -> None:
     """Run the command that was parsed."""
-    with streamed(chosen) as named:
+    with streamed(gathered(chosen)) as named:
         _COMMANDS[named.command](named)
 
 

@@ -23,7 +23,7 @@ from .formats import (
     STUDY,
     STUDY_FORMATS,
 )
-from .parameter_options import LISTED, SEVERAL, add_parameter
+from .parameter_options import FIXED, LISTED, SEVERAL, add_parameter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -115,7 +115,9 @@ def build_parser() -> argparse.ArgumentParser:
     )  # fmt: skip
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
-    inspect.add_argument("study", metavar="STUDY", help=f"{STUDY}, or - with --input-format")
+    inspect.add_argument(
+        "study", metavar="STUDY", nargs="+", help=f"{STUDY}, or its slices one by one, or - with --input-format"
+    )
     _add_streams(inspect, STUDY_FORMATS)
     inspect.add_argument("--json", action="store_true", help="print the findings as JSON")
     _add_settings(inspect, ("read", "crop"), paper=False)
@@ -157,17 +159,42 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
-    """Join the numbers after an option that takes several into one word, so that a file may follow them."""
+    """Take the numbers after an option with spaces or with commas between them.
+
+    Those of an option that takes one number or several become one word, so that a file may follow them; those of an
+    option that takes a fixed count become as many.
+    """
     words: list[str] = []
     for word in arguments:
         option, _, values = words[-1].partition("=") if words else ("", "", "")
+        own, _, listed = word.partition("=")
         if option in SEVERAL and values.count(",") < 2 and _is_number(word):
             words[-1] = f"{option}={values},{word}" if values else f"{option}={word}"
-        elif option in LISTED and not values and all(map(_is_number, word.split(","))):
+        elif option in LISTED and not values and _are_numbers(word):
             words[-1] = f"{option}={word}"  # a list that begins with a minus would look like an option
+        elif own in FIXED and _are_numbers(listed):
+            words += [own, *_listed(listed)]
+        elif "," in word and _are_numbers(word) and _takes_more(words):
+            words += _listed(word)
         else:
             words.append(word)
     return words
+
+
+def _takes_more(words: Sequence[str]) -> bool:
+    """Tell whether the last option takes more numbers than it has."""
+    numbers = 0
+    while numbers < len(words) and _is_number(words[-1 - numbers]):
+        numbers += 1
+    return numbers < len(words) and numbers < FIXED.get(words[-1 - numbers], 0)
+
+
+def _listed(word: str) -> list[str]:
+    return [part for part in word.split(",") if part.strip()]
+
+
+def _are_numbers(word: str) -> bool:
+    return bool(_listed(word)) and all(map(_is_number, _listed(word)))
 
 
 def _is_number(word: str) -> bool:
@@ -197,8 +224,8 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "study",
         metavar="STUDY",
-        nargs="?",
-        help=f"{STUDY}, or - with --input-format; --labels-in may stand in its place",
+        nargs="*",
+        help=f"{STUDY}, or its slices one by one, or - with --input-format; --labels-in may stand in its place",
     )
     parser.add_argument(
         "--labels-in",
@@ -214,8 +241,10 @@ def _add_streams(
     """Add the options that name formats where no suffix does."""
     group = parser.add_argument_group("Streams")
     group.add_argument(
-        "--input-format", choices=read, default=usual, help="what is read from standard input (default %(default)s)"
-    )
+        "--input-format", choices=read,
+        help=f"what is read from standard input (default {usual}), or from a file whose suffix does not tell",
+    )  # fmt: skip
+    parser.set_defaults(usual_format=usual)
     if written:
         group.add_argument("--format", choices=written, help="what is written to standard output (-o -)")
 

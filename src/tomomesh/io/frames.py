@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model.mesh import TriMesh
 from .meshes.attributes import MM
-from .volumes.nifti import FLIP
+from .volumes.nifti_frame import FLIP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

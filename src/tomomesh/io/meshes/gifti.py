@@ -8,7 +8,7 @@ import numpy as np
 
 from ..colors import named_colors
 from ..files.atomic import replacing
-from ..volumes.nifti import FLIP
+from ..volumes.nifti_frame import FLIP
 from .attributes import MM, single_precision
 
 if TYPE_CHECKING:
