@@ -274,3 +274,17 @@ class TestGifti:
         told = subprocess.run(command, capture_output=True, check=True, text=True)
         assert "is VALID" in told.stdout + told.stderr
         assert "**" not in told.stdout + told.stderr
+
+
+@pytest.mark.parametrize("suffix", [".3mf", ".gii"])
+def test_a_cloud_in_meters_is_written_in_millimeters_and_told_so(
+    tmp_path: Path, suffix: str, cloud_of_a_pole: Path
+) -> None:
+    """A ball of radius 10 m, three times as high."""
+    report = tmp_path / "report.json"
+    line = ["surface", str(cloud_of_a_pole), "-o", str(tmp_path / f"m{suffix}"), "--units", "m", "--quiet"]
+    assert main([*line, "--report", str(report)]) == 0
+    for read in CLIENTS[suffix]:
+        vertices, _, _ = read(tmp_path / f"m{suffix}")
+        assert np.ptp(vertices, axis=0) == pytest.approx([20e3, 20e3, 60e3], rel=0.05)
+    assert json.loads(report.read_text())["written"] == {"unit": "mm", "frame": "unknown"}

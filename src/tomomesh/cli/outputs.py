@@ -92,7 +92,7 @@ def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progr
         mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces,
         z_up=surface.part is not None, precision=settings.run.precision,
     )  # fmt: skip
-    told: dict[str, dict[str, Any]] = {"written": frame}
+    told: dict[str, dict[str, Any]] = {"written": _as_written(frame, chosen.output)}
     if getattr(chosen, "points", None):
         write_points(surface.points, stage_one, chosen.points, settings, surface.place)
     if stage_one is not None:
@@ -103,6 +103,11 @@ def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progr
     write_documents(chosen, surface.report, settings)
     draw(chosen.figures, stage_one, surface, settings, progress)
     return surface
+
+
+def _as_written(frame: dict[str, str], output: str | Path) -> dict[str, str]:
+    """Name the unit of the numbers in a file: of formats of lengths millimeters, where the unit is known."""
+    return frame | {"unit": "mm"} if suffix_of(output) in LENGTHS and frame["unit"] != "unknown" else frame
 
 
 def _placed(surface: Surface, output: str | Path, settings: Settings) -> tuple[TriMesh, dict[str, str]]:
