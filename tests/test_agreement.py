@@ -225,6 +225,14 @@ class TestCommand:
         assert checked(made, "cm.ply", "ras.stl", capsys)["max_mm"] < 1e-4
         fails(["check", str(made / "ras.stl"), "--against", str(made / "voxel.stl")], 5, capsys)
 
+    def test_a_mesh_counted_from_a_corner_is_brought_back(self, made: Path, capsys: CaptureFixture[str]) -> None:
+        mesh = read_mesh(made / "lps.stl")
+        write_mesh(mesh.moved(mesh.vertices / 10 - [1.5, -20, 3]), made / "l.ply", unit="cm", frame="local:1.5,-20.0,3")
+        write_mesh(mesh, made / "u.ply", frame="unknown")
+        assert checked(made, "l.ply", "u.ply", capsys)["max_mm"] < 1e-9
+        write_mesh(mesh, made / "odd.ply", frame="local:1,2")
+        assert checked(made, "odd.ply", "u.ply", capsys)["max_mm"] < 1e-9
+
     def test_a_mesh_without_a_frame_is_taken_for_lps_and_told(self, made: Path, capsys: CaptureFixture[str]) -> None:
         mesh = read_mesh(made / "ras.stl")
         trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(made / "other.stl")
