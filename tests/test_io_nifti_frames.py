@@ -164,7 +164,8 @@ class TestLabels:
         assert int(written.header["qform_code"]) == int(written.header["sform_code"]) == 1
         image: Any = SimpleITK.ReadImage(str(tmp_path / "l.nii.gz"))
         np.testing.assert_allclose(placed_by_itk(image), affine, atol=1e-4)
-        shape: Any = vars(SimpleITK)["LabelShapeStatisticsImageFilter"]()
+        measure: Any = SimpleITK.LabelShapeStatisticsImageFilter
+        shape = measure()
         shape.Execute(image)
         voxels = np.argwhere(labels)[:, ::-1]
         assert shape.GetPhysicalSize(1) == pytest.approx(len(voxels) * 0.5 * 0.7 * 2.0, rel=1e-5)

@@ -286,7 +286,7 @@ class TestPlace:
     def test_a_mask_is_one_whatever_its_shape(self, shape: str, divide: bool) -> None:
         """Its borders with the slab's end, or a wall one voxel thick, leave no four voxels in a line."""
         mask = np.zeros((6, 24, 24), np.uint8)
-        places = {"slab": np.s_[:, 4:20, 4:20], "sheet": np.s_[3, 2:22, 2:22], "rod": np.s_[2, 3, 2:22]}
+        places: dict[str, Any] = {"slab": np.s_[:, 4:20, 4:20], "sheet": np.s_[3, 2:22, 2:22], "rod": np.s_[2, 3, 2:22]}
         mask[places.get(shape, np.s_[:, :, 6:9])] = 1
         found = boundary(volume_of(mask, np.diag([1.0, 1, 2, 1])), mask > 0, lower=0.5, divide=divide)
         assert found.crossings.stepped
