@@ -105,7 +105,10 @@ def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progr
     if stage_one is not None and suffix_of(chosen.output) in io.ARCHIVED:
         io.write_encapsulated(mesh, chosen.output, stage_one.volume.dicom, patient=chosen.patient)
     else:
-        io.write_mesh(mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces)
+        io.write_mesh(
+            mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces,
+            z_up=surface.part is not None, precision=settings.run.precision,
+        )  # fmt: skip
     told: dict[str, dict[str, Any]] = {"written": frame}
     if getattr(chosen, "points", None):
         write_points(surface.points, stage_one, chosen.points, settings, surface.place)
@@ -146,7 +149,7 @@ def write_points(
     else:
         frame = io.frame_of_study(settings.run.frame, stage_one.volume.grid)
         points, named = frame.points(points), {"unit": frame.unit, "frame": frame.name}
-    io.write_points(points, path, **named)
+    io.write_points(points, path, **named, precision=settings.run.precision)
     return named
 
 
@@ -184,7 +187,7 @@ def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any
     filled = surface.filled
     if surface.segmentation is not None:
         filled = surface.cap_faces if filled is None else surface.cap_faces | filled
-    return at_vertices, {} if filled is None else {"filled": filled}
+    return at_vertices, {} if filled is None or not filled.any() else {"filled": filled}
 
 
 def write_stage_one(chosen: Namespace, found: Segmentation[Any]) -> None:

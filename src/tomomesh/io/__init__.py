@@ -11,7 +11,7 @@ from .clouds.write import POINT_WRITERS, write_points
 from .dicom import Listing, Series
 from .documents import read_settings, write_document, write_settings, write_table
 from .files.atomic import check_output, replacing
-from .frames import Frame, frame_of_study
+from .frames import Frame, frame_of_study, in_lps
 from .meshes.encapsulated import ARCHIVED, check_archived, write_encapsulated
 from .meshes.frame import frame_of_file
 from .meshes.read import MESH_READERS, read_mesh
@@ -39,6 +39,7 @@ __all__ = [
     "find_studies",
     "frame_of_file",
     "frame_of_study",
+    "in_lps",
     "keeps",
     "list_series",
     "read_mesh",

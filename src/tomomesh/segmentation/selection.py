@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import EmptyError, UsageError
 from .body import Cleaned, components_of_body, is_dense, largest_component, solid, thick_components, without_specks
+from .contours.labelled import filled_slices, gaps_in
 from .labels import select
 from .padding import all_padding, named_padding
 from .window import PRESETS_HU, choose_window, window
@@ -68,6 +69,8 @@ class Chosen:
     counts : Counts
     cleaned : Cleaned
         Specks and pores.
+    told : str
+        What is to be said of slices without labels.
     """
 
     volume: Volume
@@ -76,6 +79,7 @@ class Chosen:
     upper: Limit
     counts: Counts = field(default_factory=Counts)
     cleaned: Cleaned | None = None
+    told: str = ""
 
     def counted(self, mask: NDArray[np.bool_], **counts: int) -> Chosen:
         """Return the same with another mask and some counts."""
@@ -111,7 +115,12 @@ def choose(stack: Volume, labels: Volume | None, settings: Settings, inside: NDA
 
 def _of_labels(stack: Volume, labels: Volume | None, asked: WindowSettings) -> Chosen:
     mask = select(stack if labels is None else labels, asked.select or ())
-    return Chosen(replace(stack, voxels=mask.view(np.uint8)), mask, 0.5, np.inf)
+    if asked.fill_slices:
+        volume, told = filled_slices(mask, stack)
+        return Chosen(volume, volume.voxels > 0, 0.0, np.inf, told=told)
+    gaps = gaps_in(mask)
+    told = f"{gaps.told}: --fill-slices interpolates them" if gaps else ""
+    return Chosen(replace(stack, voxels=mask.view(np.uint8)), mask, 0.5, np.inf, told=told)
 
 
 def _of_levels(stack: Volume, asked: WindowSettings) -> Chosen:

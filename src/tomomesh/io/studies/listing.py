@@ -10,7 +10,7 @@ from ..dicom import Listing, is_segmentation, list_dicom, lone_object
 from ..dicom.objects.segmentation import segments_of
 from ..files.archive import unpacked_zip
 from ..files.source import existing, existing_file, suffix_of
-from .slices import Slices, in_words, slices_among, slices_behind
+from .slices import ARCHIVES, Slices, in_words, slices_among, slices_behind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,7 +45,7 @@ def list_series(path: str | Path | Sequence[str | Path], *, settings: ReadSettin
         several = [Path(one) for one in path]
         return _listed(slices_among(several), settings, study=in_words(several))
     path = existing(path)
-    if path.is_dir() or suffix_of(existing_file(path)) != ".zip":
+    if path.is_dir() or suffix_of(existing_file(path)) not in ARCHIVES:
         return _listed(slices_behind(path, str(path)), settings, study=str(path))
     with unpacked_zip(path) as folder:
         return _listed(slices_behind(folder, str(path)), settings, study=str(path))

@@ -18,10 +18,10 @@ from ..volumes.metaimage import read_metaimage
 from ..volumes.mgh import read_mgh
 from ..volumes.nifti import read_nifti
 from ..volumes.npy import read_npy_volume
-from ..volumes.nrrd import read_nrrd
+from ..volumes.nrrd.nrrd import read_nrrd
 from ..volumes.tiff import read_tiff
 from ..volumes.zarr.omezarr import is_zarr, read_omezarr
-from .slices import Slices, in_words, slices_among, slices_in
+from .slices import ARCHIVES, Slices, in_words, slices_among, slices_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -50,7 +50,7 @@ def _read_zip(path: Path, settings: ReadSettings, select: Sequence[int] | None =
     with unpacked_zip(path) as folder:
         files, _ = regular_files(folder, deep=True)
         stores = [folder] if is_zarr(folder) else [path for path in folder.iterdir() if path.is_dir() and is_zarr(path)]
-        whole = stores + [file for file in volumes_among(files) if suffix_of(file) != ".zip"]
+        whole = stores + [file for file in volumes_among(files) if suffix_of(file) not in ARCHIVES]
         one = len(whole) == 1 and not any(map(is_dicom, files))
         return read_volume(whole[0] if one else folder, settings=settings, select=select)
 
@@ -74,6 +74,7 @@ VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
     ".dcm": _read_one_dicom,
     ".ima": _read_one_dicom,
     ".zip": _read_zip,
+    ".ozx": _read_zip,
 }
 """Suffix of a single file to its reader; folders, and DICOM of any name, are known by their content."""
 
@@ -107,8 +108,8 @@ def read_volume(
     settings : ReadSettings, optional
         What to do where the files leave a choice.
     select : sequence of int, optional
-        The labels that are wanted. Of a DICOM segmentation, whose segments may overlap, only these are read; any other
-        label map is read whole.
+        The labels that are wanted. Of a DICOM segmentation, or Slicer's of several layers, whose segments may overlap,
+        only these are read; any other label map is read whole.
 
     Returns
     -------
@@ -156,6 +157,8 @@ def read_volume(
         return _read_one_dicom(path, settings, select)
     if reader is _read_zip:
         return _read_zip(path, settings, select)
+    if reader is read_nrrd:
+        return read_nrrd(path, settings, select)
     if reader is None:
         raise FormatError(
             "the file is of an unknown kind",

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+ARCHIVES = (".zip", ".ozx")
+"""Suffixes of archives: zip files, and those of OME-Zarr's RFC 9, which are zip files of one image."""
+
 
 @dataclass(frozen=True)
 class Slices:

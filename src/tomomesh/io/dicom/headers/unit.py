@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ...names import shown
 from .kinds import class_of
 from .multiframe import DOSE, STORAGE
-from .names import shown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

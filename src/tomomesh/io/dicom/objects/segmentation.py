@@ -12,10 +12,10 @@ from ....errors import EmptyError, FormatError, GeometryError
 from ....model.volume import Volume
 from ...files.limits import require_memory
 from ...files.source import third_party
+from ...names import shown
 from ..headers.dataset import read_dataset
 from ..headers.header import frames_of
 from ..headers.identity import identity_of
-from ..headers.names import shown
 from ..headers.values import numbers
 from ..pixels.decoder import Decoder
 from ..pixels.tables import PALETTE
