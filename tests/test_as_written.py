@@ -125,15 +125,15 @@ def map_by_highdicom(folder: Path, stored: NDArray[Any], affine: Floats) -> Path
 
 
 STUDIES: dict[str, Writer] = {
-    "nibabel, `Nifti1Image`": by_nibabel,
-    "nibabel, `Nifti2Image`": by_nibabel_2,
+    "nibabel, NIfTI-1": by_nibabel,
+    "nibabel, NIfTI-2": by_nibabel_2,
     "nibabel, real numbers in 16 bits": scaled_by_nibabel,
     "SimpleITK, `.nii.gz`": by_simpleitk(".nii.gz"),
     "SimpleITK, `.nrrd`": by_simpleitk(".nrrd"),
     "SimpleITK, `.mha`": by_simpleitk(".mha"),
     "SimpleITK, DICOM slices": slices_by_simpleitk,
     "dcm2niix": by_dcm2niix,
-    "highdicom, `ParametricMap`": map_by_highdicom,
+    "highdicom, parametric map": map_by_highdicom,
 }
 
 
