@@ -32,7 +32,7 @@ GIVEN = ReadSettings(spacing_z=1.0, spacing=(1.0, 1.0, 1.0), fill_gaps=True, res
 """Every flag that stands in for a place."""
 
 
-def frames(affine: NDArray[np.float64], offsets: NDArray[np.float64], kind: str, **fields: Any) -> Dataset:
+def frames(affine: NDArray[np.float64], offsets: NDArray[np.floating[Any]], kind: str, **fields: Any) -> Dataset:
     """Return a file whose frames lie at offsets in mm along the normal of the first one's rows and columns."""
     normal = np.cross(affine[:3, 0], affine[:3, 1])
     normal /= np.linalg.norm(normal)
@@ -50,7 +50,7 @@ def frames(affine: NDArray[np.float64], offsets: NDArray[np.float64], kind: str,
     return data
 
 
-def dose(affine: NDArray[np.float64], offsets: NDArray[np.float64], **fields: Any) -> Dataset:
+def dose(affine: NDArray[np.float64], offsets: NDArray[np.floating[Any]], **fields: Any) -> Dataset:
     """Return a dose whose stored numbers are a fourth of the gray levels."""
     data = frames(affine, offsets, DOSE, Modality="RTDOSE", DoseUnits="GY", DoseGridScaling=0.25)
     data.FrameIncrementPointer = Tag("GridFrameOffsetVector")

@@ -16,6 +16,8 @@ from .against import compared
 from .bars import Bars
 from .batch import reconstruct_each
 from .outputs import (
+    OF_STUDIES,
+    check_archive,
     check_files,
     check_folder,
     check_frame,
@@ -96,12 +98,13 @@ def _reconstruct(chosen: Namespace) -> None:
 
 
 def _reconstruct_one(chosen: Namespace, settings: Settings) -> Surface:
-    check_outputs(chosen, io.MESH_WRITERS, *sources_of(chosen, settings))
+    check_outputs(chosen, OF_STUDIES, *sources_of(chosen, settings))
     check_frame(chosen.output, settings)
     from ..pipeline import reconstruct
 
     with Bars(quiet=chosen.quiet) as progress:
         volume, labels = read_study(chosen, settings, progress)
+        check_archive(chosen, volume)
         surface = reconstruct(volume, settings, labels=labels, progress=progress, **given_of(chosen))
         return write_surface(chosen, surface, settings, progress)
 

@@ -166,12 +166,8 @@ def solid_between(
 
     Returns
     -------
-    levels : (K, J, I) float32 array
-        Depths in pixels, over 0 inside.
-    low : (2,) float array
-        The middle of the first pixel, in the frame of the slices.
-    edge : float
-        Of a pixel.
+    (K, J, I) float32 array, (2,) float array, float
+        Depths in pixels, over 0 inside; the middle of the first pixel, in the frame of the slices; its edge.
 
     Raises
     ------

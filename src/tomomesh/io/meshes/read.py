@@ -9,6 +9,7 @@ from ...errors import EmptyError, FormatError
 from ...model.mesh import TriMesh
 from ..files.source import existing_file, reader_of, whole
 from ..finite import check_finite
+from .encapsulated import read_encapsulated
 from .ply import read_ply_mesh
 from .stl import read_stl
 from .through_trimesh import loaded
@@ -26,7 +27,8 @@ def read_mesh(path: str | Path) -> TriMesh:
     Parameters
     ----------
     path : path
-        ``.stl`` (its equal positions become one vertex), ``.ply``, ``.obj`` or ``.off``.
+        ``.stl`` and DICOM Encapsulated STL, ``.dcm`` (equal positions become one vertex), ``.ply``, ``.obj`` or
+        ``.off``.
 
     Raises
     ------
@@ -67,5 +69,6 @@ MESH_READERS: dict[str, Callable[[bytes, str], Arrays]] = {
     ".ply": read_ply_mesh,
     ".obj": partial(loaded, "obj"),
     ".off": partial(loaded, "off"),
+    ".dcm": read_encapsulated,
 }
 """Suffix to reader of vertices and faces."""

@@ -125,7 +125,7 @@ def _offsets(header: Any, count: int, height: float, up: float, name: str) -> Fl
     if distance is None or not distance[0]:
         return None
     slices = vectors["SliceVector"]
-    return distance[0] * (np.arange(count) if slices is None else slices - slices[0])
+    return np.asarray(distance[0] * (np.arange(count) if slices is None else slices - slices[0]))
 
 
 def _from_first(found: Floats, height: float, up: float, words: str, name: str) -> Floats:
