@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..contours.known import known_slices
 from ..contours.slices import find_slices
-from ..errors import EmptyError
+from ..errors import EmptyError, GeometryError
 from ..model.columns import box
 from ..results import Place
 from ..stage import Stage, timed
@@ -16,6 +16,15 @@ if TYPE_CHECKING:
     from ..contours.slices import Slices
     from ..model.points import PointSet
     from ..settings import Settings
+
+
+OWN = ("um", "mm", "cm", "m", "voxel", "unknown")
+"""Units that files of tomomesh name."""
+METERS = {
+    "in": (0.0254, "inches"), "ft": (0.3048, "feet"), "us-ft": (1200 / 3937, "US survey feet"),
+    "km": (1000.0, "kilometers"),
+}  # fmt: skip
+"""Units that other files state, to meters and words."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +60,36 @@ def take_points(cloud: PointSet, settings: Settings) -> Stage[Points]:
     """
     if len(cloud) == 0:
         raise EmptyError("there are no points", expected="at least one")
+    cloud, unit = in_unit(cloud, settings.run.units)
     lowest, _ = box(cloud.positions)
-    place = Place(settings.run.units, cloud.frame, tuple(lowest.tolist()), settings.run.local_origin)
+    place = Place(unit, cloud.frame, tuple(lowest.tolist()), settings.run.local_origin)
     if settings.run.local_origin:
         cloud = replace(cloud, positions=cloud.positions - lowest)
     slices = None
     if settings.cubes.stacks != "none":
         slices = known_slices(cloud) or find_slices(cloud.positions)
     return Stage(Points(cloud, place, slices))
+
+
+def in_unit(cloud: PointSet, asked: str | None) -> tuple[PointSet, str]:
+    """Return a cloud in a unit of `OWN`, and that unit: as asked for, else as its file states, else millimeters.
+
+    Raises
+    ------
+    GeometryError
+        For degrees, and other units that have no known length.
+    """
+    unit = asked or cloud.unit or "mm"
+    if unit in OWN:
+        return cloud, unit
+    if unit not in METERS:
+        raise GeometryError(
+            "the coordinates are no lengths that are known", found=f"unit = {unit}",
+            expected="meters, feet or another length, as of a projected coordinate system",
+            hint="--units, to take the numbers as lengths",
+        )  # fmt: skip
+    told = f"coordinates in {METERS[unit][1]} were converted to meters"
+    return replace(cloud, positions=cloud.positions * METERS[unit][0], notes=(*cloud.notes, told), unit="m"), "m"
 
 
 def place_found(points: Points) -> Stage[None]:

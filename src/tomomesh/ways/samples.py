@@ -52,7 +52,7 @@ def settle(points: Points, settings: Settings, progress: Progress) -> Stage[Samp
     _require_digits(positions)
     require_room_for_points(len(positions))
     samples = settle_points(positions - lowest_corner(points), threads=settings.run.threads, progress=progress)
-    return _samples_found(len(positions), samples, settings.run.units)
+    return _samples_found(len(positions), samples, points.place.unit)
 
 
 def _require_digits(positions: Floats) -> None:

@@ -33,7 +33,7 @@ NAMED = 4
 def surface_of_stack(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
     """Close a cloud that is a stack of contours."""
     assert points.slices is not None
-    made = surface_of_slices(points.cloud, points.slices, settings, progress, unit=settings.run.units)
+    made = surface_of_slices(points.cloud, points.slices, settings, progress, unit=points.place.unit)
     return folded(made.value, made, place_found(points))
 
 

@@ -105,7 +105,7 @@ def read_structure(path: Path, settings: CloudSettings) -> PointSet:
     taken = _chosen(structures, settings.structure, file=str(path))
     read = [_read(one, path, len(structures), settings) for one in taken]
     points = reduce(_stacked, (points for points, _ in read))
-    return replace(points, frame="LPS", notes=tuple(note for _, notes in read for note in notes))
+    return replace(points, frame="LPS", unit="mm", notes=tuple(note for _, notes in read for note in notes))
 
 
 def _read(taken: Structure, path: Path, of: int, settings: CloudSettings) -> tuple[PointSet, list[str]]:
