@@ -41,7 +41,7 @@ NAME = re.compile(r"(?P<name>.*?)[\s_]*(?:[\[(/]\s*(?P<marked>[^\])]*?)\s*[\])]?
 
 
 @dataclass(frozen=True)
-class Columns:
+class PositionColumns:
     """The columns of the positions, from 0, their unit where it is named, and what is to be told about them."""
 
     axes: tuple[int, ...] = (0, 1, 2)
@@ -49,7 +49,7 @@ class Columns:
     notes: tuple[str, ...] = ()
 
 
-def positions_among(names: Sequence[str], *, file: str) -> Columns:
+def positions_among(names: Sequence[str], *, file: str) -> PositionColumns:
     """Find the columns of the positions; the first three where there are no names, or no more than three.
 
     Raises
@@ -58,7 +58,7 @@ def positions_among(names: Sequence[str], *, file: str) -> Columns:
         Where more than three columns have names, and none say which are the positions.
     """
     if not names:
-        return Columns()
+        return PositionColumns()
     found = named_positions(names)
     if found:
         return found
@@ -67,10 +67,10 @@ def positions_among(names: Sequence[str], *, file: str) -> Columns:
             "the columns do not say which are x, y and z", file=file, found=f"columns = {', '.join(names)[:200]}",
             expected="three columns named x, y and z",
         )  # fmt: skip
-    return Columns(notes=(f"the columns {', '.join(names)} were taken as x, y and z",))
+    return PositionColumns(notes=(f"the columns {', '.join(names)} were taken as x, y and z",))
 
 
-def named_positions(names: Sequence[str]) -> Columns | None:
+def named_positions(names: Sequence[str]) -> PositionColumns | None:
     """Find the columns that names say are the positions; None where they say nothing."""
     plain, units = zip(*map(_parted, names), strict=True)
     for triple in TRIPLES:
@@ -78,7 +78,7 @@ def named_positions(names: Sequence[str]) -> Columns | None:
         if min(places) >= 0 and len(set(places)) == 3:
             named = {units[place] for place in places}
             degrees = triple[0] is LONGITUDE
-            return Columns(tuple(places), "degree" if degrees else named.pop() if len(named) == 1 else None)
+            return PositionColumns(tuple(places), "degree" if degrees else named.pop() if len(named) == 1 else None)
     return None
 
 

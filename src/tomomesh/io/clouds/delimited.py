@@ -16,7 +16,7 @@ from ..files.signature import signature
 from ..files.source import first_bytes, whole
 from ..meshes.obj import VERTEX, unfolded
 from ..text import delimiter_of, first_row, parse_rows, read_lines, typed
-from .columns import Columns, named_positions, positions_among
+from .columns import PositionColumns, named_positions, positions_among
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,13 +36,13 @@ class Table:
 
     lines: list[str]
     names: list[str]
-    columns: Columns
+    columns: PositionColumns
 
 
 def read_text(path: Path) -> Cloud:
     """Read rows of numbers; one line of names may come first, also behind ``#`` or ``//``, and a count before it.
 
-    Columns that are named as positions are (`tomomesh.io.clouds.columns`), else the first three. The other columns
+    PositionColumns that are named as positions are (`named_positions`), else the first three. The other columns
     that have a name and hold numbers are fields.
     """
     file = str(path)
@@ -52,7 +52,7 @@ def read_text(path: Path) -> Cloud:
     return rows[:, axes], _named_columns(rows, found.names, axes, first_row(found.lines))
 
 
-def columns_stated(path: Path) -> dict[str, Any]:
+def columns_frame(path: Path) -> dict[str, Any]:
     """Return the unit that the names of the columns state, and what is to be told of them."""
     lines = first_bytes(path, LONGEST_HEAD).decode("utf-8-sig", "replace").splitlines()
     columns = _table(lines, str(path)).columns
@@ -67,7 +67,7 @@ def _table(lines: list[str], file: str) -> Table:
         if names and (n == first or named_positions(names)):
             kept = [*lines[:n], "", *lines[n + 1 :]] if n == first else lines
             return Table(kept, names, positions_among(names, file=file))
-    return Table(lines, [], Columns())
+    return Table(lines, [], PositionColumns())
 
 
 def without_counts(lines: list[str], file: str) -> list[str]:

@@ -64,7 +64,7 @@ def read_las(path: Path) -> Cloud:
     return columns.pop("") * np.array([1.0, 1.0, heights]), columns
 
 
-def las_stated(path: Path) -> dict[str, Any]:
+def las_frame(path: Path) -> dict[str, Any]:
     """Return the unit of the coordinate system that a LAS or LAZ file names; None where it names none."""
     return {"unit": _meters(path)[0]}
 

@@ -16,11 +16,11 @@ from ..meshes.vtp import read_vtp
 from .arrays import read_npy, read_npz
 from .delimited import read_obj, read_text
 from .e57 import read_e57
+from .frame import frame_of_cloud
 from .las import read_las
 from .leica import read_pts, read_ptx
 from .pcd import read_pcd
 from .ply_vertices import read_ply
-from .stated import stated_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -84,7 +84,7 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
     if len(positions) == 0:
         raise EmptyError("the cloud has no points", file=str(path))
     check_finite(positions, "row", file=str(path))
-    return replace(point_set(positions, fields), **stated_of(path))
+    return replace(point_set(positions, fields), **frame_of_cloud(path))
 
 
 def _read_vertices(path: Path) -> Cloud:

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..files.source import suffix_of, whole
-from .gifti import gifti_stated
-from .glb import glb_stated
+from .gifti import gifti_frame
+from .glb import glb_frame
 from .stl import STL_HEADER_BYTES
-from .threemf import threemf_stated
-from .vtp import vtp_stated
+from .threemf import threemf_frame
+from .vtp import vtp_frame
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,11 +22,11 @@ SIGNED_BYTES = 300
 SIGNATURE = re.compile(rb"(?:^|# |comment )tomomesh ([^\r\n]*)", re.MULTILINE)
 
 
-STATED: dict[str, Callable[[bytes, str], dict[str, str]]] = {
-    ".vtp": vtp_stated,
-    ".3mf": threemf_stated,
-    ".glb": glb_stated,
-    ".gii": gifti_stated,
+FRAMES: dict[str, Callable[[bytes, str], dict[str, str]]] = {
+    ".vtp": vtp_frame,
+    ".3mf": threemf_frame,
+    ".glb": glb_frame,
+    ".gii": gifti_frame,
 }
 """Suffix to what a file's own fields state."""
 
@@ -39,7 +39,7 @@ def frame_of_file(path: str | Path) -> dict[str, str]:
     path : path
         One of `MESH_READERS`, already known to be readable. Some of these name their unit whoever wrote them.
     """
-    if (state := STATED.get(suffix_of(path))) is not None:
+    if (state := FRAMES.get(suffix_of(path))) is not None:
         return state(whole(path), str(path))
     with Path(path).open("rb") as file:
         found = SIGNATURE.search(file.read(STL_HEADER_BYTES if suffix_of(path) == ".stl" else SIGNED_BYTES))

@@ -90,7 +90,7 @@ def read_gifti(data: bytes, file: str) -> Arrays:
         return np.array(points[0].data, np.float64).reshape(-1, 3), np.array(faces[0].data, np.int64).reshape(-1, 3)
 
 
-def gifti_stated(data: bytes, file: str) -> dict[str, str]:
+def gifti_frame(data: bytes, file: str) -> dict[str, str]:
     """Return the unit and the frame: RAS millimeters, but where tomomesh wrote it of another frame."""
     from nibabel.gifti import GiftiImage
 

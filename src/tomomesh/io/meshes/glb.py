@@ -85,8 +85,8 @@ def read_glb(data: bytes, file: str) -> Arrays:
 
     Equal positions become one vertex: exporters part them where normals or textures differ.
     """
-    scene, stated = _scene(data, file)
-    meshes = [*scene.geometry.values()] if stated else scene.dump()
+    scene, named = _scene(data, file)
+    meshes = [*scene.geometry.values()] if named else scene.dump()
     parts = [mesh for mesh in meshes if hasattr(mesh, "faces")]
     first = np.cumsum([0, *(len(mesh.vertices) for mesh in parts)])
     vertices = np.concatenate([np.empty((0, 3)), *(mesh.vertices for mesh in parts)])
@@ -95,7 +95,7 @@ def read_glb(data: bytes, file: str) -> Arrays:
     return unique, numbers[np.concatenate(faces)]
 
 
-def glb_stated(data: bytes, file: str) -> dict[str, str]:
+def glb_frame(data: bytes, file: str) -> dict[str, str]:
     """Return the unit and the frame of a file: its own where tomomesh wrote it, else meters, as glTF has it."""
     return _scene(data, file)[1] or {"unit": "m"}
 

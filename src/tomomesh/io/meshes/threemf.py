@@ -140,7 +140,7 @@ def read_3mf(data: bytes, file: str) -> Arrays:
     return vertices, np.concatenate(faces)
 
 
-def threemf_stated(data: bytes, file: str) -> dict[str, str]:
+def threemf_frame(data: bytes, file: str) -> dict[str, str]:
     """Return the unit, and the frame where tomomesh wrote the file."""
     root = _root(data, file)
     found = {name: unit for unit, name in UNITS.items()} | {"inch": "in", "foot": "ft"}

@@ -84,7 +84,7 @@ def read_vtp(path: Path) -> Cloud:
     return positions, _apart(fields)
 
 
-def vtp_stated(data: bytes, file: str) -> dict[str, str]:
+def vtp_frame(data: bytes, file: str) -> dict[str, str]:
     """Return the unit and the frame of a file that tomomesh wrote; none of another's."""
     texts = PolyData.parsed(data, file).texts()
     own = texts.get("written_by", "").startswith("tomomesh")
