@@ -5,14 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..contours.axis import half_planes
 from ..contours.known import known_slices
 from ..contours.slices import find_slices
+from ..contours.turning import between_half_planes
 from ..errors import EmptyError, GeometryError
 from ..model.columns import box
 from ..results import Place
 from ..stage import Stage, timed
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ..contours.slices import Slices
     from ..model.points import PointSet
     from ..settings import Settings
@@ -37,11 +43,19 @@ class Points:
         Counted from its lowest corner, where that was asked for.
     place : Place
     slices : Slices or None
+    between : (k, 3) float array
+        Places interpolated between outlines in planes about one axis; none of any other cloud.
     """
 
     cloud: PointSet
     place: Place
     slices: Slices | None
+    between: NDArray[np.float64]
+
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """The points, and what was interpolated between them, (n + k, 3)."""
+        return np.concatenate([self.cloud.positions, self.between])
 
     @property
     def input(self) -> str:
@@ -65,10 +79,20 @@ def take_points(cloud: PointSet, settings: Settings) -> Stage[Points]:
     place = Place(unit, cloud.frame, tuple(lowest.tolist()), settings.run.local_origin)
     if settings.run.local_origin:
         cloud = replace(cloud, positions=cloud.positions - lowest)
-    slices = None
-    if settings.cubes.stacks != "none":
-        slices = known_slices(cloud) or find_slices(cloud.positions)
-    return Stage(Points(cloud, place, slices))
+    stacked = settings.cubes.stacks != "none"
+    slices = known_slices(cloud) or find_slices(cloud.positions) if stacked else None
+    if slices or not stacked or settings.cubes.open or settings.fit.attraction == "nearest":
+        return Stage(Points(cloud, place, slices, np.empty((0, 3))))
+    return Stage(Points(*_turned_about(cloud, place)))
+
+
+def _turned_about(cloud: PointSet, place: Place) -> tuple[PointSet, Place, None, NDArray[np.float64]]:
+    """Interpolate between planes about an axis, where a cloud lies in such, and note that in the cloud."""
+    found = half_planes(cloud.positions)
+    if found is None:
+        return cloud, place, None, np.empty((0, 3))
+    told = f"the points lie in {len(found.angles) // 2} planes about one axis: what is between is interpolated"
+    return replace(cloud, notes=(*cloud.notes, told)), place, None, between_half_planes(found)
 
 
 def in_unit(cloud: PointSet, asked: str | None) -> tuple[PointSet, str]:
