@@ -25,8 +25,8 @@ the nearest point may be of another plane."""
 TWINS = 1e-6
 """Sampling distances within which two points count as one, as where planes meet: the step between tells nothing."""
 MEET = 0.35
-"""Farthest that most lines may pass from the axis, as the sine of their angle to its plane times their distance from it:
-a noise of a quarter of the sampling distance leaves .2 (measured), lines in all directions .78."""
+"""Farthest that most lines may pass from the axis, times the sine of their angle to it, in extents of the cloud: a
+noise of a quarter of the sampling distance leaves .2 (measured), lines in all directions .78."""
 SLANTED = 0.1
 """Least length of the axis beside its moment, in extents of the cloud: planes that are parallel meet at infinity."""
 NEAR = 2.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..contours.axis import half_planes
 from ..contours.known import known_slices
-from ..contours.slices import find_slices
+from ..contours.slices import find_slices, one_slice
 from ..contours.turning import between_half_planes
 from ..errors import EmptyError, GeometryError
 from ..model.columns import box
@@ -80,10 +80,16 @@ def take_points(cloud: PointSet, settings: Settings) -> Stage[Points]:
     if settings.run.local_origin:
         cloud = replace(cloud, positions=cloud.positions - lowest)
     stacked = settings.cubes.stacks != "none"
-    slices = known_slices(cloud) or find_slices(cloud.positions) if stacked else None
+    slices = _slices(cloud, settings.cloud.thickness) if stacked else None
     if slices or not stacked or settings.cubes.open or settings.fit.attraction == "nearest":
         return Stage(Points(cloud, place, slices, np.empty((0, 3))))
     return Stage(Points(*_turned_about(cloud, place)))
+
+
+def _slices(cloud: PointSet, thickness: float | None) -> Slices | None:
+    """Return the slices of a stack of contours, or the only one, where it was given a thickness; else None."""
+    found = known_slices(cloud, thickness) or find_slices(cloud.positions)
+    return found or (one_slice(cloud.positions, thickness) if thickness else None)
 
 
 def _turned_about(cloud: PointSet, place: Place) -> tuple[PointSet, Place, None, NDArray[np.float64]]:

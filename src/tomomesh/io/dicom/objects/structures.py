@@ -119,7 +119,7 @@ def _read(taken: Structure, path: Path, of: int, settings: CloudSettings) -> tup
         points = _points(corners, np.zeros(len(corners), np.int64), _side(corners) / FINE, file=str(path))
         points = PointSet.from_positions(points.positions)
     else:
-        planes = planes_of(corners, file=str(path))
+        planes = planes_of(corners, file=str(path), thickness=settings.thickness)
         notes = [f"{told} on {planes.slices} slices"]
         points = _points(corners, planes.labels, planes.apart, file=str(path))
         number = np.full(len(points), taken.number, np.int32)
