@@ -110,8 +110,8 @@ class TestStated:
         assert unit_taken(read_points(tmp_path / "c.las"), units="m")[0] == "m"
 
     @pytest.mark.parametrize(("head", "unit"), [
-        ("X [m];Y [m];Z [m]", "m"), ("x_cm;y_cm;z_cm", "cm"), ("East (ft);North (ft);Height (ft)", "ft"), ("x;y;z", None),
-        ("lon;lat;alt", "degree"), ("x_mm;y_mm;z_cm", None),
+        ("X [m];Y [m];Z [m]", "m"), ("x_cm;y_cm;z_cm", "cm"), ("East (ft);North (ft);Height (ft)", "ft"),
+        ("x;y;z", None), ("lon;lat;alt", "degree"), ("x_mm;y_mm;z_cm", None),
     ])  # fmt: skip
     def test_by_the_names_of_columns(self, tmp_path: Path, head: str, unit: str | None) -> None:
         (tmp_path / "c.csv").write_text(f"{head}\n1;2;3\n")
@@ -139,7 +139,7 @@ class TestDoors:
 
     @pytest.mark.parametrize("frame", ["lps", "ras"])
     def test_points_of_a_study_come_back_to_its_place(self, tmp_path: Path, frame: str) -> None:
-        study = write_nifti(tmp_path / "s.nii", ball())
+        study = write_nifti(tmp_path / "s.nii", ball(), np.diag([1.0, 1.2, 0.9, 1]))
         points, mesh = str(tmp_path / "seg.ply"), str(tmp_path / "m.gii")
         assert main(["segment", str(study), "--lower", "50", "-o", points, "--frame", frame, "--quiet"]) == 0
         assert main(["surface", points, "-o", mesh, "--quiet"]) == 0
