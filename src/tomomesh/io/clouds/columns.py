@@ -72,7 +72,7 @@ def positions_among(names: Sequence[str], *, file: str) -> PositionColumns:
 
 def named_positions(names: Sequence[str]) -> PositionColumns | None:
     """Find the columns that names say are the positions; None where they say nothing."""
-    plain, units = zip(*map(_parted, names), strict=True)
+    plain, units = [_parted(name)[0] for name in names], [_parted(name)[1] for name in names]
     for triple in TRIPLES:
         places = [next((n for n, name in enumerate(plain) if name in words), -1) for words in triple]
         if min(places) >= 0 and len(set(places)) == 3:

@@ -64,7 +64,7 @@ def _table(lines: list[str], file: str) -> Table:
     first = next((n for n, line in enumerate(lines) if line.split("#")[0].strip()), len(lines))
     for n in (*range(first), *((first,) if first < len(lines) else ())):
         names = _names(lines[n])
-        if names and (n == first or named_positions(names)):
+        if named_positions(names) or (names and n == first):
             kept = [*lines[:n], "", *lines[n + 1 :]] if n == first else lines
             return Table(kept, names, positions_among(names, file=file))
     return Table(lines, [], PositionColumns())
@@ -90,9 +90,10 @@ def without_counts(lines: list[str], file: str) -> list[str]:
                 expected="as many as it says",
             )  # fmt: skip
         kept[at], at = "", _next_row(kept, at + 1)
-        if at < len(kept) and _is_comment(kept[at]):
+        behind = kept[at] if at < len(kept) else ""
+        if behind and _is_comment(behind):
             kept[at], at = "", _next_row(kept, at + 1)
-        end = at + int(word)
+        end = at + int(word) + bool(named_positions(_names(behind)))
         require_rows(int(word), sum(map(bool, map(str.strip, kept[at:end]))), "rows", file=file)
         at = _next_row(kept, end)
     return kept
@@ -106,9 +107,7 @@ def _next_row(lines: list[str], start: int) -> int:
 def _is_comment(line: str) -> bool:
     """Tell whether a line behind a count is words that name no positions."""
     names = _names(line)
-    return not (names and named_positions(names)) and not _is_number(
-        line.replace(",", " ").replace(";", " ").split()[0]
-    )
+    return not named_positions(names) and not _is_number(line.replace(",", " ").replace(";", " ").split()[0])
 
 
 def _names(line: str) -> list[str]:
@@ -123,7 +122,7 @@ def _names(line: str) -> list[str]:
 
 def _is_number(word: str) -> bool:
     try:
-        float(word)
+        float(word.replace(",", "."))
     except ValueError:
         return False
     return True

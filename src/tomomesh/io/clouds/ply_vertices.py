@@ -107,7 +107,7 @@ def _rows(data: bytes, start: int, element: PlyElement, order: str, file: str) -
     except (KeyError, IndexError, ValueError):
         raise FormatError("the lists cannot be understood", file=file, expected="whole numbers as lengths") from None
     end = row_starts(
-        np.frombuffer(data, np.uint8), start, np.array([kind.itemsize for kind in kinds]), np.array(items),
+        np.array(np.frombuffer(data, np.uint8)), start, np.array([kind.itemsize for kind in kinds]), np.array(items),
         np.array([kind.kind == "i" for kind in kinds]), order == ">", starts,
     )  # fmt: skip
     if end < 0:
