@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from _pytest.capture import CaptureFixture
     from numpy.typing import NDArray
 
-WRITTEN = ["ply", "stl", "obj", "off", "glb", "vtp", "3mf", "gii"]
+WRITTEN = ["ply", "stl", "obj", "glb", "vtp", "3mf", "gii"]
 
 
 def sphere(radius: float = 3.0, count: int = 1500) -> NDArray[np.float64]:

@@ -12,7 +12,6 @@ from ...model.points import COLORS
 from ..fields import AXES, IDS, flat_columns
 from ..files.atomic import replacing
 from ..files.limits import require_rows
-from ..files.signature import signature
 from ..files.source import first_bytes, whole
 from ..meshes.obj import VERTEX, unfolded
 from ..text import delimiter_of, first_row, parse_rows, read_lines, typed
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
 
     from ...model.points import PointSet
     from ..fields import Cloud, Fields
+    from ..meshes.attributes import MeshAttributes
 
 LONGEST_HEAD = 1 << 16
 """Bytes at the beginning of a text in which its names are looked for."""
@@ -42,7 +42,7 @@ class Table:
 def read_text(path: Path) -> Cloud:
     """Read rows of numbers; one line of names may come first, also behind ``#`` or ``//``, and a count before it.
 
-    PositionColumns that are named as positions are (`named_positions`), else the first three. The other columns
+    Columns that are named as positions are (`named_positions`), else the first three. The other columns
     that have a name and hold numbers are fields.
     """
     file = str(path)
@@ -149,15 +149,15 @@ def read_obj(path: Path) -> Cloud:
     return rows[:, :3], dict(zip(COLORS, colors, strict=False))
 
 
-def write_xyz(points: PointSet, path: str | Path, unit: str, frame: str) -> None:
+def write_xyz(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
     """Write positions under a comment."""
     rows = (f"{x!r} {y!r} {z!r}" for x, y, z in points.positions.tolist())
-    _write_lines(path, [f"# {signature(unit, frame)}", *rows])
+    _write_lines(path, [f"# {beside.head}", *rows])
 
 
-def write_csv(points: PointSet, path: str | Path, unit: str, frame: str) -> None:
+def write_csv(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
     """Write positions, ids and attributes under a line of names."""
-    head = [axis if unit == "unknown" else f"{axis}_{unit}" for axis in AXES]
+    head = [axis if beside.unit == "unknown" else f"{axis}_{beside.unit}" for axis in AXES]
     others = flat_columns(points.attributes, len(points), [*AXES, *head, *IDS])
     ids = (points.slices, points.neurons, points.kinds)
     columns: list[NDArray[Any]] = [*points.positions.T, *ids, *others.values()]

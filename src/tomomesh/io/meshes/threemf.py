@@ -1,5 +1,7 @@
 """3MF: the zip of XML that slicers for 3D printing read.
 
+In millimeters always: Slic3r, OpenSCAD and assimp pass over the unit that a model names.
+
 Written with the standard library: it is one text in a zip with two fixed companions. trimesh's exporter stamps the time
 and random ids into the file, and lib3mf is a compiled library; it judges what is written here in the tests.
 """
@@ -8,6 +10,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from dataclasses import replace
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
@@ -20,6 +23,7 @@ from ..files.atomic import replacing
 from ..files.limits import require_memory
 from ..files.markup import parsed_xml
 from ..files.source import third_party
+from .attributes import MM
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -31,9 +35,6 @@ if TYPE_CHECKING:
     from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
     from .through_trimesh import Arrays
-
-UNITS = {"um": "micron", "mm": "millimeter", "cm": "centimeter", "m": "meter"}
-"""Units to the names that 3MF has for them."""
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 MATERIAL = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
@@ -58,6 +59,9 @@ FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 COLORS_ID, MESH_ID = 1, 2
 """Numbers of the two resources of a file; any will do."""
 
+UNITS = {"micron": "um", "millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"}
+"""The names that 3MF has for units to ours."""
+
 MOST_PIECES = 1 << 16
 """Objects that a file may build, those within others counted each time: they could double from object to object."""
 
@@ -66,22 +70,23 @@ IDENTITY, TRIPLE = "1 0 0 0 1 0 0 0 1 0 0 0", ("v1", "v2", "v3")
 
 
 def write_3mf(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write one object of 64-bit coordinates, with colors at its corners where there are any.
+    """Write one object of 64-bit coordinates in millimeters, with colors at its corners where there are any.
 
     Raises
     ------
     OutputError
         For coordinates of an unknown unit: 3MF has none without.
     """
-    if beside.unit not in UNITS:
+    if beside.unit not in MM:
         raise OutputError(
             "a 3MF file names a unit, and that of the coordinates is unknown",
             file=str(path),
             found=f"unit = {beside.unit}",
-            expected=" | ".join(UNITS),
+            expected=" | ".join(MM),
             hint="--units",
         )
-    members = {**COMPANIONS, "3D/3dmodel.model": "".join(_model(mesh, beside))}
+    sized = mesh.moved(MM[beside.unit] * mesh.vertices)
+    members = {**COMPANIONS, "3D/3dmodel.model": "".join(_model(sized, replace(beside, unit="mm")))}
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in members.items():
             entry = zipfile.ZipInfo(name, FIRST_DAY)
@@ -92,7 +97,7 @@ def write_3mf(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
 def _model(mesh: TriMesh, beside: MeshAttributes) -> Iterator[str]:
     colors = named_colors(beside.vertex_fields)
     palette, numbers = np.unique(colors[1], axis=0, return_inverse=True) if colors else (None, np.zeros(0, np.int64))
-    yield f'{DECLARATION}<model unit="{UNITS[beside.unit]}" xml:lang="en-US" xmlns="{CORE}" xmlns:m="{MATERIAL}">\n'
+    yield f'{DECLARATION}<model unit="millimeter" xml:lang="en-US" xmlns="{CORE}" xmlns:m="{MATERIAL}">\n'
     yield f'<metadata name="Application">tomomesh</metadata>\n<metadata name="Description">{beside.head}</metadata>\n'
     yield "<resources>\n"
     if palette is not None:
@@ -143,10 +148,9 @@ def read_3mf(data: bytes, file: str) -> Arrays:
 def threemf_frame(data: bytes, file: str) -> dict[str, str]:
     """Return the unit, and the frame where tomomesh wrote the file."""
     root = _root(data, file)
-    found = {name: unit for unit, name in UNITS.items()} | {"inch": "in", "foot": "ft"}
     told = next((one.text or "" for one in root.iter(f"{{{CORE}}}metadata") if one.get("name") == "Description"), "")
     frame = [word.removeprefix("frame=") for word in told.split() if word.startswith("frame=")]
-    unit = {"unit": found.get(root.get("unit", "millimeter"), "mm")}
+    unit = {"unit": UNITS.get(root.get("unit", "millimeter"), "mm")}
     return unit | ({"frame": frame[0]} if told.startswith("tomomesh") and frame else {})
 
 

@@ -16,6 +16,7 @@ from ..colors import named_colors
 from ..fields import IDS, doubles, flat_columns
 from ..files.atomic import replacing
 from ..files.source import whole
+from .attributes import narrowed
 from .obj import fans
 from .vtk_arrays import TYPES, PolyData
 
@@ -40,7 +41,7 @@ PARTS = ("Verts", "Lines", "Strips", "Polys")
 
 
 def write_vtp_mesh(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write a mesh of 64-bit coordinates with all its fields; colors are one array named ``RGB``."""
+    """Write a mesh with all its fields, of 64-bit coordinates unless asked else; colors are one array named ``RGB``."""
     point_data, cell_data = _arrays(beside.vertex_fields), _arrays(beside.face_fields)
     _write(path, beside, mesh.vertices, "Polys", mesh.faces, point_data, cell_data)
 
@@ -145,7 +146,7 @@ def _write(
                 f'<Piece NumberOfPoints="{len(positions)}"{counts}>',
                 *_section("PointData", point_data),
                 *_section("CellData", cell_data),
-                *_section("Points", {"Points": positions}),
+                *_section("Points", {"Points": narrowed(positions, single=beside.single)}),
                 *(line for name in PARTS for line in _cells(name, cells if name == part else cells[:0])),
                 "</Piece>",
                 "</PolyData>",
