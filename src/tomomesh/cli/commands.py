@@ -30,7 +30,7 @@ from .outputs import (
     write_stage_one,
     write_surface,
 )
-from .parts import frame_of_mesh, frame_of_part, turned
+from .parts import frame_of_mesh, frame_of_part
 from .sources import gathered, read_study, sources_of
 from .streams import streamed
 
@@ -216,7 +216,7 @@ def _check(chosen: Namespace) -> None:
         report |= {key: found.pop(key) for key in [*found] if key == "dice" or key.endswith("_mm")}
         report["against"] = found
     if chosen.print_check:
-        from ..printing.part import MM, resized
+        from ..printing.part import MM, resized, turned
         from ..printing.verdict import verdict
 
         named = frame_of_mesh(chosen.mesh)
@@ -230,7 +230,7 @@ def _check(chosen: Namespace) -> None:
 def _print(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     check_outputs(chosen, io.MESH_WRITERS, chosen.mesh)
-    from ..printing.part import make_part
+    from ..printing.part import make_part, turned
 
     with Bars(quiet=chosen.quiet) as progress:
         mesh = io.read_mesh(chosen.mesh)

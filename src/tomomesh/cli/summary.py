@@ -22,7 +22,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
     """Say what was reconstructed, and how good it is."""
     quality = report["quality"]
     unit = unit_in_words(report)
-    shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
+    shape = "closed and manifold" if quality["sound"] else "NOT closed and manifold"
     shape = shape if quality["closed"] else "a manifold sheet"
     lines = [
         *_of_far(report),
