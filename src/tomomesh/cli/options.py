@@ -35,7 +35,7 @@ TOLD = ("completion", "man")
 SHELLS = ("bash", "zsh", "fish", "tcsh")
 
 
-CUTS = ("scale", "flat_base", "hollow", "drain")
+CUTS = ("scale", "flat_base", "one_piece", "fill_cavities", "thicken", "hollow", "drain")
 """Parameters that change a part."""
 MESH_ONLY = ("local_origin", "smooth", "allow_far", "remesh", "edge", "target_faces")
 """Parameters of the run that matter to meshes alone."""
