@@ -184,7 +184,8 @@ class TestOtherCommands:
         assert main(["check", str(tmp_path / "good.ply"), "--against", str(tmp_path / "good.ply")]) == 0
         said = capsys.readouterr().out
         assert "closed, manifold, outward" in said
-        assert "to the other: mean 0" in said or re.search(r"mean \d(\.\d+)?e-", said)
+        assert "against   the other: Dice 1.0000" in said
+        assert re.search(r"mean +95 % +largest\n +to the other +(0|\d(\.\d+)?e-\d+) ", said)
         assert main(["check", str(tmp_path / "bad.ply")]) == 0
         assert "NOT sound: 3 boundary edges" in capsys.readouterr().out
 
