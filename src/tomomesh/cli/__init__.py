@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 from . import shell
 from .faults import as_error, is_full
-from .options import TOLD, build_parser, joined
+from .options import TOLD, build_parser
+from .parameter_options import joined
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

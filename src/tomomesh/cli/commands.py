@@ -14,6 +14,7 @@ from ..settings import Settings, option_of, parameters
 from . import summary
 from .bars import Bars
 from .batch import reconstruct_each
+from .faults import require_kind
 from .outputs import (
     check_files,
     check_folder,
@@ -28,7 +29,7 @@ from .outputs import (
     write_surface,
 )
 from .parts import frame_of_mesh, frame_of_part, turned
-from .sources import compared, gathered, read_study, sources_of
+from .sources import compared, gathered, numbered, read_study, sources_of
 from .streams import streamed
 
 if TYPE_CHECKING:
@@ -41,7 +42,8 @@ if TYPE_CHECKING:
 def run(chosen: Namespace) -> None:
     """Run the command that was parsed."""
     with streamed(gathered(chosen)) as named:
-        _COMMANDS[named.command](named)
+        require_kind(named)
+        _COMMANDS[named.command](numbered(named))
 
 
 def settings_of(chosen: Namespace) -> Settings:

@@ -11,6 +11,7 @@ from .. import __version__
 from ..errors import UsageError
 from ..settings import Settings, option_of, parameters
 from ..ways import WAYS
+from .faults import likely_command, likely_option
 from .formats import (
     CHECKED,
     CLOUD,
@@ -23,7 +24,7 @@ from .formats import (
     STUDY,
     STUDY_FORMATS,
 )
-from .parameter_options import FIXED, LISTED, SEVERAL, add_parameter
+from .parameter_options import add_parameter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,10 +53,31 @@ class _Parser(argparse.ArgumentParser):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(allow_abbrev=False, **kwargs)
+        self.commands: dict[str, argparse.ArgumentParser] = {}
 
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing a page and leaving."""
         raise UsageError(message, hint=f"`{self.prog} --help`")
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse; of an option or a command that there is not, say which was likely meant."""
+        words = list(args or ())
+        commands = [*self.commands]
+        if words and not words[0].startswith("-") and words[0] not in commands:
+            meant = likely_command(words[0], commands)
+            raise UsageError(
+                "there is no such command", found=words[0], expected=" | ".join(commands),
+                hint=meant or f"`{self.prog} --help`",
+            )  # fmt: skip
+        found, unknown = self.parse_known_args(words, namespace)
+        if unknown:
+            own = self.commands[found.command]
+            meant = likely_option(unknown[0], own._option_string_actions) if unknown[0].startswith("-") else ""
+            given = unknown[0].partition("=")
+            value = f"={given[2]}" if given[1] else "".join(f" {word}" for word in unknown[1:2])
+            said = f"unrecognized arguments: {' '.join(unknown)}"
+            raise UsageError(said, hint=f"{meant}{value}" if meant else f"`{own.prog} --help`")
+        return found
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -155,54 +177,8 @@ def build_parser() -> argparse.ArgumentParser:
     completion = _command(commands, "completion", "the script that completes commands and options in a shell")
     completion.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
     _command(commands, "man", "the manual page, for man and groff")
+    parser.commands = dict(commands.choices)
     return parser
-
-
-def joined(arguments: Sequence[str]) -> list[str]:
-    """Take the numbers after an option with spaces or with commas between them.
-
-    Those of an option that takes one number or several become one word, so that a file may follow them; those of an
-    option that takes a fixed count become as many.
-    """
-    words: list[str] = []
-    for word in arguments:
-        option, _, values = words[-1].partition("=") if words else ("", "", "")
-        own, _, listed = word.partition("=")
-        if option in SEVERAL and values.count(",") < 2 and _is_number(word):
-            words[-1] = f"{option}={values},{word}" if values else f"{option}={word}"
-        elif option in LISTED and not values and _are_numbers(word):
-            words[-1] = f"{option}={word}"  # a list that begins with a minus would look like an option
-        elif own in FIXED and _are_numbers(listed):
-            words += [own, *_listed(listed)]
-        elif "," in word and _are_numbers(word) and _takes_more(words):
-            words += _listed(word)
-        else:
-            words.append(word)
-    return words
-
-
-def _takes_more(words: Sequence[str]) -> bool:
-    """Tell whether the last option takes more numbers than it has."""
-    numbers = 0
-    while numbers < len(words) and _is_number(words[-1 - numbers]):
-        numbers += 1
-    return numbers < len(words) and numbers < FIXED.get(words[-1 - numbers], 0)
-
-
-def _listed(word: str) -> list[str]:
-    return [part for part in word.split(",") if part.strip()]
-
-
-def _are_numbers(word: str) -> bool:
-    return bool(_listed(word)) and all(map(_is_number, _listed(word)))
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _command(commands: Any, name: str, text: str, *, epilog: str | None = None) -> argparse.ArgumentParser:
