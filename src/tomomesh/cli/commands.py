@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from argparse import Namespace
 from dataclasses import fields, replace
 from pathlib import Path
@@ -265,7 +266,8 @@ def _shown(chosen: Namespace) -> str:
 
 def _tell(chosen: Namespace, report: dict[str, Any], lines: list[str]) -> None:
     if chosen.json or not chosen.quiet:
-        _say(report, None if chosen.json else lines)
+        spent = f", computed in {time.perf_counter() - chosen.begun:.2f} s, reading and writing included"
+        _say(report, None if chosen.json else [line + spent * line.startswith("written ") for line in lines])
 
 
 def _say(report: dict[str, Any], lines: list[str] | None) -> None:

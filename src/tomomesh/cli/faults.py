@@ -25,7 +25,7 @@ USUAL = {
     "keep": ("keep-largest", "largest-component", "lcc"),
     "edge": ("edge-length", "mesh-size", "max-edge"),
     "threads": ("jobs", "cores", "workers", "n-jobs"),
-    "neurons": ("nodes", "n-neurons", "units"),
+    "neurons": ("nodes", "n-neurons"),
     "epochs": ("iter", "n-iter"),
     "spacing": ("pixel-size", "voxel-spacing"),
     "report": ("log", "stats"),
