@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from argparse import Namespace
 from dataclasses import fields, replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from . import summary
 from .against import compared
 from .bars import Bars
 from .batch import reconstruct_each
+from .faults import require_kind
 from .outputs import (
     OF_STUDIES,
     check_archive,
@@ -31,7 +33,7 @@ from .outputs import (
     write_surface,
 )
 from .parts import frame_of_mesh, frame_of_part
-from .sources import gathered, read_study, sources_of
+from .sources import gathered, numbered, read_study, sources_of
 from .streams import streamed
 
 if TYPE_CHECKING:
@@ -44,7 +46,8 @@ if TYPE_CHECKING:
 def run(chosen: Namespace) -> None:
     """Run the command that was parsed."""
     with streamed(gathered(chosen)) as named:
-        _COMMANDS[named.command](named)
+        require_kind(named)
+        _COMMANDS[named.command](numbered(named))
 
 
 def settings_of(chosen: Namespace) -> Settings:
@@ -267,7 +270,8 @@ def _shown(chosen: Namespace) -> str:
 
 def _tell(chosen: Namespace, report: dict[str, Any], lines: list[str]) -> None:
     if chosen.json or not chosen.quiet:
-        _say(report, None if chosen.json else lines)
+        spent = f", computed in {time.perf_counter() - chosen.begun:.2f} s, reading and writing included"
+        _say(report, None if chosen.json else [line + spent * line.startswith("written ") for line in lines])
 
 
 def _say(report: dict[str, Any], lines: list[str] | None) -> None:

@@ -178,7 +178,7 @@ def solid_between(
         Where fewer than two slices enclose anything.
     """
     drawn, found = _drawn(np.empty((0, 3)), slices, False, threads, progress)
-    stack = _stack(drawn, found, slices, slices.spacing)
+    stack = _stack(drawn, found, slices, slices.spacing, None)
     return _levels(stack, threads, progress, heights), stack.low[:2], stack.edge
 
 
