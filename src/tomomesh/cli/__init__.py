@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
@@ -53,7 +54,9 @@ def _told(arguments: Sequence[str]) -> int:
 
 def _run(arguments: Sequence[str]) -> int:
     try:
+        begun = time.perf_counter()
         chosen = build_parser().parse_args(joined(arguments))
+        chosen.begun = begun
         if chosen.command in TOLD:
             shell.tell(chosen)
             return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from argparse import Namespace
 from dataclasses import fields, replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from . import summary
 from .against import compared, is_mesh
 from .bars import Bars
 from .batch import reconstruct_each
+from .faults import require_kind
 from .outputs import (
     OF_STUDIES,
     check_archive,
@@ -30,8 +32,8 @@ from .outputs import (
     write_stage_one,
     write_surface,
 )
-from .parts import frame_of_mesh, frame_of_part, turned
-from .sources import gathered, read_study, sources_of
+from .parts import frame_of_mesh, frame_of_part
+from .sources import gathered, numbered, read_study, sources_of
 from .streams import streamed
 
 if TYPE_CHECKING:
@@ -44,7 +46,8 @@ if TYPE_CHECKING:
 def run(chosen: Namespace) -> None:
     """Run the command that was parsed."""
     with streamed(gathered(chosen)) as named:
-        _COMMANDS[named.command](named)
+        require_kind(named)
+        _COMMANDS[named.command](numbered(named))
 
 
 def settings_of(chosen: Namespace) -> Settings:
@@ -216,7 +219,7 @@ def _check(chosen: Namespace) -> None:
         report |= {key: found.pop(key) for key in [*found] if key == "dice" or key.endswith("_mm")}
         report["against"] = found
     if chosen.print_check:
-        from ..printing.part import MM, resized
+        from ..printing.part import MM, resized, turned
         from ..printing.verdict import verdict
 
         named = frame_of_mesh(chosen.mesh)
@@ -230,7 +233,7 @@ def _check(chosen: Namespace) -> None:
 def _print(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     check_outputs(chosen, io.MESH_WRITERS, chosen.mesh)
-    from ..printing.part import make_part
+    from ..printing.part import make_part, turned
 
     with Bars(quiet=chosen.quiet) as progress:
         mesh = io.read_mesh(chosen.mesh)
@@ -267,7 +270,8 @@ def _shown(chosen: Namespace) -> str:
 
 def _tell(chosen: Namespace, report: dict[str, Any], lines: list[str]) -> None:
     if chosen.json or not chosen.quiet:
-        _say(report, None if chosen.json else lines)
+        spent = f", computed in {time.perf_counter() - chosen.begun:.2f} s, reading and writing included"
+        _say(report, None if chosen.json else [line + spent * line.startswith("written ") for line in lines])
 
 
 def _say(report: dict[str, Any], lines: list[str] | None) -> None:

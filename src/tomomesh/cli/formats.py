@@ -12,8 +12,11 @@ STUDY_MESH_FORMATS = (*MESH_FORMATS, "dcm")
 """Meshes of a study: DICOM Encapsulated STL too."""
 POINT_FORMATS = ("ply", "xyz", "csv", "npy", "vtp")
 LABEL_FORMATS = ("nii", "nii.gz")
-CHECKED_FORMATS = ("stl", "ply", "obj", "off", "dcm")
-CLOUD_FORMATS = ("ply", "xyz", "txt", "csv", "npy", "npz", "pcd", "las", "laz", "e57", "obj", "off", "stl")
+CHECKED_FORMATS = ("stl", "ply", "obj", "off", "vtp", "3mf", "glb", "gii", "dcm")
+CLOUD_FORMATS = (
+    "ply", "xyz", "txt", "csv", "npy", "npz", "pcd", "las", "laz", "e57", "obj", "off", "stl", "3mf", "glb", "gii",
+    "vtp", "asc", "pts", "ptx",
+)  # fmt: skip
 STUDY_FORMATS = ("nii", "nii.gz", "nrrd", "mha", "mgh", "mgz", "npy", "tif", "tiff", "dcm", "ima", "zip", "ozx")
 """Single files that hold a whole study."""
 HEADER_FORMATS = ("nhdr", "mhd", "hdr", "hdr.gz", "img", "img.gz")

@@ -11,6 +11,7 @@ from .. import __version__
 from ..errors import UsageError
 from ..settings import Settings, option_of, parameters
 from ..ways import WAYS
+from .faults import likely_command, likely_option
 from .formats import (
     CHECKED,
     CLOUD,
@@ -37,7 +38,7 @@ TOLD = ("completion", "man")
 SHELLS = ("bash", "zsh", "fish", "tcsh")
 
 
-CUTS = ("scale", "flat_base", "hollow", "drain")
+CUTS = ("scale", "flat_base", "one_piece", "fill_cavities", "thicken", "hollow", "drain")
 """Parameters that change a part."""
 MESH_ONLY = ("local_origin", "smooth", "allow_far", "remesh", "edge", "target_faces")
 """Parameters of the run that matter to meshes alone."""
@@ -54,10 +55,31 @@ class _Parser(argparse.ArgumentParser):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(allow_abbrev=False, **kwargs)
+        self.commands: dict[str, argparse.ArgumentParser] = {}
 
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing a page and leaving."""
         raise UsageError(message, hint=f"`{self.prog} --help`")
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse; of an option or a command that there is not, say which was likely meant."""
+        words = list(args or ())
+        commands = [*self.commands]
+        if words and not words[0].startswith("-") and words[0] not in commands:
+            meant = likely_command(words[0], commands)
+            raise UsageError(
+                "there is no such command", found=words[0], expected=" | ".join(commands),
+                hint=meant or f"`{self.prog} --help`",
+            )  # fmt: skip
+        found, unknown = self.parse_known_args(words, namespace)
+        if unknown:
+            own = self.commands[found.command]
+            meant = likely_option(unknown[0], own._option_string_actions) if unknown[0].startswith("-") else ""
+            given = unknown[0].partition("=")
+            value = f"={given[2]}" if given[1] else "".join(f" {word}" for word in unknown[1:2])
+            said = f"unrecognized arguments: {' '.join(unknown)}"
+            raise UsageError(said, hint=f"{meant}{value}" if meant else f"`{own.prog} --help`")
+        return found
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -159,6 +181,7 @@ def build_parser() -> argparse.ArgumentParser:
     completion = _command(commands, "completion", "the script that completes commands and options in a shell")
     completion.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
     _command(commands, "man", "the manual page, for man and groff")
+    parser.commands = dict(commands.choices)
     return parser
 
 

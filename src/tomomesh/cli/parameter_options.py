@@ -34,77 +34,6 @@ LISTED = tuple(option_of(entry.name) for _, entry in parameters() if entry.metad
 """Options that take one number, or several with commas between."""
 
 
-def add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
-    """Add the option of a parameter to a group of options."""
-    meta, options, name = entry.metadata, spellings(entry.name), entry.name
-    if meta["kind"] is bool:
-        action = "store_false" if entry.default else "store_true"
-        text = (f"do not {meta['help']}" if entry.default else meta["help"]).replace("%", "%%")
-        group.add_argument(asked_by(entry), dest=name, action=action, default=argparse.SUPPRESS, help=text)
-        return
-    one_or_three, many = options[0] in SEVERAL, meta["length"] == MANY
-    listed = meta["length"] == LAYERS
-    several = meta["length"][0] if meta["length"] and not (one_or_three or many or listed) else None
-    group.add_argument(
-        *options,
-        dest=name,
-        type=_numbers if one_or_three or listed else _whole_numbers if many else _kind(meta),
-        nargs=several,
-        choices=meta["choices"] or None,
-        metavar=None if meta["choices"] else _metavar(name, meta),
-        default=argparse.SUPPRESS,
-        help=_help(entry),
-    )
-
-
-def _kind(meta: Any) -> Any:
-    """Return what takes the text of one value; a word that a number may have in its place is left to the settings."""
-    if not meta["auto"]:
-        return meta["kind"]
-
-    def number(text: str) -> Any:
-        return text if text == "auto" else meta["kind"](text)
-
-    number.__name__ = meta["kind"].__name__
-    return number
-
-
-def _metavar(name: str, meta: Any) -> Any:
-    if meta["length"] in (MANY, LAYERS):
-        return "N[,N...]" if meta["length"] == MANY else "X[,X...]"
-    if meta["length"] in ((), (1, 3)):
-        return "X [Y Z]" if meta["length"] else {int: "N", float: "X", str: "NAME"}[meta["kind"]]
-    if meta["metavar"]:
-        return meta["metavar"]
-    return (
-        tuple(name[0].upper() + str(n) for n in range(meta["length"][0])) if meta["length"] == (2,) else ("X", "Y", "Z")
-    )
-
-
-def _help(entry: Field[Any]) -> str:
-    """Put a parameter's text, unit, limits and default into one line."""
-    meta, default = entry.metadata, entry.default
-    if isinstance(default, tuple):
-        default = " ".join(f"{value:g}" for value in default)
-    facts = [meta["unit"], "" if meta["choices"] else limits_of(entry)]
-    facts += [] if default is None else [f"default {default:g}" if isinstance(default, float) else f"default {default}"]
-    told = "; ".join(fact for fact in facts if fact)
-    return (f"{meta['help']} ({told})" if told else str(meta["help"])).replace("%", "%%")
-
-
-def _whole_numbers(text: str) -> tuple[int, ...]:
-    return tuple(int(part) for part in text.split(","))
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    return tuple(float(part) for part in text.split(","))
-
-
-# argparse names them where they fail: "invalid whole numbers, joined by commas, value"
-_whole_numbers.__name__ = "whole numbers, joined by commas,"
-_numbers.__name__ = "numbers, joined by commas,"
-
-
 def joined(arguments: Sequence[str]) -> list[str]:
     """Take the numbers after an option with spaces or with commas between them.
 
@@ -150,3 +79,74 @@ def _is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
+    """Add the option of a parameter to a group of options."""
+    meta, options, name = entry.metadata, spellings(entry.name), entry.name
+    if meta["kind"] is bool:
+        action = "store_false" if entry.default else "store_true"
+        text = (f"do not {meta['help']}" if entry.default else meta["help"]).replace("%", "%%")
+        group.add_argument(asked_by(entry), dest=name, action=action, default=argparse.SUPPRESS, help=text)
+        return
+    one_or_three, many = options[0] in SEVERAL, meta["length"] == MANY
+    listed = meta["length"] == LAYERS
+    several = meta["length"][0] if meta["length"] and not (one_or_three or many or listed) else None
+    group.add_argument(
+        *options,
+        dest=name,
+        type=_numbers if one_or_three or listed else _labels if many else _kind(meta),
+        nargs=several,
+        choices=meta["choices"] or None,
+        metavar=None if meta["choices"] else _metavar(name, meta),
+        default=argparse.SUPPRESS,
+        help=_help(entry),
+    )
+
+
+def _kind(meta: Any) -> Any:
+    """Return what takes the text of one value; a word that a number may have in its place is left to the settings."""
+    if not meta["auto"]:
+        return meta["kind"]
+
+    def number(text: str) -> Any:
+        return text if text == "auto" else meta["kind"](text)
+
+    number.__name__ = meta["kind"].__name__
+    return number
+
+
+def _metavar(name: str, meta: Any) -> Any:
+    if meta["length"] in (MANY, LAYERS):
+        return "N|NAME[,...]" if meta["length"] == MANY else "X[,X...]"
+    if meta["length"] in ((), (1, 3)):
+        return "X [Y Z]" if meta["length"] else {int: "N", float: "X", str: "NAME"}[meta["kind"]]
+    if meta["metavar"]:
+        return meta["metavar"]
+    return (
+        tuple(name[0].upper() + str(n) for n in range(meta["length"][0])) if meta["length"] == (2,) else ("X", "Y", "Z")
+    )
+
+
+def _help(entry: Field[Any]) -> str:
+    """Put a parameter's text, unit, limits and default into one line."""
+    meta, default = entry.metadata, entry.default
+    if isinstance(default, tuple):
+        default = " ".join(f"{value:g}" for value in default)
+    facts = [meta["unit"], "" if meta["choices"] else limits_of(entry)]
+    facts += [] if default is None else [f"default {default:g}" if isinstance(default, float) else f"default {default}"]
+    told = "; ".join(fact for fact in facts if fact)
+    return (f"{meta['help']} ({told})" if told else str(meta["help"])).replace("%", "%%")
+
+
+def _labels(text: str) -> tuple[int | str, ...]:
+    """Take whole numbers, and names, which the label map is asked for."""
+    return tuple(int(part) if part.strip().lstrip("+-").isdecimal() else part.strip() for part in text.split(","))
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    return tuple(float(part) for part in text.split(","))
+
+
+# argparse names it where it fails: "invalid numbers, joined by commas, value"
+_numbers.__name__ = "numbers, joined by commas,"

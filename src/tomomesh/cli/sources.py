@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from argparse import Namespace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,6 +43,38 @@ def _in_short(named: list[str]) -> str:
         if found == set(map(Path, named)):
             return f"{shlex.quote(str(first.parent))}/{pattern}"
     return " ".join(map(shlex.quote, named))
+
+
+def numbered(chosen: Namespace) -> Namespace:
+    """Put numbers in the place of labels that were chosen by their names, as the label map has them.
+
+    Raises
+    ------
+    UsageError
+        For a name that it does not have.
+    """
+    asked = getattr(chosen, "select", ())
+    if not any(isinstance(label, str) for label in asked):
+        return chosen
+    path = getattr(chosen, "labels_in", None) or getattr(chosen, "against", None) or getattr(chosen, "study", None)
+    known = io.label_names(path) if isinstance(path, str) else {}
+    return Namespace(**vars(chosen) | {"select": tuple(_number_of(label, known, str(path)) for label in asked)})
+
+
+def _number_of(label: int | str, known: dict[str, int], path: str) -> int:
+    if isinstance(label, int):
+        return label
+    plain = {name.lower().replace(" ", "_"): number for name, number in known.items()}
+    wanted = label.lower().replace(" ", "_")
+    if wanted in plain:
+        return plain[wanted]
+    near = get_close_matches(wanted, plain, 3, 0.5)
+    told = ", ".join(f"{name} ({plain[name]})" for name in near)
+    raise UsageError(
+        "the label map has no label of that name" if known else "the label map names none of its labels",
+        file=path, found=f"--select {label}",
+        hint=told or f"`tomomesh inspect {shlex.quote(path)}`, which counts its labels, and --select N",
+    )  # fmt: skip
 
 
 def sources_of(chosen: Namespace, settings: Settings) -> list[str]:

@@ -22,7 +22,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
     """Say what was reconstructed, and how good it is."""
     quality = report["quality"]
     unit = unit_in_words(report)
-    shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
+    shape = "closed and manifold" if quality["sound"] else "NOT closed and manifold"
     shape = shape if quality["closed"] else "a manifold sheet"
     lines = [
         *_of_far(report),
@@ -231,9 +231,10 @@ def _of_points(report: dict[str, Any]) -> str:
         return points_in_words(report)
     made = ""
     if points.get("on_bridges") or points.get("on_caps"):
-        bridges = "bridged gaps" if "networks" in report else "added voxels"
-        made = f", {points['on_bridges']} on {points['bridged_gaps']} {bridges}, {points['on_caps']} on caps"
-    return f"{points['count']}{made}, r = {points['spacing_mm']:.4g} {unit}"
+        bridges = "bridged gaps" if "networks" in report else "voxels added where two touch"
+        made = f", {points['on_bridges']} on {points['bridged_gaps']} {bridges}, "
+        made += f"{points['on_caps']} where the study ends" if points["on_caps"] else "none where the study ends"
+    return f"{points['count']}{made}; up to {points['spacing_mm']:.4g} {unit} apart"
 
 
 def _of_smooth(report: dict[str, Any]) -> list[str]:
@@ -283,4 +284,4 @@ def _ending(report: dict[str, Any], output: str) -> list[str]:
     warnings = [f"warning   {warning}" for warning in report["warnings"] if warning != _far(report)]
     notes = report.get("study", report["points"]).get("notes", [])
     told = [f"note      {'; '.join(notes)}"] if notes else []
-    return [*told, *warnings[:SHOWN], f"written   {output}, computed in {report['timings']['total_s']:.2f} s"]
+    return [*told, *warnings[:SHOWN], f"written   {output}"]

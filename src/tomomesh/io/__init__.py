@@ -17,6 +17,7 @@ from .meshes.frame import frame_of_file
 from .meshes.read import MESH_READERS, read_mesh
 from .meshes.write import MESH_WRITERS, keeps, write_mesh
 from .studies.folder import Study, find_studies
+from .studies.label_names import label_names
 from .studies.listing import list_series
 from .studies.read import VOLUME_READERS, read_volume
 from .volumes.images import read_picture
@@ -41,6 +42,7 @@ __all__ = [
     "frame_of_study",
     "in_lps",
     "keeps",
+    "label_names",
     "list_series",
     "read_mesh",
     "read_picture",

@@ -15,6 +15,7 @@ from .bad import leave_out
 from .files import read_frames
 from .headers.identity import identity_of
 from .headers.kinds import SEGMENTED, class_of
+from .headers.multiframe import placed_evenly
 from .headers.unit import gray_unit
 from .pixels.decoder import Decoder
 from .series.choice import choose, stacks_among
@@ -98,6 +99,8 @@ def _said(header: Any) -> tuple[str, ...]:
         notes.append("MONOCHROME1: HU were kept" if kept else "MONOCHROME1: gray levels were inverted")
     if class_of(header) == ULTRASOUND_VOLUME:
         notes.append("placed by the transducer, not by the patient: left, back and up are not known")
+    if placed_evenly(header):
+        notes.append("frames placed by SpacingBetweenSlices, one behind the other along their normal")
     return tuple(notes)
 
 
