@@ -39,10 +39,11 @@ OTHER: dict[str, Any] = {
 SOMETIMES = {*MATTERS, *(name for way in TABLE for name in way_of(way).reads)}
 """Parameters that are read on some ways alone, or beside some values of others alone."""
 ALWAYS = {
-    "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "level", "fill_chunks", "structure",
-    "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "keep", "slices", "way", "network",
-    "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow", "drain", "least_wall",
-    "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge", "precision",
+    "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "nifti_form", "level", "fill_chunks",
+    "structure", "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "fill_slices", "keep",
+    "slices", "way", "network", "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow",
+    "drain", "least_wall", "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge", "thickness",
+    "precision",
 }  # fmt: skip
 """Parameters that matter on every way, or that choose what is read, the way, or what becomes of the mesh."""
 STUDY: dict[str, dict[str, Any]] = {

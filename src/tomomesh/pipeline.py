@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from .finish import compare_with, finish
 from .model.points import PointSet
-from .printing.part import require_printing
+from .printing.part import require_printing, turned
 from .progress import Progress, silent
 from .segmentation.study import select_study
 from .settings import Settings
@@ -138,9 +138,8 @@ def reconstruct_points(
     """
     settings = _settled(settings, changes)
     cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)
-    if cloud.frame == "LPS":
-        settings = settings.replace(units="mm")
     taken = take_points(cloud, settings)
+    settings = replace(settings, printing=turned(settings.printing, cloud.frame))
     begun = _begin(settings, changes, input=taken.value.input)
     made = begun.value.surface(taken.value, settings, progress)
     done, later = finish(replace(made.value, place=taken.value.place), settings, progress)

@@ -13,10 +13,13 @@ from .. import io
 from ..errors import UnreadableError, UsageError, printable
 from ..settings import Settings, option_of, parameters
 from . import summary
+from .against import compared
 from .bars import Bars
 from .batch import reconstruct_each
 from .faults import require_kind
 from .outputs import (
+    OF_STUDIES,
+    check_archive,
     check_files,
     check_folder,
     check_frame,
@@ -29,8 +32,8 @@ from .outputs import (
     write_stage_one,
     write_surface,
 )
-from .parts import frame_of_mesh, frame_of_part, turned
-from .sources import compared, gathered, numbered, read_study, sources_of
+from .parts import frame_of_mesh, frame_of_part
+from .sources import gathered, numbered, read_study, sources_of
 from .streams import streamed
 
 if TYPE_CHECKING:
@@ -98,12 +101,13 @@ def _reconstruct(chosen: Namespace) -> None:
 
 
 def _reconstruct_one(chosen: Namespace, settings: Settings) -> Surface:
-    check_outputs(chosen, io.MESH_WRITERS, *sources_of(chosen, settings))
+    check_outputs(chosen, OF_STUDIES, *sources_of(chosen, settings))
     check_frame(chosen.output, settings)
     from ..pipeline import reconstruct
 
     with Bars(quiet=chosen.quiet) as progress:
         volume, labels = read_study(chosen, settings, progress)
+        check_archive(chosen, volume)
         surface = reconstruct(volume, settings, labels=labels, progress=progress, **given_of(chosen))
         return write_surface(chosen, surface, settings, progress)
 
@@ -215,7 +219,7 @@ def _check(chosen: Namespace) -> None:
         report |= {key: found.pop(key) for key in [*found] if key == "dice" or key.endswith("_mm")}
         report["against"] = found
     if chosen.print_check:
-        from ..printing.part import MM, resized
+        from ..printing.part import MM, resized, turned
         from ..printing.verdict import verdict
 
         named = frame_of_mesh(chosen.mesh)
@@ -229,7 +233,7 @@ def _check(chosen: Namespace) -> None:
 def _print(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     check_outputs(chosen, io.MESH_WRITERS, chosen.mesh)
-    from ..printing.part import make_part
+    from ..printing.part import make_part, turned
 
     with Bars(quiet=chosen.quiet) as progress:
         mesh = io.read_mesh(chosen.mesh)

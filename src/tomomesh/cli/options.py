@@ -23,6 +23,8 @@ from .formats import (
     POINT_FORMATS,
     STUDY,
     STUDY_FORMATS,
+    STUDY_MESH,
+    STUDY_MESH_FORMATS,
 )
 from .parameter_options import add_parameter
 
@@ -101,11 +103,13 @@ def build_parser() -> argparse.ArgumentParser:
     main = _command(commands, "reconstruct", "a study of slices in, a closed surface out", epilog=_ways("study"))
     _add_study(main)
     main.add_argument(
-        "-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format; with --each, a folder"
+        "-o", "--output", required=True, metavar="MESH", help=f"{STUDY_MESH}, or - with --format; with --each, a folder"
     )
-    _add_streams(main, STUDY_FORMATS, MESH_FORMATS)
+    _add_streams(main, STUDY_FORMATS, STUDY_MESH_FORMATS)
     _add_each(main)
-    _add_outputs(main, "points", "labels", "mask_out", "figures")
+    _add_outputs(main, "points", "labels", "mask_out", "figures").add_argument(
+        "--patient", action="store_true", help="copy the patient's fields of a DICOM study into MESH.dcm"
+    )
     _add_settings(main, (*STAGE_ONE, *STAGE_TWO, "run"))
 
     stage_one = _command(commands, "segment", "stage one alone: the neurons of all slices as points")
@@ -220,7 +224,6 @@ def _add_streams(
         "--input-format", choices=read,
         help=f"what is read from standard input (default {usual}), or from a file whose suffix does not tell",
     )  # fmt: skip
-    parser.set_defaults(usual_format=usual)
     if written:
         group.add_argument("--format", choices=written, help="what is written to standard output (-o -)")
 
@@ -237,7 +240,7 @@ def _add_each(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--force", action="store_true", help="reconstruct again what is finished")
 
 
-def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
+def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> Any:
     """Add the options that name further files; what is shown goes with `_add_settings`."""
     kinds = {
         "points": ("FILE", f"write the points: {POINT}"),
@@ -251,6 +254,7 @@ def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
         group.add_argument(option_of(name), metavar=metavar, help=text)
     group.add_argument("--report", metavar="FILE.json", help="write the report")
     group.add_argument("--save-settings", metavar="FILE.toml", help="write the settings of this run, to repeat it")
+    return group
 
 
 def _add_settings(

@@ -42,7 +42,7 @@ def pictures(
             "smoothed": surface.smoothed,
             "mesh": surface.mesh,
             "trace": surface.trace,
-            "view": _view(stage_one, settings),
+            "view": _view(surface),
         }
     if surface is not None and len(surface.cuberille.quads):
         stages |= {"cuberille": surface.cuberille, "triangulated": surface.cuberille.triangulated()}
@@ -97,6 +97,6 @@ def _shown(stage_one: Segmentation[Any], settings: Settings) -> NDArray[Any]:
     return np.where(stage_one.mask, 2, voxels > 0).astype(np.uint8)
 
 
-def _view(stage_one: Segmentation[Any] | None, settings: Settings) -> View:
+def _view(surface: Surface) -> View:
     """Name the axes of the patient where there is one, and plainly where there is a cloud."""
-    return View() if stage_one is not None else View(unit=settings.run.units, axes=("x", "y", "z"))
+    return View() if surface.place is None else View(unit=surface.place.unit, axes=("x", "y", "z"))

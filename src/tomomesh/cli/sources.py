@@ -1,4 +1,4 @@
-"""What a command reads, and what a mesh is compared with."""
+"""What a command reads."""
 
 from __future__ import annotations
 
@@ -6,15 +6,13 @@ import shlex
 from argparse import Namespace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .. import io
-from ..errors import GeometryError, UsageError
-from ..io.files.source import suffix_of
+from ..errors import UsageError
 
 if TYPE_CHECKING:
-    from ..model.mesh import TriMesh
-    from ..model.volume import Grid, Volume
+    from ..model.volume import Volume
     from ..settings import Settings
     from .bars import Bars
 
@@ -101,45 +99,3 @@ def read_study(chosen: Namespace, settings: Settings, progress: Bars) -> tuple[V
     labels = io.read_volume(chosen.labels_in, settings=settings.read, select=select) if total == 2 else None
     progress("read", total, total)
     return volume, labels
-
-
-def compared(chosen: Namespace, mesh: TriMesh, settings: Settings) -> dict[str, Any]:
-    """Compare a mesh with another, or with a window or labels of a study, each in its own unit and frame.
-
-    Raises
-    ------
-    GeometryError
-        For voxel indices beside a mesh in another frame.
-    """
-    stated = io.frame_of_file(chosen.mesh)
-    stated |= {"frame": chosen.mesh_frame.replace("lps", "LPS").replace("ras", "RAS")} if chosen.mesh_frame else {}
-    if suffix_of(chosen.against) in io.MESH_READERS:
-        return _with_mesh(chosen.against, mesh, stated)
-    from ..agreement.study import compare_with_study
-
-    study = io.read_volume(chosen.against, settings=settings.read, select=settings.window.select)
-    named = {"unit": "mm", "frame": "unknown"} | stated
-    found = compare_with_study(_in_lps(mesh, named, study.grid), study, settings)
-    notes = () if "frame" in stated else (f"{chosen.mesh} names no frame, and is taken for LPS (--mesh-frame)",)
-    what = "labels" if settings.window.select else "window"
-    return {"against": what, **found, "frame": named["frame"], "notes": [*notes, *study.notes]}
-
-
-def _with_mesh(path: str, mesh: TriMesh, stated: dict[str, str]) -> dict[str, Any]:
-    """Compare two meshes; where one does not state its unit or frame, it is taken for the other's."""
-    from ..agreement.meshes import compare_with_mesh
-
-    other, its = io.read_mesh(path), io.frame_of_file(path)
-    own, its = {"unit": "mm", "frame": "unknown"} | its | stated, {"unit": "mm", "frame": "unknown"} | stated | its
-    if own != its:
-        if "voxel" in (own["frame"], its["frame"]):
-            raise GeometryError(
-                "voxel indices are no lengths", file=path, found=f"frame = {its['frame']}",
-                expected=f"frame = {own['frame']}", hint="--frame lps where the mesh is made",
-            )  # fmt: skip
-        mesh, other = _in_lps(mesh, own), _in_lps(other, its)
-    return {"against": "mesh", **compare_with_mesh(mesh, other), "frame": own["frame"], "notes": []}
-
-
-def _in_lps(mesh: TriMesh, named: dict[str, str], grid: Grid | None = None) -> TriMesh:
-    return io.in_lps(mesh, unit=named["unit"], frame=named["frame"], grid=grid)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -21,9 +21,16 @@ from .verdict import verdict
 if TYPE_CHECKING:
     from ..model.mesh import TriMesh
     from ..settings import Settings
+    from ..settings.printing import PrintSettings
 
-MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "unknown": 1.0}
-"""Millimeters in the unit of a cloud."""
+MM = {
+    "um": 0.001, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8, "unknown": 1.0,
+}  # fmt: skip
+"""Millimeters in the unit of a cloud or a mesh; one that is unknown is taken for them."""
+
+
+MIRRORED = {"anterior": "posterior", "posterior": "anterior", "left": "right", "right": "left"}
+"""Where a side of LPS lies in RAS."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,11 @@ def resized(mesh: TriMesh, factor: float) -> TriMesh:
     return mesh if factor == 1 else mesh.moved(factor * mesh.vertices)
 
 
+def turned(asked: PrintSettings, frame: str) -> PrintSettings:
+    """Return the settings for a frame: the way down is that of LPS, against which RAS is turned by half a turn."""
+    return replace(asked, down=MIRRORED.get(asked.down, asked.down)) if frame == "RAS" else asked
+
+
 def require_printing(settings: Settings) -> None:
     """Refuse what cannot be printed, and what needs a package that is not installed.
 
@@ -77,8 +89,8 @@ def make_part(mesh: TriMesh, settings: Settings, *, unit: str = "mm", progress: 
     ----------
     mesh : TriMesh
     settings : Settings
-    unit : {"mm", "cm", "m", "unknown"}
-        Of the mesh's coordinates; those of the part are millimeters.
+    unit : str
+        A key of `MM`, of the mesh's coordinates; those of the part are millimeters.
     progress : callable
 
     Returns
@@ -101,6 +113,11 @@ def make_part(mesh: TriMesh, settings: Settings, *, unit: str = "mm", progress: 
             "the mesh encloses no solid", found=faults, expected="a closed, outward 2-manifold", hint="`tomomesh check`"
         )
     asked, threads = settings.printing, settings.run.threads
+    if unit not in MM:
+        raise GeometryError(
+            "the unit of what is to be printed has no known length", found=f"unit = {unit}",
+            expected=" | ".join(MM), hint="--units",
+        )  # fmt: skip
     per_unit = asked.scale * MM[unit]
     made = resized(mesh, per_unit)
     if asked.one_piece:

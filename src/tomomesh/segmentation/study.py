@@ -75,6 +75,8 @@ def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> S
             found=type(volume).__name__,
             expected="read_volume(path) or Volume.from_stored(array, affine)",
         )
+    if settings.window.fill_slices and settings.window.select is None:
+        raise UsageError("slices are filled between labels", found="--fill-slices", hint="--select with the labels")
     if settings.window.select is not None and labels is None:
         volume = whole(volume)
     axis = _slice_axis(volume, settings.network.slices)

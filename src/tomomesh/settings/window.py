@@ -63,8 +63,6 @@ class WindowSettings(Group):
         limited = self.lower is not None or self.upper is not None
         if self.preset is not None and limited:
             raise UsageError("two windows are asked for", found="--preset and a window", expected="one of them")
-        if self.fill_slices and self.select is None:
-            raise UsageError("slices are filled between labels", found="--fill-slices", hint="--select with the labels")
         if self.select is not None and (limited or self.preset is not None):
             raise UsageError("two windows are asked for", found="--select and a window", expected="one of them")
         if self.lower is not None and self.upper is not None:
