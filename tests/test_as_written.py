@@ -1,181 +1,235 @@
-"""Files as other programs write them, by those programs: what docs/formats.md says of packages from PyPI."""
+"""Files as other programs write them: each row of docs/writers.md, made by the writer itself."""
 
 from __future__ import annotations
 
-import importlib.util
+import json
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import nibabel
 import numpy as np
 import pytest
 
-from studies import AFFINES, assert_in_place, gray_at, indices_of, sampled
+from segmentations import by_highdicom, palette, sources
+from studies import AFFINES, LPS_TO_RAS, assert_in_place, sampled, save, write_series
 from tomomesh.io import read_volume
-from tomomesh.settings import ReadSettings
-from writers import as_image, needed
+from tomomesh.model.volume import Volume
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from tomomesh.model.volume import Volume
+    Floats = NDArray[np.float64]
+    Writer = Callable[[Path, NDArray[Any], Floats], Path]
 
-PERMUTED = np.array([[0, 0, 0.5, -10], [-0.7, 0, 0, 25], [0, -2.0, 0, 40], [0, 0, 0, 1.0]])
-ALONG_AXES = {
-    "upright": np.array([[0.5, 0, 0, -10], [0, 0.7, 0, 25], [0, 0, 2.0, 40], [0, 0, 0, 1.0]]),
-    "left to right": np.array([[-0.5, 0, 0, 20], [0, 0.7, 0, 25], [0, 0, 2.0, 40], [0, 0, 0, 1.0]]),
-    "RAS": np.array([[-0.5, 0, 0, 20], [0, -0.7, 0, 25], [0, 0, 2.0, 40], [0, 0, 0, 1.0]]),
-    "head to feet": np.array([[0.5, 0, 0, -10], [0, 0.7, 0, 25], [0, 0, -2.0, 40], [0, 0, 0, 1.0]]),
-    "sagittal": PERMUTED,
-}
-"""Affines, LPS, that a store of scales, translations and directions can hold."""
-MM = ReadSettings(spacing=(0.5, 0.7, 2.0))
+sitk: Any = pytest.importorskip("SimpleITK")
+
+PAGE = Path(__file__).parents[1] / "docs" / "writers.md"
+PLACES = ["axial", "oblique", "oblique sagittal"]
+SHAPE = (9, 12, 14)
 
 
-def in_place_at(volume: Volume, affine: NDArray[np.float64]) -> None:
-    np.testing.assert_allclose(volume.grid.affine, affine, atol=1e-5)
-    assert_in_place(volume, 0.6)
+def tool(name: str) -> str:
+    """Return the path of a program that a package of PyPI brings; skip the test where it is not installed."""
+    found = shutil.which(name) or shutil.which(name, path=str(Path(sys.executable).parent))
+    if found is None:
+        pytest.skip(f"the program {name} is not here: pip install {WHEELS[name]}")
+    return found
 
 
-WRITER = """
-import sys, pathlib, itk, nibabel, numpy as np, ngff_zarr as ngff
-folder, units = pathlib.Path(sys.argv[1]), dict.fromkeys("xyz", "millimeter")
-def write(image, name, version):
-    ngff.to_ngff_zarr(str(folder / name), ngff.to_multiscales(image, scale_factors=[], chunks=4), version=version)
-for file in folder.glob("*.npz"):
-    stored, affine = (np.load(file)[key] for key in ("stored", "affine"))
+WHEELS = {"dcm2niix": "dcm2niix", "itkimage2segimage": "dcmqi"}
+
+
+def of_itk(stored: NDArray[Any], affine: Floats) -> Any:
+    """Return an image of sitk."""
+    image = sitk.GetImageFromArray(stored)
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
-    for version in ("0.4", "0.5", "0.6"):
-        for unit in (False, True):
-            image = itk.image_from_array(stored)
-            image.SetSpacing(spacing.tolist())
-            image.SetOrigin(affine[:3, 3].tolist())
-            image.SetDirection(itk.matrix_from_array(affine[:3, :3] / spacing))
-            made = ngff.itk_image_to_ngff_image(image)
-            made.axes_units = units if unit else None
-            write(made, f"{file.stem} itk {version} {unit}.ome.zarr", version)
-        other = nibabel.Nifti1Image(stored.T, np.diag([-1, -1, 1, 1]) @ affine)
-        write(ngff.nibabel_image_to_ngff_image(other), f"{file.stem} nibabel {version}.ome.zarr", version)
-        if version != "0.4":
-            write(made, f"{file.stem} {version}.ozx", version)
-"""
-"""A program of its own, for ITK and Numba may not share a process."""
+    image.SetSpacing(spacing.tolist())
+    image.SetOrigin(affine[:3, 3].tolist())
+    image.SetDirection((affine[:3, :3] / spacing).ravel().tolist())
+    return image
 
 
-@pytest.fixture(scope="module")
-def stores(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """OME-Zarr by ngff-zarr of images of ITK and nibabel, in every direction."""
-    missing = [name for name in ("ngff_zarr", "itk", "zarr") if importlib.util.find_spec(name) is None]
-    if missing:
-        pytest.skip(f"the package {missing[0]} is not installed")
-    folder = tmp_path_factory.mktemp("stores")
-    for name, affine in ALONG_AXES.items():
-        np.savez(folder / name, stored=sampled(affine), affine=affine)
-    subprocess.run([sys.executable, "-c", WRITER, str(folder)], check=True)
-    return folder
+def by_nibabel(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
+    nibabel.save(nibabel.Nifti1Image(stored.T, LPS_TO_RAS @ affine), folder / "s.nii.gz")
+    return folder / "s.nii.gz"
 
 
-class TestNgffZarr:
-    """OME-Zarr by ngff-zarr, which writes orientations without units, and origins whatever the directions are."""
-
-    @pytest.mark.parametrize("version", ["0.4", "0.5", "0.6"])
-    @pytest.mark.parametrize("units", [False, True])
-    @pytest.mark.parametrize("turn", ALONG_AXES)
-    def test_of_an_image_of_itk(self, stores: Path, turn: str, units: bool, version: str) -> None:
-        volume = read_volume(stores / f"{turn} itk {version} {units}.ome.zarr")
-        in_place_at(volume, ALONG_AXES[turn])
-        assert any("ngff-zarr" in note for note in volume.notes) == (turn != "upright")
-        assert any("no units" in note for note in volume.notes) == (not units)
-
-    @pytest.mark.parametrize("version", ["0.4", "0.5", "0.6"])
-    @pytest.mark.parametrize("turn", ALONG_AXES)
-    def test_of_an_image_of_nibabel(self, stores: Path, turn: str, version: str) -> None:
-        in_place_at(read_volume(stores / f"{turn} nibabel {version}.ome.zarr"), ALONG_AXES[turn])
-
-    @pytest.mark.parametrize("version", ["0.5", "0.6"])
-    @pytest.mark.parametrize("turn", ALONG_AXES)
-    def test_zipped(self, stores: Path, turn: str, version: str) -> None:
-        in_place_at(read_volume(stores / f"{turn} {version}.ozx"), ALONG_AXES[turn])
+def by_nibabel_2(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
+    nibabel.save(nibabel.Nifti2Image(stored.T, LPS_TO_RAS @ affine), folder / "s.nii")
+    return folder / "s.nii"
 
 
-class TestTifffile:
-    AFFINE = np.diag([0.5, 0.7, 2.0, 1.0])
-
-    @pytest.mark.parametrize(
-        "told",
-        [
-            {"imagej": True, "resolution": (1 / 500, 1 / 700),
-             "metadata": {"unit": r"\u00B5m", "spacing": 2000, "axes": "ZYX"}},
-            {"imagej": True, "resolution": (2, 1 / 0.7),
-             "metadata": {"unit": "mm", "zunit": "cm", "spacing": 0.2, "axes": "ZYX"}},
-            {"ome": True, "metadata": {
-                "axes": "ZYX", "PhysicalSizeX": 5e6, "PhysicalSizeXUnit": "Å", "PhysicalSizeY": 700,
-                "PhysicalSizeYUnit": "µm", "PhysicalSizeZ": 2 / 25.4, "PhysicalSizeZUnit": "in"}},
-        ],
-        ids=["ImageJ, escaped", "ImageJ, an axis in cm", "OME, three units"],
-    )  # fmt: skip
-    def test_units_of_each_axis(self, tmp_path: Path, told: dict[str, Any]) -> None:
-        stored = (sampled(self.AFFINE) + 9000).astype(np.uint16)
-        needed("tifffile").imwrite(tmp_path / "s.tif", stored, **told)
-        volume = read_volume(tmp_path / "s.tif")
-        np.testing.assert_allclose(volume.affine, self.AFFINE, rtol=1e-5)
-        np.testing.assert_array_equal(volume.voxels, stored)
-
-    def test_a_mask(self, tmp_path: Path) -> None:
-        mask = sampled(self.AFFINE) > 0
-        needed("tifffile").imwrite(tmp_path / "s.tif", mask)
-        np.testing.assert_array_equal(read_volume(tmp_path / "s.tif", settings=MM).voxels, mask)
+def scaled_by_nibabel(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
+    """Real numbers in 16 bits: nibabel finds a slope and an intercept."""
+    image = nibabel.Nifti1Image(stored.T.astype(np.float64), LPS_TO_RAS @ affine)
+    image.set_data_dtype(np.int16)
+    nibabel.save(image, folder / "s.nii")
+    return folder / "s.nii"
 
 
-class TestPynrrd:
-    @pytest.mark.parametrize("encoding", ["raw", "gzip", "bzip2", "ascii"])
-    def test_a_study(self, tmp_path: Path, encoding: str) -> None:
-        affine = AFFINES["oblique"]
-        header = {"space": "left-posterior-superior", "space directions": affine[:3, :3].T,
-                  "space origin": affine[:3, 3], "encoding": encoding}  # fmt: skip
-        needed("nrrd").write(str(tmp_path / "s.nrrd"), sampled(affine).T, header)
-        in_place_at(read_volume(tmp_path / "s.nrrd"), affine)
+def by_simpleitk(suffix: str) -> Writer:
+    def write(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
+        sitk.WriteImage(of_itk(stored, affine), str(folder / f"s{suffix}"))
+        return folder / f"s{suffix}"
 
-    def test_layers_of_segments(self, tmp_path: Path) -> None:
-        affine = AFFINES["axial"]
-        place = indices_of((9, 9, 9)).reshape(9, 9, 9, 3)
-        ball = np.linalg.norm(place - 4, axis=-1) < 4
-        core = np.linalg.norm(place - 4, axis=-1) < 2
-        header: dict[str, Any] = {
-            "space": "left-posterior-superior", "kinds": ["list", "domain", "domain", "domain"],
-            "space directions": np.vstack([np.full(3, np.nan), affine[:3, :3].T]), "space origin": affine[:3, 3],
+    return write
+
+
+def slices_by_simpleitk(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
+    """Slices as SimpleITK's own example writes them."""
+    writer: Any = sitk.ImageFileWriter()
+    writer.KeepOriginalImageUIDOn()
+    for k, plane in enumerate(stored):
+        image = sitk.GetImageFromArray(plane[None])
+        spacing = np.linalg.norm(affine[:3, :3], axis=0)
+        image.SetSpacing(spacing.tolist())
+        fields = {
+            "0008|0060": "MR", "0020|000e": "1.2.826.0.1.3680043.2.1125.9", "0020|0013": str(k),
+            "0020|0032": "\\".join(f"{v:.6f}" for v in affine[:3, 3] + k * affine[:3, 2]),
+            "0020|0037": "\\".join(f"{v:.8f}" for v in (affine[:3, :2] / spacing[:2]).T.ravel()),
         }  # fmt: skip
-        for n, name in enumerate(("Ball", "Core")):
-            header |= {f"Segment{n}_Name": name, f"Segment{n}_LabelValue": "1", f"Segment{n}_Layer": str(n)}
-        needed("nrrd").write(str(tmp_path / "s.seg.nrrd"), np.stack([ball.T, core.T]).astype(np.uint8), header)
-        for number, mask in ((1, ball), (2, core)):
-            np.testing.assert_array_equal(read_volume(tmp_path / "s.seg.nrrd", select=[number]).voxels == number, mask)
+        for key, value in fields.items():
+            image.SetMetaData(key, value)
+        writer.SetFileName(str(folder / "series" / f"{k}.dcm"))
+        (folder / "series").mkdir(exist_ok=True)
+        writer.Execute(image)
+    return folder / "series"
 
 
-class TestSimpleItk:
-    @pytest.mark.parametrize("suffix", [".mha", ".mhd", ".nrrd", ".nhdr", ".nii.gz"])
-    @pytest.mark.parametrize("packed", [False, True])
-    def test_a_study(self, tmp_path: Path, suffix: str, packed: bool) -> None:
-        affine = AFFINES["oblique"]
-        path = tmp_path / f"s{suffix}"
-        needed("SimpleITK").WriteImage(as_image(sampled(affine), affine), str(path), packed)
-        in_place_at(read_volume(path), affine)
-
-    def test_a_vector_of_three_bytes_is_no_color(self, tmp_path: Path) -> None:
-        sitk = needed("SimpleITK")
-        image = sitk.GetImageFromArray(np.zeros((5, 6, 7, 3), np.uint8), isVector=True)
-        sitk.WriteImage(image, str(tmp_path / "s.nrrd"))
-        assert "kinds: vector" in (tmp_path / "s.nrrd").read_bytes()[:600].decode("ascii", "replace")
+def by_dcm2niix(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
+    series = write_series(folder / "series", stored, affine)
+    command = [tool("dcm2niix"), "-z", "y", "-f", "s", "-o", str(folder), str(series)]
+    subprocess.run(command, check=True, capture_output=True)
+    return folder / "s.nii.gz"
 
 
-class TestZarr:
-    @pytest.mark.parametrize("version", [2, 3])
-    def test_a_plain_array_and_its_place(self, tmp_path: Path, version: int) -> None:
-        affine = np.diag([0.5, 0.7, 2.0, 1.0])
-        zarr, stored = needed("zarr"), sampled(affine)
-        array = zarr.create_array(tmp_path / "s", shape=stored.shape, dtype="i2", chunks=(4, 4, 4), zarr_format=version)
-        array[...] = stored
-        volume = read_volume(tmp_path / "s", settings=MM)
-        np.testing.assert_allclose(volume.voxels.ravel(), gray_at(volume.to_mm(indices_of(volume.shape))), atol=0.51)
+def map_by_highdicom(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
+    """Real numbers in a parametric map: floating-point pixels behind functional groups."""
+    hd = pytest.importorskip("highdicom")
+    from pydicom.sr.codedict import codes
+    from pydicom.uid import generate_uid
+
+    mapping = hd.pm.RealWorldValueMapping(
+        lut_label="1", lut_explanation="levels", unit=codes.UCUM.NoUnits, value_range=[-1e6, 1e6], intercept=0, slope=1
+    )
+    made = hd.pm.ParametricMap(
+        sources(SHAPE, affine), stored.astype(np.float32), generate_uid(), 1, generate_uid(), 1, "maker", "model", "1",
+        "1", contains_recognizable_visual_features=False, real_world_value_mappings=[mapping],
+        voi_lut_transformations=[hd.VOILUTTransformation(window_center=0, window_width=100)],
+    )  # fmt: skip
+    return save(made, folder / "map.dcm")
+
+
+STUDIES: dict[str, Writer] = {
+    "nibabel, NIfTI-1": by_nibabel,
+    "nibabel, NIfTI-2": by_nibabel_2,
+    "nibabel, real numbers in 16 bits": scaled_by_nibabel,
+    "SimpleITK, `.nii.gz`": by_simpleitk(".nii.gz"),
+    "SimpleITK, `.nrrd`": by_simpleitk(".nrrd"),
+    "SimpleITK, `.mha`": by_simpleitk(".mha"),
+    "SimpleITK, DICOM slices": slices_by_simpleitk,
+    "dcm2niix": by_dcm2niix,
+    "highdicom, parametric map": map_by_highdicom,
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("writer", STUDIES)
+def test_a_study_is_where_its_writer_put_it(tmp_path: Path, writer: str, place: str) -> None:
+    affine = AFFINES[place]
+    volume = read_volume(STUDIES[writer](tmp_path, sampled(affine, SHAPE), affine))
+    assert sorted(volume.shape) == sorted(SHAPE)
+    assert_in_place(volume)
+
+
+def two_labels() -> NDArray[np.uint8]:
+    """Two blocks beside one another, neither on the first or last slice."""
+    labels = np.zeros(SHAPE, np.uint8)
+    labels[2:7, 2:6, 3:8] = 1
+    labels[3:6, 6:10, 3:11] = 2
+    return labels
+
+
+def seg_by_highdicom(kind: str, **options: Any) -> Writer:
+    def write(folder: Path, labels: NDArray[Any], affine: Floats) -> Path:
+        pytest.importorskip("highdicom")
+        masks = {n: (labels == n).astype(np.float64 if kind == "FRACTIONAL" else np.uint8) for n in (1, 2)}
+        chosen = {key: value() for key, value in options.items()}
+        by_highdicom(masks, affine, folder / "seg.dcm", kind, **chosen)
+        return folder / "seg.dcm"
+
+    return write
+
+
+def seg_by_dcmqi(kind: str) -> Writer:
+    def write(folder: Path, labels: NDArray[Any], affine: Floats) -> Path:
+        return _by_dcmqi(folder, labels, affine, kind)
+
+    return write
+
+
+def _by_dcmqi(folder: Path, labels: NDArray[Any], affine: Floats, kind: str) -> Path:
+    program = tool("itkimage2segimage")
+    for k, data in enumerate(sources(SHAPE, affine)):
+        save(data, folder / "ct" / f"{k}.dcm")
+    sitk.WriteImage(of_itk(labels, affine), str(folder / "labels.nrrd"))
+    code = {"CodeValue": "85756007", "CodingSchemeDesignator": "SCT", "CodeMeaning": "Tissue"}
+    described = [
+        {
+            "labelID": n, "SegmentDescription": f"block {n}", "SegmentAlgorithmType": "MANUAL",
+            "SegmentedPropertyCategoryCodeSequence": code, "SegmentedPropertyTypeCodeSequence": code,
+        }
+        for n in (1, 2)
+    ]  # fmt: skip
+    head = {"ContentCreatorName": "Nobody", "SeriesDescription": "s", "SeriesNumber": "300", "InstanceNumber": "1"}
+    (folder / "meta.json").write_text(json.dumps(head | {"segmentAttributes": [described]}), encoding="utf-8")
+    subprocess.run(
+        [
+            program, "--inputImageList", str(folder / "labels.nrrd"), "--inputDICOMDirectory", str(folder / "ct"),
+            "--inputMetadata", str(folder / "meta.json"), "--outputDICOM", str(folder / "seg.dcm"), "--skip", "1",
+            "--segmentationType", kind,
+        ],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    return folder / "seg.dcm"
+
+
+LABELS: dict[str, Writer] = {
+    "highdicom, SEG `BINARY`": seg_by_highdicom("BINARY"),
+    "highdicom, SEG `FRACTIONAL`": seg_by_highdicom("FRACTIONAL"),
+    "highdicom, SEG `LABELMAP`": seg_by_highdicom("LABELMAP"),
+    "highdicom, SEG `LABELMAP` with colors": seg_by_highdicom("LABELMAP", palette_color_lut_transformation=palette),
+    "dcmqi, SEG": seg_by_dcmqi("binary"),
+    "dcmqi, SEG as a label map": seg_by_dcmqi("labelmap"),
+    "SimpleITK, labels in `.nii.gz`": by_simpleitk(".nii.gz"),
+    "nibabel, labels": by_nibabel,
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("writer", LABELS)
+def test_labels_are_where_their_writer_put_them(tmp_path: Path, writer: str, place: str) -> None:
+    affine, labels = AFFINES[place], two_labels()
+    volume = read_volume(LABELS[writer](tmp_path, labels, affine))
+    truth = Volume.from_stored(labels, affine)
+    for number in (1, 2):
+        found, expected = (
+            one.to_mm(np.argwhere(one.voxels == number)[:, ::-1].astype(float)) for one in (volume, truth)
+        )
+        assert len(found) == len(expected)
+        np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), atol=1e-3)
+        np.testing.assert_allclose(np.cov(found.T), np.cov(expected.T), atol=1e-3)
+
+
+def test_the_page_has_a_row_for_each() -> None:
+    rows = [
+        line.split(" | ")[0].removeprefix("| ")
+        for line in PAGE.read_text(encoding="utf-8").splitlines()
+        if line.startswith("| ")
+    ]
+    assert [row for row in rows if row != "writer"] == [*STUDIES, *LABELS]

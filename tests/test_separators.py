@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tomomesh.cli import main
-from tomomesh.cli.options import build_parser, joined
+from tomomesh.cli.options import build_parser
+from tomomesh.cli.parameter_options import joined
 
 ROI = ["-1", "2.5", "-3", "4", "5e1", "66"]
 
@@ -42,7 +43,7 @@ def test_what_follows_is_left_alone() -> None:
     assert found["lower"] == (-5, 6, 7)
     assert found["seed"] == 7
     first = vars(build_parser().parse_args(joined(["reconstruct", "--spacing", "1,1,2", "1,2", "-o", "m.stl"])))
-    assert first["study"] == "1,2"
+    assert first["study"] == ["1,2"]
 
 
 @pytest.mark.parametrize(

@@ -177,7 +177,7 @@ class TestIn:
 
     def test_a_folder_has_no_format(self, tmp_path: Path, capfdbinary: Any) -> None:
         assert main(["inspect", str(tmp_path), "--input-format", "dcm"]) == 2
-        assert b"the format of a file" in capfdbinary.readouterr().err
+        assert b"a format is that of one file" in capfdbinary.readouterr().err
 
     def test_a_cloud_of_another_suffix_too(self, tmp_path: Path) -> None:
         np.savetxt(tmp_path / "c.dat", trimesh.creation.icosphere(3).vertices)

@@ -1,4 +1,4 @@
-"""Standard input and output in place of files: ``-``; and files whose format is named in place of their suffix."""
+"""Standard input and output in place of files, ``-``, and files whose format is named and not told by their suffix."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import OutputError, TomomeshError, UsageError
+from ..errors import OutputError, TomomeshError, UsageError, printable
 from ..io.files.private import private_folder
-from ..io.files.source import existing
+from ..io.files.source import existing_file, suffix_of
 from .formats import TEXTS
 
 if TYPE_CHECKING:
@@ -38,25 +38,24 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
     UsageError
         For a format that is not named, and where a terminal would get bytes that are no text.
     """
-    given = getattr(chosen, "input_format", None)
-    typed = {name: getattr(chosen, name, None) for name in SOURCES}
-    inside = next((name for name, path in typed.items() if path == STREAM or (path and given)), "")
+    inside = next((name for name in SOURCES if getattr(chosen, name, None) == STREAM), "")
+    source = inside or _of_named_format(chosen)
     each = getattr(chosen, "each", False)
     outside = getattr(chosen, "output", None) == STREAM and not each
     if getattr(chosen, "format", None) and not (outside or each):
         raise UsageError("a file's suffix tells its format", found=f"--format {chosen.format}", expected="-o -")
     suffix = _suffix(chosen) if outside else ""
-    if not inside and not outside:
+    if not source and not outside:
         yield chosen
         return
-    source = str(typed.get(inside, STREAM))
-    with private_folder() as folder, _named_as_typed(folder, source):
+    typed = getattr(chosen, source) if source else STREAM
+    with private_folder() as folder, _named_as_typed(folder, typed):
         files = {}
-        if inside:
-            read = given or SOURCES[inside]
-            kept = Path(folder, f"input.{read}")
-            files[inside] = _received(kept) if source == STREAM else _under_suffix(Path(source), kept)
-            files["typed"] = f"{shlex.quote(source)} --input-format {read}"
+        if source:
+            suffix_in = chosen.input_format or SOURCES[source]
+            place = Path(folder, f"input.{suffix_in}")
+            files[source] = _received(place) if inside else _linked(place, typed)
+            files["typed"] = f"{shlex.quote(typed)} --input-format {suffix_in}"
         if not outside:
             yield Namespace(**vars(chosen) | files)
             return
@@ -65,6 +64,28 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
             yield Namespace(**vars(chosen) | files)
         with Path(files["output"]).open("rb") as file:
             shutil.copyfileobj(file, sys.stdout.buffer)
+
+
+def _of_named_format(chosen: Namespace) -> str:
+    """Return which argument is a file whose format is named; empty where none is, or its suffix says the same."""
+    named = getattr(chosen, "input_format", None)
+    source = next((name for name in SOURCES if getattr(chosen, name, None)), "")
+    if not named or not source:
+        return ""
+    path = getattr(chosen, source)
+    if not isinstance(path, str) or Path(path).is_dir():
+        raise UsageError("a format is that of one file", found=f"--input-format {named}", expected="a file, or -")
+    return "" if suffix_of(path) == f".{named}" else source
+
+
+def _linked(place: Path, typed: str) -> str:
+    """Give a file another name; a copy where the system has no links."""
+    path = existing_file(typed)
+    try:
+        place.symlink_to(path.resolve())
+    except OSError:
+        shutil.copyfile(path, place)
+    return str(place)
 
 
 def _suffix(chosen: Namespace) -> str:
@@ -92,24 +113,13 @@ def _received(path: Path) -> str:
     return str(path)
 
 
-def _under_suffix(path: Path, file: Path) -> str:
-    """Give a file that is there another suffix, by a link, or a copy where the system has none."""
-    if existing(path).is_dir():
-        raise UsageError("--input-format names the format of a file", found=f"{path}, a folder", expected="a file")
-    try:
-        file.symlink_to(path.resolve())
-    except OSError:
-        shutil.copyfile(path, file)
-    return str(file)
-
-
 @contextmanager
-def _named_as_typed(folder: Path, source: str) -> Iterator[None]:
-    """Name streams and files in errors as they were typed, not the temporary files in their place."""
-    names = {"input": source, "output": STREAM}
-    inside = rf"(?:{re.escape(f'{folder}{os.sep}')})?\b(input|output)(\.\w+)+"
+def _named_as_typed(folder: Path, typed: str) -> Iterator[None]:
+    """Name what is read and written in errors as it was typed, not the temporary files in its place."""
     try:
         yield
     except TomomeshError as fault:
-        fault.args = (re.sub(inside, lambda found: names[found[1]], str(fault)),)
+        inside = re.escape(f"{folder}{os.sep}")
+        words = re.sub(rf"({inside})?\binput(\.\w+)+", lambda _: printable(typed), str(fault))
+        fault.args = (re.sub(rf"{inside}output(\.\w+)+", STREAM, words),)
         raise

@@ -42,12 +42,15 @@ class Stack:
         Edge of the voxels.
     least : float
         Distance of slices where no part goes on as another.
+    thickness : float or None
+        Of a part that goes on as no other; a slice distance where it is None.
     """
 
     parts: Sequence[Part]
     links: Sequence[Link]
     edge: float
     least: float
+    thickness: float | None = None
 
     @cached_property
     def body(self) -> NDArray[np.int64]:
@@ -114,7 +117,7 @@ class Stack:
     def step_of(self, key: Key) -> float:
         """Return the median gap of the body of some parts."""
         gaps = self.gaps.get(int(self.body[key[0]]))
-        return self.step if gaps is None else float(np.median(gaps))
+        return self.thickness or self.step if gaps is None else float(np.median(gaps))
 
     def ending(self, key: Key, upward: bool) -> tuple[Ending, Floats]:
         """Return how parts end, and the way that they go sideways until then, (2,)."""

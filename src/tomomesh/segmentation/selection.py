@@ -11,7 +11,7 @@ from ..errors import EmptyError, UsageError
 from .body import Cleaned, components_of_body, is_dense, largest_component, solid, thick_components, without_specks
 from .contours.labelled import filled_slices, gaps_in
 from .labels import select
-from .padding import named_padding, padding
+from .padding import all_padding, named_padding
 from .window import PRESETS_HU, choose_window, window
 
 if TYPE_CHECKING:
@@ -126,20 +126,20 @@ def _of_labels(stack: Volume, labels: Volume | None, asked: WindowSettings) -> C
 def _of_levels(stack: Volume, asked: WindowSettings) -> Chosen:
     """Window a study whose padding is background: what its header names, and what is found where no window is given."""
     given = asked.lower is not None or asked.upper is not None
-    found = None if given else padding(stack.voxels)
-    stack, named = _as_background(stack, named_padding(stack))
-    stack, guessed = _as_background(stack, found)
-    lower, upper = choose_window(stack, asked, found)
+    padded, named = all_padding(stack, guessed=not given), named_padding(stack)
+    stack, changed = _as_background(stack, padded)
+    lower, upper = choose_window(stack, asked, padded)
     mask = window(stack, lower=lower, upper=upper, layers=asked.layers)
-    return Chosen(stack, mask, lower, upper, Counts(padding=named + guessed, named_padding=named))
+    counts = [0 if one is None else int(np.count_nonzero(changed & one)) for one in (padded, named)]
+    return Chosen(stack, mask, lower, upper, Counts(padding=counts[0], named_padding=counts[1]))
 
 
-def _as_background(stack: Volume, padded: NDArray[np.bool_] | None) -> tuple[Volume, int]:
-    """Give padding the lowest of the other levels; return also how many voxels had another."""
+def _as_background(stack: Volume, padded: NDArray[np.bool_] | None) -> tuple[Volume, NDArray[np.bool_] | np.bool_]:
+    """Give padding the lowest of the other levels; return also which voxels had another."""
     if padded is None:
-        return stack, 0
+        return stack, np.False_
     lowest = stack.voxels.min(where=~padded, initial=stack.voxels.max())
-    changed = int(np.count_nonzero(stack.voxels[padded] != lowest))
+    changed = padded & (stack.voxels != lowest)
     return replace(stack, voxels=np.where(padded, lowest, stack.voxels)), changed
 
 
