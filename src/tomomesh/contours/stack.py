@@ -182,9 +182,9 @@ def solid_between(
     return _levels(stack, threads, progress, heights), stack.low[:2], stack.edge
 
 
-def _levels(stack: Stack, threads: int, progress: Progress, heights: Floats | None = None) -> NDArray[np.float32]:
+def _levels(stack: Stack, threads: int, progress: Progress, at: Floats | None = None) -> NDArray[np.float32]:
     """Return depths inside of the parts and between them."""
-    levels = filled_between(stack, heights, threads=threads, progress=progress)
+    levels = filled_between(stack, at, threads=threads, progress=progress)
     return np.negative(levels, out=levels)
 
 
