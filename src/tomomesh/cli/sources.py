@@ -12,6 +12,9 @@ from ..errors import GeometryError, UsageError
 from ..io.files.source import suffix_of
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ..model.mesh import TriMesh
     from ..model.volume import Grid, Volume
     from ..settings import Settings
@@ -110,3 +113,29 @@ def _with_mesh(path: str, mesh: TriMesh, stated: dict[str, str]) -> dict[str, An
 
 def _in_lps(mesh: TriMesh, named: dict[str, str], grid: Grid | None = None) -> TriMesh:
     return io.in_lps(mesh, unit=named["unit"], frame=named["frame"], grid=grid)
+
+
+def window_of_picture(path: str, settings: Settings, notes: list[str]) -> NDArray[np.float64]:
+    """Return the window's pixels of one picture as (column, -row[, layer]), so that up stays up.
+
+    Where no window was asked for, and what Otsu's threshold takes has most of the picture's border, that is the paper:
+    the figure is the rest, and a note says so.
+    """
+    import numpy as np
+
+    from ..segmentation.signal import pixels_of
+    from ..segmentation.window import by_layer, choose_window, window
+
+    picture, asked = io.read_picture(path), settings.window
+    lower, upper = choose_window(picture, asked)
+    mask = window(picture, lower=lower, upper=upper, layers=asked.layers)[0]
+    border = np.concatenate([mask[0], mask[-1], mask[1:-1, 0], mask[1:-1, -1]])
+    chosen = any(limit is not None for limit in (asked.lower, asked.upper, asked.preset))
+    dark = not chosen and border.mean() > 0.5 and not mask.all()
+    if dark:
+        notes.append("the border of the picture is bright: what is dark on it was taken (--lower for what is bright)")
+    mask = mask ^ dark
+    if picture.layers > 1 and settings.network.inputs == "layers":
+        mask = (by_layer(picture, lower=lower, upper=upper)[0] ^ dark) & mask[..., None]
+    pixels = pixels_of(mask)
+    return np.asarray(pixels * np.array([1.0, -1.0, 1.0])[: pixels.shape[1]])

@@ -60,7 +60,7 @@ def _fill(points: Points, apart: float, settings: Settings) -> Stage[Volume]:
 WAY = Way(
     applies=lambda settings, input: input in POINTS and settings.cubes.filled,
     because=lambda settings, input: "with --filled",
-    reads=parameters("cell_mm", "cell_factor", "filled", "stiffness"),
+    reads=parameters("cell_mm", "cell_factor", "stiffness"),
     surface=surface_of_filled,
     of_body=lambda report: body_of_voxels(report, "what the points fill"),
 )
