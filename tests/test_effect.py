@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from tomomesh.effect import without_effect
 
 from conftest import COMPILED
 from studies import write_nifti
 from tomomesh import PointSet, Settings, Volume, reconstruct, reconstruct_points
 from tomomesh.cli import main
+from tomomesh.effect import without_effect
 from tomomesh.settings import MATTERS, parameters
 from tomomesh.ways import WAYS as TABLE
 from tomomesh.ways import way_of
@@ -40,10 +40,11 @@ OTHER: dict[str, Any] = {
 SOMETIMES = {*MATTERS, *(name for way in TABLE for name in way_of(way).reads)}
 """Parameters that are read on some ways alone, or beside some values of others alone."""
 ALWAYS = {
-    "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "level", "fill_chunks", "structure",
-    "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "keep", "slices", "way", "network",
-    "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow", "drain", "least_wall",
-    "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge", "thickness", "precision",
+    "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "nifti_form", "level", "fill_chunks",
+    "structure", "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "fill_slices", "keep",
+    "slices", "way", "network", "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow",
+    "drain", "least_wall", "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge", "thickness",
+    "precision",
 }  # fmt: skip
 """Parameters that matter on every way, or that choose what is read, the way, or what becomes of the mesh."""
 STUDY: dict[str, dict[str, Any]] = {

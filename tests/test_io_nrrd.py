@@ -100,6 +100,13 @@ class TestNrrd:
         assert_in_place(volume)
         assert "millimeters" in volume.notes[0]
 
+    def test_each_axis_of_the_space_has_its_own_unit(self, tmp_path: Path) -> None:
+        scaled = np.diag([1000, 1, 0.1, 1.0]) @ AFFINES["oblique"]
+        told = {"space units": ["um", "mm", "cm"]}
+        path = self.write(tmp_path / "s.nrrd", scaled, **told)
+        volume = read_volume(path)
+        np.testing.assert_allclose(volume.grid.affine, AFFINES["oblique"], atol=1e-9)
+
     def test_spacings_alone_are_taken_and_told(self, tmp_path: Path) -> None:
         path = self.write(
             tmp_path / "s.nrrd", AFFINES["axial"], space=None, **{

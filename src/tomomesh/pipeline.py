@@ -168,8 +168,11 @@ def _segmented(
     volume: Volume, labels: Volume | None, settings: Settings, given: Collection[str], progress: Progress
 ) -> tuple[Segmentation[Any], Way, Settings]:
     """Run stage one; return also the way that it takes, and the settings with nothing about that left open."""
+    progress("window", 0, 2)
     kept = select_study(volume, labels, settings)
+    progress("window", 1, 2)
     taken = take_way(kept.value, settings)
+    progress("window", 2, 2)
     begun = _begin(taken.value, given, input=_input_of(volume))
     way = begun.value
     assert way.segment is not None

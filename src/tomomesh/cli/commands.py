@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from argparse import Namespace
 from dataclasses import fields, replace
 from pathlib import Path
@@ -12,9 +13,13 @@ from .. import io
 from ..errors import UnreadableError, UsageError, printable
 from ..settings import Settings, option_of, parameters
 from . import summary
+from .against import compared
 from .bars import Bars
 from .batch import reconstruct_each
+from .faults import require_kind
 from .outputs import (
+    OF_STUDIES,
+    check_archive,
     check_files,
     check_folder,
     check_frame,
@@ -28,7 +33,7 @@ from .outputs import (
     write_surface,
 )
 from .parts import frame_of_mesh, frame_of_part
-from .sources import compared, gathered, read_study, sources_of, window_of_picture
+from .sources import gathered, numbered, read_study, sources_of, window_of_picture
 from .streams import streamed
 
 if TYPE_CHECKING:
@@ -38,7 +43,8 @@ if TYPE_CHECKING:
 def run(chosen: Namespace) -> None:
     """Run the command that was parsed."""
     with streamed(gathered(chosen)) as named:
-        _COMMANDS[named.command](named)
+        require_kind(named)
+        _COMMANDS[named.command](numbered(named))
 
 
 def settings_of(chosen: Namespace) -> Settings:
@@ -92,12 +98,13 @@ def _reconstruct(chosen: Namespace) -> None:
 
 
 def _reconstruct_one(chosen: Namespace, settings: Settings) -> Surface:
-    check_outputs(chosen, io.MESH_WRITERS, *sources_of(chosen, settings))
+    check_outputs(chosen, OF_STUDIES, *sources_of(chosen, settings))
     check_frame(chosen.output, settings)
     from ..pipeline import reconstruct
 
     with Bars(quiet=chosen.quiet) as progress:
         volume, labels = read_study(chosen, settings, progress)
+        check_archive(chosen, volume)
         surface = reconstruct(volume, settings, labels=labels, progress=progress, **given_of(chosen))
         return write_surface(chosen, surface, settings, progress)
 
@@ -245,7 +252,8 @@ def _shown(chosen: Namespace) -> str:
 
 def _tell(chosen: Namespace, report: dict[str, Any], lines: list[str]) -> None:
     if chosen.json or not chosen.quiet:
-        _say(report, None if chosen.json else lines)
+        spent = f", computed in {time.perf_counter() - chosen.begun:.2f} s, reading and writing included"
+        _say(report, None if chosen.json else [line + spent * line.startswith("written ") for line in lines])
 
 
 def _say(report: dict[str, Any], lines: list[str] | None) -> None:

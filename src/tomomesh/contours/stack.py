@@ -167,12 +167,8 @@ def solid_between(
 
     Returns
     -------
-    levels : (K, J, I) float32 array
-        Depths in pixels, over 0 inside.
-    low : (2,) float array
-        The middle of the first pixel, in the frame of the slices.
-    edge : float
-        Of a pixel.
+    (K, J, I) float32 array, (2,) float array, float
+        Depths in pixels, over 0 inside; the middle of the first pixel, in the frame of the slices; its edge.
 
     Raises
     ------
@@ -180,7 +176,7 @@ def solid_between(
         Where fewer than two slices enclose anything.
     """
     drawn, found = _drawn(np.empty((0, 3)), slices, False, threads, progress)
-    stack = _stack(drawn, found, slices, slices.spacing)
+    stack = _stack(drawn, found, slices, slices.spacing, None)
     return _levels(stack, threads, progress, heights), stack.low[:2], stack.edge
 
 

@@ -1,4 +1,4 @@
-"""The part to print, one arrow a line: mesh -> scaled -> cut flat -> hollowed -> drained."""
+"""The part to print, one arrow a line: mesh -> scaled -> mended -> cut flat -> hollowed -> drained."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from ..progress import Progress, silent
 from .cavity import hollowed
 from .drains import drained
 from .flat_base import stood
+from .pieces import largest_piece, without_cavities
 from .solids import require_solids
+from .thicken import thickened
 from .verdict import verdict
 
 if TYPE_CHECKING:
@@ -42,16 +44,20 @@ class Part:
     per_unit : float
         Printed millimeters in a unit of the object's coordinates.
     settings : Settings
+    notes : tuple of str
+        What was asked for and changed nothing.
     """
 
     mesh: TriMesh
     per_unit: float
     settings: Settings
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def report(self) -> dict[str, Any]:
         """Whether it can be printed, key by key in docs/printing.md; measured on first use."""
-        return verdict(self.mesh, self.settings.printing, threads=self.settings.run.threads)
+        told = verdict(self.mesh, self.settings.printing, threads=self.settings.run.threads)
+        return told | {"notes": [*self.notes, *told["notes"]]}
 
 
 def resized(mesh: TriMesh, factor: float) -> TriMesh:
@@ -77,7 +83,7 @@ def require_printing(settings: Settings) -> None:
 
 
 def make_part(mesh: TriMesh, settings: Settings, *, unit: str = "mm", progress: Progress = silent) -> Part:
-    """Make a part to print of a closed mesh: scale it, cut it flat, hollow it, drain it, as far as asked for.
+    """Make a part to print of a closed mesh: scale, mend, cut, hollow and drain it, as far as asked for.
 
     Parameters
     ----------
@@ -114,11 +120,19 @@ def make_part(mesh: TriMesh, settings: Settings, *, unit: str = "mm", progress: 
         )  # fmt: skip
     per_unit = asked.scale * MM[unit]
     made = resized(mesh, per_unit)
+    if asked.one_piece:
+        made = largest_piece(made)
+    if asked.fill_cavities:
+        made = without_cavities(made)
+    if asked.thicken is not None:
+        made = thickened(made, asked.thicken, threads=threads, progress=progress)
     if asked.flat_base is not None:
         made = stood(made, asked.flat_base, asked.down)
     if asked.hollow is not None:
         made = hollowed(made, asked.hollow, threads=threads, progress=progress)
+    notes: tuple[str, ...] = ()
     if asked.drain is not None:
+        notes = () if linings(made) else ("there is no cavity to drain: --hollow makes one",)
         made = drained(made, asked.drain, asked.down)
     check_promise(made, cavities=linings(made))
-    return Part(made, per_unit, settings)
+    return Part(made, per_unit, settings, notes)

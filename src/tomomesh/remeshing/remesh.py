@@ -159,6 +159,7 @@ def remesh(
         if not crosses.any():
             break
         found = found | _under(ground, made, under, crosses)
+    progress("remesh", ROUNDS, ROUNDS)
     if best is None or not _is_like(best.mesh, mesh, like):
         if most is None:
             raise _too_long(edge, share_of(made, mesh))
@@ -242,14 +243,14 @@ def _made(ground: Ground, kept: Marks, most: float, threads: int, progress: Prog
     """Go round after round, and on with longer edges while there are too many faces."""
     making = Making(ground, kept, threads)
     for count in range(ROUNDS):
-        progress("remesh", count, ROUNDS)
+        progress("remesh", count, ROUNDS + 1)
         if _round(making) < FEW:
             break
-    progress("remesh", ROUNDS, ROUNDS)
     _move(making, LAST)
-    for _ in range(COARSER):
+    for count in range(COARSER):
         if len(making.faces) <= most:
             break
+        progress("remesh", ROUNDS + count, ROUNDS + COARSER)
         ground = ground.scaled((len(making.faces) / (AIM * most)) ** 0.5)
         making.rescaled(ground)
         _round(making)

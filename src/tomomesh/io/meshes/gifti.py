@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,13 +41,14 @@ def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None
     from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiMetaData
 
     placed, patient = _ras(mesh.vertices, beside)
-    space = SCANNER if patient else UNKNOWN
+    space, unit = SCANNER if patient else UNKNOWN, "mm" if beside.unit in MM else beside.unit
+    head = replace(beside, unit=unit, frame="RAS" if patient else beside.frame).head
     points = GiftiDataArray(
         single_precision(placed, path, kind="GIFTI"),
         intent="NIFTI_INTENT_POINTSET",
         datatype="NIFTI_TYPE_FLOAT32",
         coordsys=GiftiCoordSystem(space, space, np.eye(4)),
-        meta=GiftiMetaData(written_by=beside.head, coordinates="RAS, mm" if patient else beside.unit),
+        meta=GiftiMetaData(written_by=head, coordinates="RAS, mm" if patient else unit),
     )
     others = [GiftiDataArray(mesh.faces.astype(np.int32), "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32")]
     others += [
@@ -55,7 +57,7 @@ def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None
     ]
     for array in others:
         array.coordsys = None
-    image = GiftiImage(darrays=[points, *others], meta=GiftiMetaData(Description=beside.head))
+    image = GiftiImage(darrays=[points, *others], meta=GiftiMetaData(Description=head))
     with replacing(path) as file:
         file.write(image.to_xml())
 

@@ -9,6 +9,7 @@ from ...errors import EmptyError, FormatError
 from ...model.mesh import TriMesh
 from ..files.source import existing_file, reader_of, whole
 from ..finite import check_finite
+from .encapsulated import read_encapsulated
 from .gifti import read_gifti
 from .glb import read_glb
 from .obj import read_obj_mesh
@@ -31,8 +32,8 @@ def read_mesh(path: str | Path) -> TriMesh:
     Parameters
     ----------
     path : path
-        ``.stl`` (its equal positions become one vertex), ``.ply``, ``.obj``, ``.off``, ``.vtp``, ``.3mf``, ``.glb`` or
-        ``.gii``. Polygons are cut into triangles.
+        ``.stl`` and DICOM Encapsulated STL, ``.dcm`` (equal positions become one vertex), ``.ply``, ``.obj``, ``.off``,
+        ``.vtp``, ``.3mf``, ``.glb`` or ``.gii``. Polygons are cut into triangles.
 
     Raises
     ------
@@ -73,6 +74,7 @@ MESH_READERS: dict[str, Callable[[bytes, str], Arrays]] = {
     ".ply": read_ply_mesh,
     ".obj": read_obj_mesh,
     ".off": partial(loaded, "off"),
+    ".dcm": read_encapsulated,
     ".vtp": read_vtp_mesh,
     ".3mf": read_3mf,
     ".glb": read_glb,

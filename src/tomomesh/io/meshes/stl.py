@@ -88,21 +88,32 @@ def _text_corners(data: bytes, file: str) -> NDArray[np.float64]:
 
 
 def write_stl(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write a binary file of 32-bit coordinates, each face with its normal, behind a header that names the frame.
+    """Write a binary file.
 
     Raises
     ------
     OutputError
         Where 32 bits cannot keep the vertices apart.
     """
+    data = stl_bytes(mesh, path, beside)
+    with replacing(path) as file:
+        file.write(data)
+
+
+def stl_bytes(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> bytes:
+    """Return a binary file: 32-bit coordinates, each face with its normal, behind a header that names the frame.
+
+    Raises
+    ------
+    OutputError
+        Where 32 bits cannot keep the vertices apart; `path` is named.
+    """
     rows = np.zeros(len(mesh.faces), FACE)
     rows["corners"] = single_precision(mesh.vertices, path, kind="STL")[mesh.faces]
     length = np.linalg.norm(mesh.face_vectors, axis=1, keepdims=True)
     rows["normal"] = mesh.face_vectors / np.where(length > 0, length, 1.0)
-    with replacing(path) as file:
-        file.write(_shortened(beside.head).encode("ascii").ljust(STL_HEADER_BYTES))
-        file.write(np.array(len(rows), "<u4").tobytes())
-        file.write(rows.tobytes())
+    head = _shortened(beside.head).encode("ascii").ljust(STL_HEADER_BYTES)
+    return head + np.array(len(rows), "<u4").tobytes() + rows.tobytes()
 
 
 def _shortened(head: str) -> str:
