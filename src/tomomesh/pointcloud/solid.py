@@ -43,7 +43,7 @@ def fills_solid(positions: Floats) -> bool:
 def distance_within(positions: Floats) -> float:
     """Return how far apart points in a solid are: each owns the cube of that, and k of them fill the ball around k."""
     away = np.asarray(cKDTree(positions).query(positions, k=[NEIGHBORS + 1])[0])
-    return float(np.median(away)) * (4 / 3 * np.pi / NEIGHBORS) ** (1 / 3)
+    return float(np.median(away) * np.cbrt(4 / 3 * np.pi / NEIGHBORS))
 
 
 def depths(positions: Floats, apart: float, edge: float) -> tuple[NDArray[np.float32], Floats]:
