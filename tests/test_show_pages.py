@@ -45,7 +45,7 @@ def test_a_long_cloud_leaves_no_half_of_its_page_empty(axis: int) -> None:
     """Rows and columns with ink reach over most of the page, whichever way the cloud is long."""
     places = np.random.default_rng(0).uniform(-1, 1, (2000, 3))
     places[:, axis] *= 20
-    ink = (drawn(draw_points(PointSet.from_positions(places))) < 250).any(axis=2)
+    ink: NDArray[np.bool_] = np.asarray(drawn(draw_points(PointSet.from_positions(places))) < 250).any(axis=2)
     for side in (0, 1):
         inked = np.flatnonzero(ink.any(axis=side))
         assert np.diff(inked).max() < 0.3 * ink.shape[1 - side]
@@ -93,8 +93,9 @@ def test_panels_of_a_network_share_their_limits(dimensions: int) -> None:
     one, other = draw_adapted(region, region[:12], graph, start=3 * region[12:24]).axes
     assert one.get_xlim() == other.get_xlim()
     assert one.get_ylim() == other.get_ylim()
-    widths = one.collections[1].get_linewidths()
-    assert isinstance(one.collections[1], LineCollection)
+    edges = one.collections[1]
+    assert isinstance(edges, LineCollection)
+    widths = np.asarray(edges.get_linewidth())
     assert (np.ptp(widths) > 0) == (dimensions == 3)
 
 
@@ -116,7 +117,7 @@ def test_labels_by_themselves_are_drawn_as_chosen_others_and_background() -> Non
     stage_one = found.segmentation
     assert stage_one is not None
     window = dict(pictures(stage_one, None, Settings().replace(select=(7,))))["04-window"]
-    assert set(np.unique(window.axes[0].images[0].get_array())) == {0, 1, 2}
+    assert set(np.unique(np.asarray(window.axes[0].images[0].get_array()))) == {0, 1, 2}
 
 
 def test_a_window_that_goes_on_is_told_of() -> None:
