@@ -258,6 +258,7 @@ class TestCommand:
 
     def test_options_of_a_study_without_one(self, made: Path, capsys: CaptureFixture[str]) -> None:
         fails(["check", str(made / "lps.stl"), "--select", "5"], 2, capsys)
+        fails(["check", str(made / "lps.stl"), "--against", str(made / "ras.stl"), "--lower", "5"], 2, capsys)
         fails(["check", str(made / "lps.stl"), "--against", str(made / "labels.nii")], 2, capsys)
         fails(["check", str(made / "lps.stl"), "--against", str(made / "none.nii.gz")], 3, capsys)
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import nibabel
 import numpy as np
 import pytest
-import SimpleITK
 
 from segmentations import by_highdicom, palette, sources
 from studies import AFFINES, LPS_TO_RAS, assert_in_place, sampled, save, write_series
@@ -26,6 +25,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Writer = Callable[[Path, NDArray[Any], Floats], Path]
+
+sitk: Any = pytest.importorskip("SimpleITK")
 
 PAGE = Path(__file__).parents[1] / "docs" / "writers.md"
 PLACES = ["axial", "oblique", "oblique sagittal"]
@@ -44,8 +45,8 @@ WHEELS = {"dcm2niix": "dcm2niix", "itkimage2segimage": "dcmqi"}
 
 
 def of_itk(stored: NDArray[Any], affine: Floats) -> Any:
-    """Return an image of SimpleITK."""
-    image = SimpleITK.GetImageFromArray(stored)
+    """Return an image of sitk."""
+    image = sitk.GetImageFromArray(stored)
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     image.SetSpacing(spacing.tolist())
     image.SetOrigin(affine[:3, 3].tolist())
@@ -73,7 +74,7 @@ def scaled_by_nibabel(folder: Path, stored: NDArray[Any], affine: Floats) -> Pat
 
 def by_simpleitk(suffix: str) -> Writer:
     def write(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
-        SimpleITK.WriteImage(of_itk(stored, affine), str(folder / f"s{suffix}"))
+        sitk.WriteImage(of_itk(stored, affine), str(folder / f"s{suffix}"))
         return folder / f"s{suffix}"
 
     return write
@@ -81,10 +82,10 @@ def by_simpleitk(suffix: str) -> Writer:
 
 def slices_by_simpleitk(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
     """Slices as SimpleITK's own example writes them."""
-    writer: Any = SimpleITK.ImageFileWriter()
+    writer: Any = sitk.ImageFileWriter()
     writer.KeepOriginalImageUIDOn()
     for k, plane in enumerate(stored):
-        image = SimpleITK.GetImageFromArray(plane[None])
+        image = sitk.GetImageFromArray(plane[None])
         spacing = np.linalg.norm(affine[:3, :3], axis=0)
         image.SetSpacing(spacing.tolist())
         fields = {
@@ -176,7 +177,7 @@ def _by_dcmqi(folder: Path, labels: NDArray[Any], affine: Floats, kind: str) -> 
     program = tool("itkimage2segimage")
     for k, data in enumerate(sources(SHAPE, affine)):
         save(data, folder / "ct" / f"{k}.dcm")
-    SimpleITK.WriteImage(of_itk(labels, affine), str(folder / "labels.nrrd"))
+    sitk.WriteImage(of_itk(labels, affine), str(folder / "labels.nrrd"))
     code = {"CodeValue": "85756007", "CodingSchemeDesignator": "SCT", "CodeMeaning": "Tissue"}
     described = [
         {

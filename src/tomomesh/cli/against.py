@@ -16,6 +16,11 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 
+def is_mesh(path: str) -> bool:
+    """Whether a file is a mesh, by its suffix, and no study."""
+    return suffix_of(path) in io.MESH_READERS
+
+
 def compared(chosen: Namespace, mesh: TriMesh, settings: Settings) -> dict[str, Any]:
     """Compare a mesh with another, or with a window or labels of a study, each in its own unit and frame.
 
@@ -26,7 +31,7 @@ def compared(chosen: Namespace, mesh: TriMesh, settings: Settings) -> dict[str, 
     """
     stated = io.frame_of_file(chosen.mesh)
     stated |= {"frame": chosen.mesh_frame.replace("lps", "LPS").replace("ras", "RAS")} if chosen.mesh_frame else {}
-    if suffix_of(chosen.against) in io.MESH_READERS:
+    if is_mesh(chosen.against):
         return _with_mesh(chosen.against, mesh, stated)
     from ..agreement.study import compare_with_study
 

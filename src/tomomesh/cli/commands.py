@@ -13,7 +13,7 @@ from .. import io
 from ..errors import UnreadableError, UsageError, printable
 from ..settings import Settings, option_of, parameters
 from . import summary
-from .against import compared
+from .against import compared, is_mesh
 from .bars import Bars
 from .batch import reconstruct_each
 from .faults import require_kind
@@ -191,7 +191,7 @@ def _check(chosen: Namespace) -> None:
 
     settings = settings_of(chosen)
     of_study = given_of(chosen).keys() - {entry.name for entry in fields(settings.printing)}
-    if of_study and not chosen.against:
+    if of_study and (not chosen.against or is_mesh(chosen.against)):
         asked_for = ", ".join(map(option_of, sorted(of_study)))
         raise UsageError("there is no study to choose voxels of", found=asked_for, expected="--against STUDY")
     mesh = io.read_mesh(chosen.mesh)

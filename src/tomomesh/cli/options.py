@@ -82,7 +82,7 @@ class _Parser(argparse.ArgumentParser):
         return found
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> _Parser:
     """Return the parser of all commands."""
     parser = _Parser(
         prog="tomomesh",
