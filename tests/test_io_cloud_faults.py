@@ -88,6 +88,8 @@ class TestFaults:
             read_points(tmp_path / "c.ply")
         listed = axes + "property list uchar int i\n"
         (tmp_path / "c.ply").write_bytes(head.format("", listed).encode() + place + b"\0")
+        np.testing.assert_array_equal(read_points(tmp_path / "c.ply").positions, [[1, 2, 3]])
+        (tmp_path / "c.ply").write_bytes(head.format("", axes.replace("float x", "list uchar int x")).encode() + place)
         with pytest.raises(FormatError, match="single properties"):
             read_points(tmp_path / "c.ply")
 

@@ -41,7 +41,7 @@ def surface_of_filled(points: Points, settings: Settings, progress: Progress) ->
     return folded(surface, apart, filled, rest, told, boundary_found(edges, rest.value), place_found(points))
 
 
-@timed("voxels")
+@timed("cubes")
 def _fill(points: Points, apart: float, settings: Settings) -> Stage[Volume]:
     asked = settings.cubes.cell_mm
     low, high = box(points.cloud.positions)

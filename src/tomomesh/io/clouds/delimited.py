@@ -141,8 +141,8 @@ def _named_columns(rows: NDArray[np.float64], names: list[str], axes: list[int],
 
 def read_obj(path: Path) -> Cloud:
     """Read the vertices of an OBJ file, with their colors where they have any."""
-    vertices = [words[1:] for words in map(str.split, unfolded(whole(path), str(path))) if words[:1] in VERTEX]
-    width = min(map(len, vertices), default=3)
+    vertices = [words[1:] if words[:1] in VERTEX else [] for words in map(str.split, unfolded(whole(path), str(path)))]
+    width = max(min((len(words) for words in vertices if words), default=3), 3)
     lines = [" ".join(words[:width]) for words in vertices]
     rows = parse_rows(lines, required=(0, 1, 2), file=str(path))
     colors = rows[:, 3:6].T if rows.shape[1] == 6 else rows[:, 4:7].T if rows.shape[1] > 6 else ()
