@@ -13,10 +13,10 @@ from conftest import COMPILED
 from studies import write_nifti
 from tomomesh import PointSet, Settings, Volume, reconstruct, reconstruct_points
 from tomomesh.cli import main
+from tomomesh.effect import without_effect
 from tomomesh.settings import MATTERS, parameters
 from tomomesh.ways import WAYS as TABLE
 from tomomesh.ways import way_of
-from tomomesh.ways.effect import without_effect
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,7 +30,8 @@ OTHER: dict[str, Any] = {
     "epochs": 2, "start": "axes", "neighborhood": "bubble", "alpha": (0.3, 0.1), "alpha_fall": "exponential",
     "alpha_power": 1.5, "radius": (4.0, 0.9), "radius_fall": "linear", "radius_power": 3.0, "least_move": 0.5,
     "bridge": 1.1, "even": False, "trim": 1.5, "cell_mm": (1.5,), "cell_factor": 1.7, "caps": False, "closing": 3,
-    "stacks": "none", "allow_leaks": True, "open": True, "low_pass": 0, "attraction": "surface", "stiffness": 0.9,
+    "stacks": "none", "filled": True, "allow_leaks": True, "open": True, "low_pass": 0, "attraction": "surface",
+    "stiffness": 0.9,
     "damping": 0.9, "step": 0.5, "springs": "triangles", "limit": "shorten", "allow_returns": True,
     "units": "cm", "local_origin": True, "allow_far": True,
     "largest": True, "surface": "outer", "divide": False, "seed": 99, "cell_from": "nearest", "tracking": "faces",

@@ -241,7 +241,12 @@ class TestOurOwn:
     def test_points_with_all_that_is_known_of_them(self, tmp_path: Path) -> None:
         rng = np.random.default_rng(1)
         ids = np.arange(5, dtype=np.int32)
-        known = {"red": ids.astype(np.uint8), "green": ids.astype(np.uint8), "blue": ids.astype(np.uint8), "t": ids / 3}
+        known: dict[str, NDArray[Any]] = {
+            "red": ids.astype(np.uint8),
+            "green": ids.astype(np.uint8),
+            "blue": ids.astype(np.uint8),
+            "t": ids / 3,
+        }
         points = PointSet(rng.normal(size=(5, 3)), ids, ids, np.zeros(5, np.uint8), known)
         io.write_points(points, tmp_path / "c.vtp")
         back = read_points(tmp_path / "c.vtp")

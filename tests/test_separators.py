@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from tomomesh.cli.parameter_options import joined
 ROI = ["-1", "2.5", "-3", "4", "5e1", "66"]
 
 
-def parsed(*words: str) -> dict[str, object]:
+def parsed(*words: str) -> dict[str, Any]:
     return vars(build_parser().parse_args(joined(["reconstruct", "study.npy", "-o", "m.stl", *words])))
 
 

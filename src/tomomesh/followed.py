@@ -188,7 +188,7 @@ def _filled(mask: Mask, threads: int) -> Mask:
 
 def _over_bare(filled: Mask) -> Mask:
     """Fill, in place, a bare slice between two others where both of them are: a surface goes through it."""
-    held = filled.any(axis=(1, 2))
+    held = np.asarray(filled.any(axis=(1, 2)))
     bare = 1 + np.flatnonzero(~held[1:-1] & held[:-2] & held[2:])
     filled[bare] = filled[bare - 1] & filled[bare + 1]
     return filled

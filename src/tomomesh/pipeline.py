@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from .effect import without_effect
 from .finish import compare_with, finish
 from .model.points import PointSet
 from .printing.part import require_printing, turned
@@ -14,7 +15,6 @@ from .settings import Settings
 from .stage import Stage, folded
 from .ways import choose_way, way_of
 from .ways.choice import take_way
-from .ways.effect import without_effect
 from .ways.points import take_points
 
 if TYPE_CHECKING:

@@ -33,13 +33,10 @@ from .outputs import (
     write_surface,
 )
 from .parts import frame_of_mesh, frame_of_part
-from .sources import gathered, numbered, read_study, sources_of
+from .sources import gathered, numbered, read_study, sources_of, window_of_picture
 from .streams import streamed
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from ..results import Surface
 
 
@@ -152,16 +149,17 @@ def _network(chosen: Namespace) -> None:
     settings = replace(settings, network=settings.network.taking(settings.network.detailed or "ring"))
     folder = check_folder(chosen.output)
     check_files(chosen)
+    from ..effect import without_effect
     from ..som.region import train_region
     from ..som.shapes import SHAPES, shape
-    from ..ways.effect import without_effect
     from .pictures import film_of_network, pictures_of_network
 
     given = chosen.region in SHAPES
     if not given and not Path(chosen.region).exists():
         regions = f"{' | '.join(SHAPES)} | a PNG or TIFF file"
         raise UnreadableError("there is no such region", file=chosen.region, expected=regions)
-    inputs, area = shape(chosen.region) if given else (_window_of_picture(chosen.region, settings), 1.0)
+    notes: list[str] = []
+    inputs, area = shape(chosen.region) if given else (window_of_picture(chosen.region, settings, notes), 1.0)
     trained = train_region(inputs, settings.network, seed=settings.run.seed, pixel_area=area)
     make_folder(folder)
     title = f"A network over a {chosen.region if given else 'picture'}"
@@ -171,26 +169,10 @@ def _network(chosen: Namespace) -> None:
     if chosen.film:
         with io.replacing(folder / "02-film.gif") as file:
             file.write(film_of_network(trained, settings, area, title, axes))
-    warnings = without_effect(settings, given_of(chosen), input="color")  # a picture may be in color
+    warnings = notes + without_effect(settings, given_of(chosen), input="color")  # a picture may be in color
     report = {"network": trained.measures, "settings": settings.to_dict(), "warnings": warnings}
     write_documents(chosen, report, settings)
     _tell(chosen, report, summary.of_network(report, chosen.output))
-
-
-def _window_of_picture(path: str, settings: Settings) -> NDArray[np.float64]:
-    """Return the window's pixels of one picture as (column, -row[, layer]), so that up stays up."""
-    import numpy as np
-
-    from ..segmentation.signal import pixels_of
-    from ..segmentation.window import by_layer, choose_window, window
-
-    picture = io.read_picture(path)
-    lower, upper = choose_window(picture, settings.window)
-    mask = window(picture, lower=lower, upper=upper, layers=settings.window.layers)[0]
-    if picture.layers > 1 and settings.network.inputs == "layers":
-        mask = by_layer(picture, lower=lower, upper=upper)[0] & mask[..., None]
-    pixels = pixels_of(mask)
-    return np.asarray(pixels * np.array([1.0, -1.0, 1.0])[: pixels.shape[1]])
 
 
 def _inspect(chosen: Namespace) -> None:

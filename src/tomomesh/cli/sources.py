@@ -12,6 +12,9 @@ from .. import io
 from ..errors import UsageError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ..model.volume import Volume
     from ..settings import Settings
     from .bars import Bars
@@ -99,3 +102,29 @@ def read_study(chosen: Namespace, settings: Settings, progress: Bars) -> tuple[V
     labels = io.read_volume(chosen.labels_in, settings=settings.read, select=select) if total == 2 else None
     progress("read", total, total)
     return volume, labels
+
+
+def window_of_picture(path: str, settings: Settings, notes: list[str]) -> NDArray[np.float64]:
+    """Return the window's pixels of one picture as (column, -row[, layer]), so that up stays up.
+
+    Where no window was asked for, and what Otsu's threshold takes has most of the picture's border, that is the paper:
+    the figure is the rest, and a note says so.
+    """
+    import numpy as np
+
+    from ..segmentation.signal import pixels_of
+    from ..segmentation.window import by_layer, choose_window, window
+
+    picture, asked = io.read_picture(path), settings.window
+    lower, upper = choose_window(picture, asked)
+    mask = window(picture, lower=lower, upper=upper, layers=asked.layers)[0]
+    border = np.concatenate([mask[0], mask[-1], mask[1:-1, 0], mask[1:-1, -1]])
+    chosen = any(limit is not None for limit in (asked.lower, asked.upper, asked.preset))
+    dark = not chosen and border.mean() > 0.5 and not mask.all()
+    if dark:
+        notes.append("the border of the picture is bright: what is dark on it was taken (--lower for what is bright)")
+    mask = mask ^ dark
+    if picture.layers > 1 and settings.network.inputs == "layers":
+        mask = (by_layer(picture, lower=lower, upper=upper)[0] ^ dark) & mask[..., None]
+    pixels = pixels_of(mask)
+    return np.asarray(pixels * np.array([1.0, -1.0, 1.0])[: pixels.shape[1]])

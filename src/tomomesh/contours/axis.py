@@ -192,7 +192,8 @@ def _caps(points: Floats, near: float, spacing: float) -> list[Floats] | None:
     ends = np.split(points[order], cuts)
     if len(ends) != 2 or min(map(len, ends)) < 2:
         return None
-    return [np.linalg.lstsq(_terms(end[:, :2]), end[:, 2], rcond=None)[0] for end in ends]
+    fitted = (np.linalg.lstsq(_terms(end[:, :2]), end[:, 2], rcond=None)[0] for end in ends)
+    return [np.asarray(cap, np.float64) for cap in fitted]
 
 
 def _terms(places: Floats) -> Floats:

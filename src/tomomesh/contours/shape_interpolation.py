@@ -153,10 +153,10 @@ class _Span:
         slopes, ways = [change, change], [way, way]
         if not before:
             fall = self._toward_end(self.link.below, one, upward=False)
-            slopes[0] = parabolic(np.full_like(change, -fall), change, step, step)
+            slopes[0] = (change - fall) / 2
         if not after:
             fall = self._toward_end(self.link.above, other, upward=True)
-            slopes[1] = parabolic(change, np.full_like(change, fall), step, step)
+            slopes[1] = (change + fall) / 2
         if before:
             last = self.shapes[before]
             step_before = one.height - last.height

@@ -6,9 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
-from scipy.spatial.distance import pdist, squareform
 
 from ..errors import EmptyError, GeometryError
 from ..isosurface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
@@ -17,7 +15,7 @@ from ..model.volume import Grid, Volume
 from ..progress import Progress, silent
 from ..settings import FitSettings
 from .assembly import Stack
-from .curves import DENSE, fine_curve
+from .curves import DENSE, chord, fine_curve
 from .levels import slices_at, typical_gap
 from .parts import Part
 from .rings import Outline, nested, outline
@@ -227,22 +225,10 @@ def _outlined(points: Floats, allow_leaks: bool) -> tuple[Floats, Outline]:
     found = outline(placed)
     if not (found.open and allow_leaks):
         return np.column_stack([placed, heights]), found
-    chords = [(_chord(placed[numbers]), heights[numbers].mean()) for numbers in found.open]
-    more = [np.column_stack([chord, np.full(len(chord), height)]) for chord, height in chords]
+    chords = [(chord(placed[numbers]), heights[numbers].mean()) for numbers in found.open]
+    more = [np.column_stack([line, np.full(len(line), height)]) for line, height in chords]
     closed, again = _outlined(np.concatenate([np.column_stack([placed, heights]), *more]), allow_leaks=False)
     return closed, Outline(again.rings, again.parts, found.open, again.reach)
-
-
-def _chord(curve: Floats) -> Floats:
-    """Return points from one end of an open curve (p, 2) to the other, as far apart as its own."""
-    distance = np.asarray(cKDTree(curve).query(curve, k=[2])[0])
-    tree = minimum_spanning_tree(squareform(pdist(curve)))
-    ways = dijkstra(tree, directed=False)
-    first = int(np.argmax(ways[0]))
-    last = int(np.argmax(ways[first]))
-    way = curve[last] - curve[first]
-    count = int(np.hypot(*way) / np.median(distance))
-    return np.asarray(curve[first] + np.arange(1, count)[:, None] / max(count, 1) * way)
 
 
 def _refuse_open(found: list[Outline], slices: Slices, allow_leaks: bool) -> None:
@@ -258,7 +244,9 @@ def _refuse_open(found: list[Outline], slices: Slices, allow_leaks: bool) -> Non
         )
 
 
-def _stack(drawn: list[Floats], found: list[Outline], slices: Slices, edge: float, thickness: float | None) -> Stack:
+def _stack(
+    drawn: list[Floats], found: list[Outline], slices: Slices, edge: float, thickness: float | None = None
+) -> Stack:
     """Link the parts of all slices."""
     parts = [
         part

@@ -23,6 +23,7 @@ from ..model.mesh import QuadMesh, TriMesh
 from ..opensurface.gaps import gaps
 from ..pointcloud.bridges import bridges
 from ..pointcloud.forecast import require_room
+from ..pointcloud.solid import fills_solid
 from ..results import Surface
 from ..stage import Stage, folded, measured, timed
 from .points import place_found
@@ -93,7 +94,7 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     settled = settle(points, settings, progress)
     samples, origin = settled.value, lowest_corner(points)
     shell = _close(points, samples, settings, progress)
-    walls = _walls(shell.value, samples, origin, settings)
+    walls = _walls(shell.value, samples, points, settings)
     rough = measured("smooth", _smoothed, shell.value, settings)
     kept, smoothed, ring = rough.value.faces, rough.value.mesh, rough.value.ring
     rest = measured("fit", _fitted, shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
@@ -154,22 +155,27 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
     return best
 
 
-def _walls(shell: Shell, samples: Samples, origin: Floats, settings: Settings) -> Stage[int]:
+def _walls(shell: Shell, samples: Samples, points: Points, settings: Settings) -> Stage[int]:
     """Count the walls of a shell.
 
     Raises
     ------
     GeometryError
-        Where the outside leaks in; names the widest gap.
+        Where the outside leaks in; names the widest gap. Where the points fill a solid, as that.
     """
     tight = shell.leak_test.tight
     flat = not tight and is_flat(samples.positions, float(np.median(samples.spacing)))
     walls = count_walls(settings, tight=tight, flat=flat)
     if walls is not None:
         return walls
+    if fills_solid(points.places):
+        raise GeometryError(
+            "the points fill a solid, and do not lie on its surface", found=f"{len(points.cloud)} points",
+            expected="points on the surface of the object", hint="--filled, for the boundary of what they fill",
+        )  # fmt: skip
     cell = float(shell.cell.min())
     found = gaps(samples, cell, threads=settings.run.threads)
-    where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]
+    where = [f"a gap of {gap.size:.4g} around {_place(gap.place + lowest_corner(points))}" for gap in found[:1]]
     raise GeometryError(
         ("the points look like an open surface: " if found else "")
         + "the outside leaks into the shell of cubes, so its surface would have two walls",

@@ -95,4 +95,4 @@ def fans(corners: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int
     """
     first = np.repeat(np.cumsum(sizes) - sizes, sizes - 2)
     step = np.arange(len(first)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
-    return corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+    return np.asarray(corners[np.stack([first, first + step + 1, first + step + 2], axis=1)])
