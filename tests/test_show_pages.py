@@ -45,7 +45,7 @@ def test_a_long_cloud_leaves_no_half_of_its_page_empty(axis: int) -> None:
     """Rows and columns with ink reach over most of the page, whichever way the cloud is long."""
     places = np.random.default_rng(0).uniform(-1, 1, (2000, 3))
     places[:, axis] *= 20
-    ink: NDArray[np.bool_] = np.asarray(drawn(draw_points(PointSet.from_positions(places))) < 250).any(axis=2)
+    ink = np.asarray((drawn(draw_points(PointSet.from_positions(places))) < 250).any(axis=2))
     for side in (0, 1):
         inked = np.flatnonzero(ink.any(axis=side))
         assert np.diff(inked).max() < 0.3 * ink.shape[1 - side]

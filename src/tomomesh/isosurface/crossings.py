@@ -102,7 +102,7 @@ class Levels:
         """
         every = -(-len(inner) // SAMPLES) or 1
         inner, steps = inner[::every], steps[::every]
-        if self.are_two(inner, inner + steps):
+        if self.are_two(inner, inner + steps) and self._are_all(inner, steps):
             return True
         whole, step, clear = self._heights(inner, steps)
         known, shares = np.isfinite(whole + step), step[clear] / whole[clear]
@@ -112,6 +112,11 @@ class Levels:
         """Tell whether voxels inside (n, 3) all have one level, and those outside another, as those of a mask do."""
         sides = [levels[np.isfinite(levels).all(axis=1)] for levels in (self.at(inner), self.at(outer))]
         return all(len(levels) and not np.ptp(levels, axis=0).any() for levels in sides)
+
+    def _are_all(self, inner: NDArray[np.int32], steps: NDArray[np.int32]) -> bool:
+        """Tell whether four voxels in a line have two levels alone: distances from a box are two beside it alone."""
+        levels = np.concatenate([self.at(inner + n * steps) for n in (-1, 0, 1, 2)])
+        return len(np.unique(levels[np.isfinite(levels).all(axis=1)], axis=0)) <= 2
 
     def _heights(
         self, inner: NDArray[np.int32], steps: NDArray[np.int32]

@@ -26,6 +26,8 @@ STEP = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of an even sequence in the square, the inverse of the plastic number and its square (Roberts 2018)."""
 SHARE = 1.0
 """Percent of a surface that tells what is common on it."""
+SPOT = 4.0
+"""Edge of a cube over a width within which narrow places count together: room for a spot of one width and its rim."""
 BLOCK = 1_000
 """Samples handled at once: some milliseconds. No result depends on it."""
 
@@ -56,6 +58,15 @@ class Thickness:
     def area_below(self, width: float) -> float:
         """Return the area of the surface where it is narrower."""
         return float(self.areas[self.widths < width].sum())
+
+    def widest_spot(self, width: float) -> float:
+        """Return the most area that is narrower within a cube of `SPOT` times the width."""
+        thin = self.widths < width
+        if not thin.any():
+            return 0.0
+        cube = np.floor((self.places[thin] - self.places.min(axis=0)) / (SPOT * width)).astype(np.int64)
+        _, owner = np.unique(cube, axis=0, return_inverse=True)
+        return float(np.bincount(owner.reshape(-1), self.areas[thin]).max())
 
     def percentile(self, percent: float) -> float:
         """Return the width that so much of the surface stays below; infinite where less of it has any."""

@@ -123,7 +123,8 @@ def level_surface(depth: Depth, within: NDArray[np.bool_], level: float, threads
     """Return the surface around nodes that lie beyond a level, outward from them, between the nodes by their values."""
     affine = np.diag([depth.step, depth.step, depth.step, 1.0])
     affine[:3, 3] = depth.low
-    mask, values = (np.ascontiguousarray(each.transpose(2, 1, 0)) for each in (within, depth.values))
+    mask = np.ascontiguousarray(within.transpose(2, 1, 0))
+    values = np.ascontiguousarray(depth.values.transpose(2, 1, 0))
     found = boundary(Volume.from_stored(values, affine), mask, lower=level, threads=threads)
     return voxel_surface(found, FIT, threads=threads).mesh
 

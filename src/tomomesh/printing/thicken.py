@@ -62,7 +62,7 @@ def thickened(mesh: TriMesh, least: float, *, threads: int, progress: Progress) 
 
     for _ in range(ROUNDS):
         walls, _ = walls_and_gaps(mesh, near=least, threads=threads, progress=progress)
-        if walls.area_below(least) <= SPARED * least**2:
+        if walls.widest_spot(least) <= SPARED * least**2:
             break
         tiles = list(_tiles(_middle(mesh, walls, least, threads), TILE * least / (2 * STEPS)))
         added = []

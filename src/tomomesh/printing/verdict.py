@@ -115,7 +115,7 @@ def _reasons(told: dict[str, Any], walls: Thickness, least: float) -> list[str]:
     reasons = []
     if told["floating_pieces"]:
         reasons.append(f"{told['floating_pieces']} of {told['pieces']} pieces float free of the plate (--one-piece)")
-    if walls.area_below(least) > least**2:
+    if walls.widest_spot(least) > least**2:
         share = 100 * told["thin_wall_share"]
         thinnest = f"thinnest wall {told['thinnest_wall_mm']:.3g} mm at {_at(told['thinnest_wall_at_mm'])}"
         reasons.append(f"{thinnest}, {share:.3g} % of the surface under {least:g} mm (--thicken {least:g})")

@@ -204,8 +204,9 @@ def scale_bar(ax: Axes, bounds: Floats, plane: Plane) -> None:
     """Put the length that all slices share above the first, where it hides none of it."""
     left, right = float(bounds[0, 0]), float(bounds[1, 0])
     length = nice_length(right - left)
-    share = length / (right - left)
+    share, figure = length / (right - left), ax.get_figure(root=True)
+    assert figure is not None
     look: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "color": INK}
-    above = ax.transAxes + ScaledTranslation(0, BAR / 72, ax.get_figure(root=True).dpi_scale_trans)
+    above = ax.transAxes + ScaledTranslation(0, BAR / 72, figure.dpi_scale_trans)
     ax.plot([0, share], [1, 1], color=INK, linewidth=1.6, transform=above, clip_on=False, solid_capstyle="butt")
     ax.annotate(f"{length:g} {plane.unit}".strip(), (share, 1), (4, BAR), va="center", fontsize=6.8, **look)

@@ -71,7 +71,8 @@ def draw_learning(history: History, *, unit: str = "") -> Figure:
     heading(axes[0], "Quantization error", f"mean distance of an input to its winner{ending}")
     _curves(axes[1], {"largest move": history.largest_move}, log=True)
     heading(axes[1], "Largest move", f"of a neuron in an epoch{ending}")
-    _curves(axes[2], {"radius": history.radius} | ({"learning rate": rate} if online else {}), log=online)
+    curves: dict[str, NDArray[np.generic]] = {"radius": history.radius}
+    _curves(axes[2], curves | ({"learning rate": rate} if online else {}), log=online)
     heading(axes[2], "Radius" + (" and learning rate" if online else ""), "of the neighborhood, hops")
     for ax in axes:
         ax.set_xlabel("epoch")

@@ -119,7 +119,8 @@ def area_of_each(inputs: NDArray[np.float64], lattice: Lattice, weights: NDArray
     if len(places) <= NEIGHBORS:
         return 0.0
     some = places[:: -(-len(places) // LOOKED_AT)]
-    reach = float(np.median(cKDTree(places).query(some, k=NEIGHBORS + 1)[0][:, -1]))
+    apart, _ = cKDTree(places).query(some, k=NEIGHBORS + 1)
+    reach = float(np.median(np.asarray(apart)[:, -1]))
     covered = len(places) * np.pi * reach**2 / (NEIGHBORS + 0.5)
     mean_radius = float(np.sqrt(places.var(axis=0).sum()))
     half_width = covered / (4 * np.pi * max(mean_radius, 1e-300))
