@@ -14,7 +14,7 @@ import numpy as np
 from ..kernels.cuberille.bitmasks import compose, flood
 from ..kernels.cuberille.cells import label_components
 from ..model.cubes import keys_of
-from .bitmasks import Blocks
+from .bitmasks import EDGE, Blocks
 from .neighbors import FACE_COLUMNS, neighbor_table
 
 if TYPE_CHECKING:
@@ -96,6 +96,31 @@ def close_shell(cells: NDArray[np.int64], closing: int, *, threads: int = 0) -> 
     within = blocks.cells(occupied & ~reached)
     near = blocks.spread(_roomy(blocks, enclosed, ROOM * len(cells)), solid, 2 * closing + NEAR)
     return Shell(blocks, occupied, solid, occupied & near, within, closing, added)
+
+
+def shell_around(inside: NDArray[np.int64], cells: NDArray[np.int64], *, threads: int = 0) -> Shell:
+    """Take a solid whose cubes are known.
+
+    Parameters
+    ----------
+    inside : (i, 3) int64 array
+        Positions (x, y, z) of the cubes inside.
+    cells : (c, 3) int64 array
+        Those of the cubes that hold points; where they face the outside they tell of an inside.
+    threads : int
+
+    Returns
+    -------
+    Shell
+        Well composed, its pockets filled.
+    """
+    blocks = Blocks.around(inside, NEAR, threads=threads)
+    outside = blocks.beyond()
+    flood(~blocks.bitmask_of(inside), blocks.table, outside)
+    solid, added = _well_composed(blocks, ~outside)
+    known = np.isin(keys_of(cells // EDGE), blocks.keys)
+    occupied = blocks.grown(blocks.bitmask_of(cells[known]))
+    return Shell(blocks, occupied, solid, occupied, np.empty((0, 3), np.int64), 0, added)
 
 
 def _roomy(blocks: Blocks, enclosed: Bitmask, least: float) -> Bitmask:

@@ -46,6 +46,9 @@ class CubeSettings(Group):
     allow_leaks: bool = param(
         False, "write the surface even where the outside leaks in, or where it encloses less than half of its window"
     )
+    fill_holes: bool = param(
+        False, "cap the holes of a cloud's surface along their borders, however wide, and mark the faces as filled"
+    )
     open: bool = param(False, "write an open surface as a one-sided sheet with its borders")
     surface: str = param(
         "auto",

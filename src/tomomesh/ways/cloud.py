@@ -12,6 +12,7 @@ from ..cuberille.leak_test import SURE, close_leaks
 from ..cuberille.neighbors import once_each
 from ..cuberille.partition import cubes_over, is_flat
 from ..dynamics.low_pass import OneRing
+from ..dynamics.membrane import capped
 from ..dynamics.moving_least_squares import SurfaceFit, fit_to_surface
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError
@@ -21,12 +22,13 @@ from ..model.cubes import cells_of
 from ..model.mesh import QuadMesh, TriMesh
 from ..opensurface.gaps import gaps
 from ..pointcloud.bridges import bridges
+from ..pointcloud.filling import fill_inside, made_up
 from ..pointcloud.forecast import require_room
 from ..results import Surface
 from ..stage import Stage, folded, measured, timed
 from .points import place_found
-from .samples import cell_edges, lowest_corner, settle
-from .sections import body_of_cubes, count_walls, fit_found, hollow, shell_found
+from .samples import cell_edges, lowest_corner, require_parts, settle
+from .sections import body_of_cubes, count_walls, fit_found, hollow, shell_found, walls_found
 from .way import CUBES, POINTS, Way, on_input, parameters
 
 if TYPE_CHECKING:
@@ -53,6 +55,18 @@ TRIED = ((0, 1, 2), (3, 4, 5, 6, 7, 8))
 closing of two joins what lies nearer than four cubes, about what the shorter bridges span."""
 
 
+MET = 0.8
+"""Share of the samples that must lie at a surface for it to be theirs: on scans that were measured .93 and more do, and
+half of them where both walls of a plate are taken for one."""
+MADE_UP = 0.25
+"""Share of a surface without samples from which it is refused, unless holes are to be filled: a third of a hemisphere's
+is, and a scan from four sides leaves a sixth."""
+THIN = (
+    "the points lie on both sides of a part so thin that they cannot be told apart: the surface was laid around them, "
+    "and is smoothed, but not fitted"
+)
+
+
 @dataclass(frozen=True)
 class Shell:
     """Cubes of an edge (3,) from a lowest corner, what spans their holes, and how they hold."""
@@ -62,6 +76,14 @@ class Shell:
     cubes: int
     spanned: Bridges
     leak_test: LeakTest
+    doubt: str = ""
+    """Where inside and outside were told apart by the normals alone, in words."""
+
+    @property
+    def is_thin(self) -> bool:
+        """Whether all but a few of its cubes lie at its surface, as those of a thin plate do."""
+        faces = self.leak_test.faces
+        return len(np.unique(faces.cells[faces.occupied], axis=0)) >= MET * self.cubes
 
     def taken(self, settings: Settings) -> NDArray[np.bool_]:
         """Tell of each surface whether it is kept."""
@@ -117,9 +139,10 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
 @timed("cubes")
 def _close(points: Points, samples: Samples, settings: Settings, progress: Progress) -> Stage[Shell]:
     shell = _tightest(len(points.cloud), samples, settings, progress)
-    return folded(
-        shell, shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
-    )  # fmt: skip
+    if not shell.leak_test.tight and samples.normals.any() and not _is_flat(samples):
+        shell = _by_normals(shell, samples, lowest_corner(points), settings, progress)
+    told = shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
+    return folded(shell, told, Stage(None, warnings=(shell.doubt,) if shell.doubt else ()))
 
 
 def _tightest(count: int, samples: Samples, settings: Settings, progress: Progress) -> Shell:
@@ -127,7 +150,9 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
     cubes, best = settings.cubes, None
     closings = TRIED if cubes.closing is None else ((cubes.closing,),)
     reach = WIDEST * float(np.median(samples.spacing))
-    for tried, span, cell in product(closings, SPANS, cell_edges(samples, settings)):
+    edges = cell_edges(samples, settings)
+    require_parts(samples, edges[0], 3)
+    for tried, span, cell in product(closings, SPANS, edges):
         require_room(count, samples, cell)
         spanned = bridges(samples, float(cell.min()), span=span, threads=settings.run.threads, progress=progress)
         lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
@@ -144,6 +169,26 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
     return best
 
 
+def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settings, progress: Progress) -> Shell:
+    """Return a shell around what the normals say is inside; the one that leaks where they say nothing of the kind."""
+    places, threads = np.concatenate([samples.positions, shell.spanned.places]), settings.run.threads
+    lowest, keys = cubes_over(places, shell.cell)
+    leaky = close_leaks(cells_of(once_each(keys)), TRIED[-1][-1:], threads=threads, progress=progress)
+    asked = float(shell.cell.min()) if settings.cubes.cell_mm else None
+    found = fill_inside(samples, leaky, lowest, shell.cell, cell=asked, threads=threads, progress=progress)
+    middles = found.lowest + found.cell * (found.leak_test.faces.cells + 0.5)
+    share = float(made_up(middles, samples, found.cell).mean())
+    if found.met < MET or (share > MADE_UP and not settings.cubes.fill_holes):
+        return shell
+    where = _place(found.doubtful + origin)
+    doubt = f"the shell of cubes does not hold: the normals tell inside from outside, least surely around {where}"
+    return Shell(np.full(3, found.cell), found.lowest, found.cubes, shell.spanned, found.leak_test, doubt)
+
+
+def _is_flat(samples: Samples) -> bool:
+    return is_flat(samples.positions, float(np.median(samples.spacing)))
+
+
 def _walls(shell: Shell, samples: Samples, origin: Floats, settings: Settings) -> Stage[int]:
     """Count the walls of a shell.
 
@@ -153,19 +198,21 @@ def _walls(shell: Shell, samples: Samples, origin: Floats, settings: Settings) -
         Where the outside leaks in; names the widest gap.
     """
     tight = shell.leak_test.tight
-    flat = not tight and is_flat(samples.positions, float(np.median(samples.spacing)))
+    flat = not tight and _is_flat(samples)
     walls = count_walls(settings, tight=tight, flat=flat)
     if walls is not None:
         return walls
     cell = float(shell.cell.min())
     found = gaps(samples, cell, threads=settings.run.threads)
+    if not found and shell.is_thin:
+        return walls_found(2, THIN)
     where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]
     raise GeometryError(
         ("the points look like an open surface: " if found else "")
         + "the outside leaks into the shell of cubes, so its surface would have two walls",
         found=f"{len(found)} border(s), the widest {where[0]}" if found else f"cell = {cell:.4g}",
         expected="points all around the object, without gaps as wide as its holes",
-        hint="--open for a sheet with borders, a larger --closing or --cell, or --allow-leaks",
+        hint="--fill-holes to cap what is open, --open for a sheet with borders, or --allow-leaks",
     )
 
 
@@ -195,13 +242,17 @@ def _fitted(
     edge, threads = float(shell.cell.min()), settings.run.threads
     start = rough.mesh.vertices
     fitted = fit_to_surface(start, rough.ring, samples, edge, settings.fit, threads=threads, progress=progress)
-    return Rest(TriMesh(fitted.vertices, fitted.faces), any_of(fitted.filled[fitted.faces]), fitted)
+    mesh, filled = TriMesh(fitted.vertices, fitted.faces), fitted.filled
+    if shell.doubt:
+        filled = filled | made_up(mesh.vertices, samples, edge)
+        mesh = mesh.moved(capped(mesh, filled)) if settings.cubes.fill_holes else mesh
+    return Rest(mesh, any_of(filled[mesh.faces]), fitted)
 
 
 WAY = Way(
     applies=lambda settings, input: input in POINTS,
     because=on_input,
-    reads=CUBES | parameters("stacks", "open", "attraction", "damping", "step"),
+    reads=CUBES | parameters("fill_holes", "stacks", "open", "attraction", "damping", "step"),
     surface=surface_of_cloud,
     of_body=body_of_cubes,
 )
