@@ -12,7 +12,7 @@ from ..cuberille.closing import shell_around
 from ..cuberille.faces import exposed_faces
 from ..cuberille.leak_test import LeakTest
 from ..model.columns import cells_at
-from .indicator import find_inside
+from .indicator import facing, find_inside
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -89,7 +89,7 @@ def fill_inside(
     own = max(FINE * spacing, float(np.prod(np.maximum(box, spacing)) / room) ** (1 / 3))
     edge = own if cell is None else max(cell, own)
     outward = samples.positions - samples.positions.mean(axis=0)
-    starts = [_facing(samples.normals, way) for way in (_of_shell(samples, leaky, lowest, edges), outward)]
+    starts = [facing(samples.normals, way) for way in (_of_shell(samples, leaky, lowest, edges), outward)]
     found = find_inside(samples, starts, edge, threads=threads, progress=progress)
     cells = np.unique(cells_at(samples.positions, found.lowest, np.full(3, edge)), axis=0)
     shell = shell_around(found.inside, cells, threads=threads)
@@ -113,8 +113,3 @@ def _of_shell(samples: Samples, leaky: LeakTest, lowest: Floats, edges: Floats) 
     ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     near = cKDTree(corners.mean(axis=1)).query(samples.positions, k=list(range(1, NEIGHBORS + 1)))[1]
     return np.asarray(ways[near].sum(axis=1))
-
-
-def _facing(normals: Floats, ways: Floats) -> Floats:
-    """Turn normals so that they face a way, (p, 3)."""
-    return np.where((normals * ways).sum(axis=1)[:, None] < 0, -normals, normals)

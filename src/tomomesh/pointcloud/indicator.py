@@ -92,9 +92,15 @@ def find_inside(
         found.append((normals, fall))
     progress("inside", len(starts) * ROUNDS, len(starts) * ROUNDS)
     normals, fall = max(found, key=lambda one: float(one[1].mean()))
+    normals = facing(samples.normals, normals)
     values = lattice.values(lattice.solved(normals * area[:, None], width))
     inside = np.argwhere(values > np.median(lattice.at(values)))
     return Indicator(lattice.lowest, inside.astype(np.int64), normals, int(np.argmin(fall)))
+
+
+def facing(normals: Floats, ways: Floats) -> Floats:
+    """Turn normals so that they face a way, (p, 3)."""
+    return np.where((normals * ways).sum(axis=1)[:, None] < 0, -normals, normals)
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ class CubeSettings(Group):
     open: bool = param(False, "write an open surface as a one-sided sheet with its borders")
     surface: str = param(
         "auto",
-        "the outer surfaces, or all, with what lies in cavities; auto is outer, and all without a network",
+        "the outer surfaces, or all, with what lies in cavities; auto is all on voxels and on the points of a cloud, else outer",
         choices=("auto", "outer", "all"),
     )
     divide: bool = param(

@@ -27,8 +27,8 @@ from ..pointcloud.forecast import require_room
 from ..results import Surface
 from ..stage import Stage, folded, measured, timed
 from .points import place_found
-from .samples import cell_edges, lowest_corner, require_parts, settle
-from .sections import body_of_cubes, count_walls, fit_found, hollow, shell_found, walls_found
+from .samples import WALLS, cell_edges, lowest_corner, require_parts, settle, too_wide
+from .sections import WIDE, body_of_cubes, count_walls, fit_found, hollow, shell_found, walls_found
 from .way import CUBES, POINTS, Way, on_input, parameters
 
 if TYPE_CHECKING:
@@ -58,12 +58,18 @@ closing of two joins what lies nearer than four cubes, about what the shorter br
 MET = 0.8
 """Share of the samples that must lie at a surface for it to be theirs: on scans that were measured .93 and more do, and
 half of them where both walls of a plate are taken for one."""
-MADE_UP = 0.25
+FEW = 8
+"""Cubes with points deep inside of a surface from which that is warned of. A warning's threshold, chosen: no mesh depends
+on it."""
+MADE_UP = 0.2
 """Share of a surface without samples from which it is refused, unless holes are to be filled: a third of a hemisphere's
 is, and a scan from four sides leaves a sixth."""
-THIN = (
+THIN = 0.5
+"""Share of the cubes that must lie at the surface of what is thin: .65 of a plate's in noise, .27 of a solid's of 20
+cubes."""
+BOTH_SIDES = (
     "the points lie on both sides of a part so thin that they cannot be told apart: the surface was laid around them, "
-    "and is smoothed, but not fitted"
+    "and may be wrong there"
 )
 
 
@@ -83,7 +89,7 @@ class Shell:
     def is_thin(self) -> bool:
         """Whether all but a few of its cubes lie at its surface, as those of a thin plate do."""
         faces = self.leak_test.faces
-        return len(np.unique(faces.cells[faces.occupied], axis=0)) >= MET * self.cubes
+        return len(np.unique(faces.cells[faces.occupied], axis=0)) >= THIN * self.cubes
 
     def taken(self, settings: Settings) -> NDArray[np.bool_]:
         """Tell of each surface whether it is kept."""
@@ -139,10 +145,22 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
 @timed("cubes")
 def _close(points: Points, samples: Samples, settings: Settings, progress: Progress) -> Stage[Shell]:
     shell = _tightest(len(points.cloud), samples, settings, progress)
-    if not shell.leak_test.tight and samples.normals.any() and not _is_flat(samples):
-        shell = _by_normals(shell, samples, lowest_corner(points), settings, progress)
+    unsure = shell.leak_test.two_sided < SURE or shell.leak_test.shell.closing > WIDE
+    if unsure and settings.cubes.closing is None and not _is_wide(shell, samples) and not _is_flat(samples):
+        other = _by_normals(shell, samples, lowest_corner(points), settings, progress)
+        shell = other if other.leak_test.is_better_than(shell.leak_test) else shell
     told = shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
-    return folded(shell, told, Stage(None, warnings=(shell.doubt,) if shell.doubt else ()))
+    said = (shell.doubt, _joined(shell, lowest_corner(points)))
+    return folded(shell, told, Stage(None, warnings=tuple(one for one in said if one)))
+
+
+def _joined(shell: Shell, origin: Floats) -> str:
+    """Say where points lie deep inside of the surface; nothing where none do."""
+    buried = shell.leak_test.shell.buried() if shell.leak_test.tight and not shell.doubt else ()
+    if len(buried) < FEW:
+        return ""
+    where = _place(shell.lowest + shell.cell * (buried[len(buried) // 2] + 0.5) + origin)
+    return f"points lie deep inside of the surface around {where}: what is nearer than the cubes can part was joined"
 
 
 def _tightest(count: int, samples: Samples, settings: Settings, progress: Progress) -> Shell:
@@ -159,7 +177,7 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
         cells = cells_of(once_each(keys))
         steps = [k for k in tried if cubes.closing is not None or k * cell.min() <= reach]
         leak_test = close_leaks(
-            cells, steps, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
+            cells, steps, cavities=cubes.surface != "outer", threads=settings.run.threads, progress=progress
         )  # fmt: skip
         if best is None or leak_test.two_sided >= SURE or leak_test.is_better_than(best.leak_test):
             best = Shell(cell, lowest, len(cells), spanned, leak_test)
@@ -171,6 +189,8 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
 
 def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settings, progress: Progress) -> Shell:
     """Return a shell around what the normals say is inside; the one that leaks where they say nothing of the kind."""
+    if not samples.normals.any():
+        return shell
     places, threads = np.concatenate([samples.positions, shell.spanned.places]), settings.run.threads
     lowest, keys = cubes_over(places, shell.cell)
     leaky = close_leaks(cells_of(once_each(keys)), TRIED[-1][-1:], threads=threads, progress=progress)
@@ -183,6 +203,11 @@ def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settin
     where = _place(found.doubtful + origin)
     doubt = f"the shell of cubes does not hold: the normals tell inside from outside, least surely around {where}"
     return Shell(np.full(3, found.cell), found.lowest, found.cubes, shell.spanned, found.leak_test, doubt)
+
+
+def _is_wide(shell: Shell, samples: Samples) -> bool:
+    """Tell whether the cubes are so much wider than the points lie apart that these have no say."""
+    return float(shell.cell.min()) > WALLS * float(np.median(samples.spacing))
 
 
 def _is_flat(samples: Samples) -> bool:
@@ -203,9 +228,11 @@ def _walls(shell: Shell, samples: Samples, origin: Floats, settings: Settings) -
     if walls is not None:
         return walls
     cell = float(shell.cell.min())
+    if _is_wide(shell, samples):
+        raise too_wide(shell.cell)
     found = gaps(samples, cell, threads=settings.run.threads)
     if not found and shell.is_thin:
-        return walls_found(2, THIN)
+        return walls_found(1, BOTH_SIDES)
     where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]
     raise GeometryError(
         ("the points look like an open surface: " if found else "")

@@ -115,11 +115,15 @@ def require_parts(samples: Samples, cell: Floats, axes: int) -> None:
     extents = np.ptp(samples.positions, axis=0)
     across = np.sort(extents / cell)[-axes]
     if 0 < across < WALLS and cell.min() > WALLS * float(np.median(samples.spacing)):
-        raise GeometryError(
-            "the cubes are wider than the parts of the object", found=f"cell = {cell.max():.4g}",
-            expected=f"at most {cell.max() * across / WALLS:.2g}, {WALLS} of them across the points",
-            hint="a smaller --cell, or none: it is found from the points",
-        )  # fmt: skip
+        raise too_wide(cell, f"at most {cell.max() * across / WALLS:.2g}, {WALLS} of them across the points")
+
+
+def too_wide(cell: Floats, expected: str = "two walls of cubes, and some between them, in every part") -> GeometryError:
+    """Return the error of cubes in whose shell the object has no inside."""
+    return GeometryError(
+        "the cubes are wider than the parts of the object", found=f"cell = {cell.max():.4g}", expected=expected,
+        hint="a smaller --cell, or none: it is found from the points",
+    )  # fmt: skip
 
 
 def points_in_words(report: dict[str, Any]) -> str:
