@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def capped(mesh: TriMesh, free: NDArray[np.bool_]) -> NDArray[np.float64]:
     count, (a, b) = len(free), mesh.edges.T
     links = sparse.coo_array((np.ones(len(a)), (a, b)), shape=(count, count))
     links = sparse.csr_array(links + links.T)
-    _, piece = sparse.csgraph.connected_components(links, directed=False)
+    _, piece = connected_components(links, directed=False)
     held = np.bincount(piece, ~free) > 0
     moving = np.flatnonzero(free & held[piece])
     if len(moving) == 0:

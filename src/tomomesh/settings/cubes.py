@@ -52,7 +52,8 @@ class CubeSettings(Group):
     open: bool = param(False, "write an open surface as a one-sided sheet with its borders")
     surface: str = param(
         "auto",
-        "the outer surfaces, or all, with what lies in cavities; auto is all on voxels and on the points of a cloud, else outer",
+        "the outer surfaces, or all, with what lies in cavities; auto is outer for rings, networks and nearest points, "
+        "else all",
         choices=("auto", "outer", "all"),
     )
     divide: bool = param(

@@ -22,12 +22,12 @@ from ..model.cubes import cells_of
 from ..model.mesh import QuadMesh, TriMesh
 from ..opensurface.gaps import gaps
 from ..pointcloud.bridges import bridges
-from ..pointcloud.filling import fill_inside, made_up
+from ..pointcloud.filling import fill_inside, holes, made_up
 from ..pointcloud.forecast import require_room
 from ..results import Surface
 from ..stage import Stage, folded, measured, timed
 from .points import place_found
-from .samples import WALLS, cell_edges, lowest_corner, require_parts, settle, too_wide
+from .samples import ACROSS, cell_edges, lowest_corner, require_parts, settle, too_wide
 from .sections import WIDE, body_of_cubes, count_walls, fit_found, hollow, shell_found, walls_found
 from .way import CUBES, POINTS, Way, on_input, parameters
 
@@ -56,11 +56,11 @@ closing of two joins what lies nearer than four cubes, about what the shorter br
 
 
 MET = 0.8
-"""Share of the samples that must lie at a surface for it to be theirs: on scans that were measured .93 and more do, and
-half of them where both walls of a plate are taken for one."""
+"""Share of the samples that must lie at a surface for it to be theirs: .97 and more do on the
+scans that were measured."""
 FEW = 8
-"""Cubes with points deep inside of a surface from which that is warned of. A warning's threshold, chosen: no mesh depends
-on it."""
+"""Cubes with points deep inside of a surface from which that is warned of. A warning's threshold, chosen: no mesh
+depends on it."""
 MADE_UP = 0.2
 """Share of a surface without samples from which it is refused, unless holes are to be filled: a third of a hemisphere's
 is, and a scan from four sides leaves a sixth."""
@@ -207,7 +207,7 @@ def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settin
 
 def _is_wide(shell: Shell, samples: Samples) -> bool:
     """Tell whether the cubes are so much wider than the points lie apart that these have no say."""
-    return float(shell.cell.min()) > WALLS * float(np.median(samples.spacing))
+    return float(shell.cell.min()) > ACROSS * float(np.median(samples.spacing))
 
 
 def _is_flat(samples: Samples) -> bool:
@@ -271,7 +271,7 @@ def _fitted(
     fitted = fit_to_surface(start, rough.ring, samples, edge, settings.fit, threads=threads, progress=progress)
     mesh, filled = TriMesh(fitted.vertices, fitted.faces), fitted.filled
     if shell.doubt:
-        filled = filled | made_up(mesh.vertices, samples, edge)
+        filled = filled | holes(mesh, samples, edge)
         mesh = mesh.moved(capped(mesh, filled)) if settings.cubes.fill_holes else mesh
     return Rest(mesh, any_of(filled[mesh.faces]), fitted)
 

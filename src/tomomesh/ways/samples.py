@@ -35,8 +35,8 @@ NOISE = (1.8, 1.3, 1.0)
 ones fill thin parts. Chosen: half of them changes the distance by +0.2 %, twice by -1.6 %."""
 STEPS = 64
 """Steps between numbers that the extent of a cloud must hold: its cubes and the vertices between are smaller yet."""
-WALLS = 4
-"""Cubes across an object under which nothing is inside: two walls, which may lie across two cubes each."""
+ACROSS = 4
+"""Cubes across an object under which nothing is inside: two sides, which may lie across two cubes each."""
 STRAYS = 0.05
 """Share of strays among the points over which a result is warned of. A warning's threshold, chosen: no mesh depends on
 it."""
@@ -97,7 +97,7 @@ def cell_edges(samples: Samples, settings: Settings) -> list[Floats]:
 
 
 def require_parts(samples: Samples, cell: Floats, axes: int) -> None:
-    """Refuse cubes that are wider than the points' extent leaves room for: two walls, and a cube inside.
+    """Refuse cubes that are wider than the points' extent leaves room for: two sides, and a cube inside.
 
     Parameters
     ----------
@@ -114,11 +114,13 @@ def require_parts(samples: Samples, cell: Floats, axes: int) -> None:
     """
     extents = np.ptp(samples.positions, axis=0)
     across = np.sort(extents / cell)[-axes]
-    if 0 < across < WALLS and cell.min() > WALLS * float(np.median(samples.spacing)):
-        raise too_wide(cell, f"at most {cell.max() * across / WALLS:.2g}, {WALLS} of them across the points")
+    if 0 < across < ACROSS and cell.min() > ACROSS * float(np.median(samples.spacing)):
+        raise too_wide(cell, f"at most {cell.max() * across / ACROSS:.2g}, {ACROSS} of them across the points")
 
 
-def too_wide(cell: Floats, expected: str = "two walls of cubes, and some between them, in every part") -> GeometryError:
+def too_wide(
+    cell: Floats, expected: str = "both sides of every part in cubes of their own, and some between them"
+) -> GeometryError:
     """Return the error of cubes in whose shell the object has no inside."""
     return GeometryError(
         "the cubes are wider than the parts of the object", found=f"cell = {cell.max():.4g}", expected=expected,
