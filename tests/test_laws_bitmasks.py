@@ -16,7 +16,7 @@ from tomomesh.cuberille import bitmasks as module
 from tomomesh.cuberille.bitmasks import EDGE, Blocks
 from tomomesh.cuberille.neighbors import OFFSETS
 from tomomesh.errors import ResourceError
-from tomomesh.kernels.cuberille.bitmasks import flood, neighbor, popcount, touches
+from tomomesh.kernels.cuberille.bitmasks import neighbor, popcount, touches
 from tomomesh.model.cubes import MARGIN, SIDE, keys_of
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ class TestFlood:
         all_cells = everywhere(blocks)
         closed = all_cells[np.random.default_rng(seed).random(len(all_cells)) < share]
         reached = blocks.beyond()
-        flood(~blocks.bitmask_of(closed), blocks.table, reached)
+        blocks.flood(~blocks.bitmask_of(closed), reached)
         low = all_cells.min(axis=0) - 1
         open_ = np.ones(all_cells.max(axis=0) - low + 2, bool)
         open_[tuple((closed - low).T)] = False
@@ -163,7 +163,7 @@ class TestFlood:
         labels, _ = ndimage.label(open_)
         seed = cells[labels[open_] == np.bincount(labels[open_]).argmax()][:1]
         reached = blocks.bitmask_of(seed)
-        flood(blocks.bitmask_of(cells), blocks.table, reached)
+        blocks.flood(blocks.bitmask_of(cells), reached)
         assert_same(blocks.cells(reached), np.argwhere(labels == labels[tuple(seed[0])]))
 
 
@@ -185,7 +185,7 @@ class TestSpace:
         cells = np.concatenate([box(*side) for side in sides])
         blocks = Blocks.around(cells, 1)
         reached = blocks.beyond()
-        flood(~blocks.bitmask_of(cells), blocks.table, reached)
+        blocks.flood(~blocks.bitmask_of(cells), reached)
         all_cells = everywhere(blocks)
         outside = ((all_cells < cells.min()) | (all_cells > cells.max())).any(axis=1)
         assert_same(blocks.cells(reached), all_cells[outside])
@@ -196,7 +196,7 @@ class TestSpace:
         cells = cells[(cells != [20, 20, 47]).any(axis=1)]
         blocks = Blocks.around(cells, 1)
         reached = blocks.beyond()
-        flood(~blocks.bitmask_of(cells), blocks.table, reached)
+        blocks.flood(~blocks.bitmask_of(cells), reached)
         assert blocks.spaces == 2
         assert (reached[len(blocks) :] == ~np.uint64(0)).all()
         assert blocks.count(reached).sum() == EDGE**3 * len(blocks) - len(cells)

@@ -45,7 +45,8 @@ MESH_ONLY = ("local_origin", "smooth", "allow_far", "remesh", "edge", "target_fa
 STUDY_ONLY = ("frame",)
 """Parameters of the run that matter to studies alone."""
 SURFACE_ONLY = (
-    "cell_mm", "cell_factor", "closing", "stacks", "largest", "allow_leaks", "surface", "low_pass", *MESH_ONLY,
+    "cell_mm", "cell_factor", "closing", "fill_holes", "stacks", "largest", "allow_leaks", "surface", "low_pass",
+    *MESH_ONLY,
 )  # fmt: skip
 """Parameters that do not matter to the points."""
 

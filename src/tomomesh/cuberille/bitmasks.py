@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ResourceError
-from ..kernels.cuberille.bitmasks import grow_along, list_cubes
+from ..kernels.cuberille.bitmasks import compose, flood, grow_along, list_cubes
 from ..kernels.cuberille.cells import label_components
 from ..kernels.threads import in_blocks
 from ..model.cubes import SIDE, cells_of, keys_of
@@ -100,6 +100,24 @@ class Blocks:
         for _ in range(steps):
             bitmask = bitmask | (self.grown(bitmask) & within)
         return bitmask
+
+    def flood(self, open_: Bitmask, reached: Bitmask) -> None:
+        """Walk over faces from the cubes that are reached to all open ones; what is reached is changed in place."""
+        count = len(self)
+        waiting, queue, line = np.ones(count, np.bool_), np.arange(count), np.array([0, count])
+        while line[1]:
+            flood(open_, self.table, reached, waiting, queue, line, SHARE)
+
+    def composed(self, solid: Bitmask) -> tuple[Bitmask, int]:
+        """Fill every contact along an edge or at a corner, once; return also how many cubes that took."""
+        filled, near = solid.copy(), self.grown(solid) & ~solid
+        added = np.zeros(-(-len(self) // SHARE), np.int64)
+
+        def work(begin: int, end: int) -> None:
+            added[begin // SHARE] = compose(solid, self.table, near, filled, begin, end)
+
+        self.each(work)
+        return filled, int(added.sum())
 
     def each(self, work: Callable[[int, int], None]) -> None:
         """Share the blocks among threads."""

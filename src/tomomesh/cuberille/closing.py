@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.cuberille.bitmasks import compose, flood
 from ..kernels.cuberille.cells import label_components
 from ..model.cubes import keys_of
-from .bitmasks import Blocks
+from .bitmasks import EDGE, Blocks
 from .neighbors import FACE_COLUMNS, neighbor_table
 
 if TYPE_CHECKING:
@@ -25,6 +24,9 @@ if TYPE_CHECKING:
 NEAR = 2
 """Steps, beyond twice the dilation, from enclosed space within which an occupied cube counts as near it: noise may
 make a shell two cubes thick, and a dilation leaves little of what is enclosed."""
+DEEP = 3
+"""Cubes below the outside where no points of a surface lie: of the clouds of docs/clouds.md at most one cube does, 117
+and more where two spheres are joined."""
 ROOM = 0.005
 """Cubes of a piece of enclosed space, over the occupied ones, under which it is a pocket: a sphere of radius 2 encloses
 8 % of its own cubes, a wider one more."""
@@ -60,6 +62,11 @@ class Shell:
     closing: int
     added: int
 
+    def buried(self) -> NDArray[np.int64]:
+        """List the cubes with points that lie `DEEP` cubes and more below the outside, cavities aside, (d, 3)."""
+        deep = self.blocks.cells(self.occupied & ~self.blocks.grown(~self.solid, DEEP))
+        return deep[~np.isin(keys_of(deep), keys_of(self.within))]
+
 
 def close_shell(cells: NDArray[np.int64], closing: int, *, threads: int = 0) -> Shell:
     """Dilate the shell, let the outside in, and take back from the outside what the dilation added.
@@ -86,23 +93,48 @@ def close_shell(cells: NDArray[np.int64], closing: int, *, threads: int = 0) -> 
     occupied = blocks.bitmask_of(cells)
     dilated = blocks.grown(occupied, closing)
     outside = blocks.beyond()
-    flood(~dilated, blocks.table, outside)
+    blocks.flood(~dilated, outside)
     enclosed = ~(dilated | outside)
     lining = blocks.grown(enclosed)
     outside = blocks.spread(outside, dilated & ~occupied & ~lining, closing)
     solid, added = _well_composed(blocks, ~outside)
     reached = blocks.grown(outside) & dilated
-    flood(dilated, blocks.table, reached)
+    blocks.flood(dilated, reached)
     within = blocks.cells(occupied & ~reached)
     near = blocks.spread(_roomy(blocks, enclosed, ROOM * len(cells)), solid, 2 * closing + NEAR)
     return Shell(blocks, occupied, solid, occupied & near, within, closing, added)
+
+
+def shell_around(inside: NDArray[np.int64], cells: NDArray[np.int64], *, threads: int = 0) -> Shell:
+    """Take a solid whose cubes are known.
+
+    Parameters
+    ----------
+    inside : (i, 3) int64 array
+        Positions (x, y, z) of the cubes inside.
+    cells : (c, 3) int64 array
+        Those of the cubes that hold points; where they face the outside they tell of an inside.
+    threads : int
+
+    Returns
+    -------
+    Shell
+        Well composed, its pockets filled.
+    """
+    blocks = Blocks.around(inside, NEAR, threads=threads)
+    outside = blocks.beyond()
+    blocks.flood(~blocks.bitmask_of(inside), outside)
+    solid, added = _well_composed(blocks, ~outside)
+    known = np.isin(keys_of(cells // EDGE), blocks.keys)
+    occupied = blocks.grown(blocks.bitmask_of(cells[known]))
+    return Shell(blocks, occupied, solid, occupied, np.empty((0, 3), np.int64), 0, added)
 
 
 def _roomy(blocks: Blocks, enclosed: Bitmask, least: float) -> Bitmask:
     """Leave out the small pieces of enclosed space: pockets in a thick shell tell of no inside."""
     large = blocks.empty()
     large[len(blocks) :] = enclosed[len(blocks) :]
-    flood(enclosed, blocks.table, large)
+    blocks.flood(enclosed, large)
     cells = blocks.cells(enclosed & ~large)
     if len(cells) == 0:
         return large
@@ -122,10 +154,9 @@ def _well_composed(blocks: Blocks, solid: Bitmask) -> tuple[Bitmask, int]:
     """
     total = 0
     while True:
-        filled, near = solid.copy(), blocks.grown(solid) & ~solid
-        added = compose(solid, blocks.table, near, filled, 0, len(blocks))
+        filled, added = blocks.composed(solid)
         if not added:
             return solid, total
         outside = blocks.beyond()
-        flood(~filled, blocks.table, outside)
+        blocks.flood(~filled, outside)
         solid, total = ~outside, total + added

@@ -49,10 +49,14 @@ class CubeSettings(Group):
     filled: bool = param(
         False, "take points as filling a solid, not as lying on its surface, and write the boundary of what they fill"
     )
+    fill_holes: bool = param(
+        False, "cap the holes of a cloud's surface along their borders, however wide, and mark the faces as filled"
+    )
     open: bool = param(False, "write an open surface as a one-sided sheet with its borders")
     surface: str = param(
         "auto",
-        "the outer surfaces, or all, with what lies in cavities; auto is outer, and all without a network",
+        "the outer surfaces, or all, with what lies in cavities; auto is outer for rings, networks and nearest points, "
+        "else all",
         choices=("auto", "outer", "all"),
     )
     divide: bool = param(

@@ -13,6 +13,7 @@ from ..cuberille.leak_test import SURE, close_leaks
 from ..cuberille.neighbors import once_each
 from ..cuberille.partition import cubes_over, is_flat
 from ..dynamics.low_pass import OneRing
+from ..dynamics.membrane import capped
 from ..dynamics.moving_least_squares import SurfaceFit, fit_to_surface
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError
@@ -22,13 +23,14 @@ from ..model.cubes import cells_of
 from ..model.mesh import QuadMesh, TriMesh
 from ..opensurface.gaps import gaps
 from ..pointcloud.bridges import bridges
+from ..pointcloud.filling import fill_inside, holes, made_up
 from ..pointcloud.forecast import require_room
 from ..pointcloud.solid import fills_solid
 from ..results import Surface
 from ..stage import Stage, folded, measured, timed
 from .points import place_found
-from .samples import cell_edges, lowest_corner, settle
-from .sections import body_of_cubes, count_walls, fit_found, hollow, shell_found
+from .samples import ACROSS, cell_edges, lowest_corner, require_parts, settle, too_wide
+from .sections import WIDE, body_of_cubes, count_walls, fit_found, hollow, shell_found, walls_found
 from .way import CUBES, POINTS, Way, on_input, parameters
 
 if TYPE_CHECKING:
@@ -55,6 +57,23 @@ TRIED = ((0, 1, 2), (3, 4, 5, 6, 7, 8))
 closing of two joins what lies nearer than four cubes, about what the shorter bridges span."""
 
 
+MET = 0.8
+"""Share of the samples that must lie at a surface for it to be theirs: .97 and more do on the
+scans that were measured."""
+FEW = 8
+"""Cubes with points deep inside of a surface from which that is warned of. A warning's threshold, chosen: no mesh
+depends on it."""
+MADE_UP = 0.2
+"""Share of a surface without samples from which it is refused, unless holes are to be filled: a third of a hemisphere's
+is, and a scan from four sides leaves a sixth."""
+THIN = 0.5
+"""Share of the cubes that lie at the surface of what is thin: .65 of a plate's in noise, .27 of a solid's of 20."""
+BOTH_SIDES = (
+    "the points lie on both sides of a part so thin that they cannot be told apart: the surface was laid around them, "
+    "and may be wrong there"
+)
+
+
 @dataclass(frozen=True)
 class Shell:
     """Cubes of an edge (3,) from a lowest corner, what spans their holes, and how they hold."""
@@ -64,6 +83,14 @@ class Shell:
     cubes: int
     spanned: Bridges
     leak_test: LeakTest
+    doubt: str = ""
+    """Where inside and outside were told apart by the normals alone, in words."""
+
+    @property
+    def is_thin(self) -> bool:
+        """Whether all but a few of its cubes lie at its surface, as those of a thin plate do."""
+        faces = self.leak_test.faces
+        return len(np.unique(faces.cells[faces.occupied], axis=0)) >= THIN * self.cubes
 
     def taken(self, settings: Settings) -> NDArray[np.bool_]:
         """Tell of each surface whether it is kept."""
@@ -128,9 +155,22 @@ def _interpolated(mesh: TriMesh, points: Points) -> NDArray[np.bool_]:
 @timed("cubes")
 def _close(points: Points, samples: Samples, settings: Settings, progress: Progress) -> Stage[Shell]:
     shell = _tightest(len(points.cloud), samples, settings, progress)
-    return folded(
-        shell, shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
-    )  # fmt: skip
+    unsure = shell.leak_test.two_sided < SURE or shell.leak_test.shell.closing > WIDE
+    if unsure and settings.cubes.closing is None and not _is_wide(shell, samples) and not _is_flat(samples):
+        other = _by_normals(shell, samples, lowest_corner(points), settings, progress)
+        shell = other if other.leak_test.is_better_than(shell.leak_test) else shell
+    told = shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
+    said = (shell.doubt, _joined(shell, lowest_corner(points)))
+    return folded(shell, told, Stage(None, warnings=tuple(one for one in said if one)))
+
+
+def _joined(shell: Shell, origin: Floats) -> str:
+    """Say where points lie deep inside of the surface; nothing where none do."""
+    buried = shell.leak_test.shell.buried() if shell.leak_test.tight and not shell.doubt else ()
+    if len(buried) < FEW:
+        return ""
+    where = _place(shell.lowest + shell.cell * (buried[len(buried) // 2] + 0.5) + origin)
+    return f"points lie deep inside of the surface around {where}: what is nearer than the cubes can part was joined"
 
 
 def _tightest(count: int, samples: Samples, settings: Settings, progress: Progress) -> Shell:
@@ -138,14 +178,16 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
     cubes, best = settings.cubes, None
     closings = TRIED if cubes.closing is None else ((cubes.closing,),)
     reach = WIDEST * float(np.median(samples.spacing))
-    for tried, span, cell in product(closings, SPANS, cell_edges(samples, settings)):
+    edges = cell_edges(samples, settings)
+    require_parts(samples, edges[0], 3)
+    for tried, span, cell in product(closings, SPANS, edges):
         require_room(count, samples, cell)
         spanned = bridges(samples, float(cell.min()), span=span, threads=settings.run.threads, progress=progress)
         lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
         cells = cells_of(once_each(keys))
         steps = [k for k in tried if cubes.closing is not None or k * cell.min() <= reach]
         leak_test = close_leaks(
-            cells, steps, cavities=cubes.surface == "all", threads=settings.run.threads, progress=progress
+            cells, steps, cavities=cubes.surface != "outer", threads=settings.run.threads, progress=progress
         )  # fmt: skip
         if best is None or leak_test.two_sided >= SURE or leak_test.is_better_than(best.leak_test):
             best = Shell(cell, lowest, len(cells), spanned, leak_test)
@@ -155,16 +197,43 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
     return best
 
 
-def _walls(shell: Shell, samples: Samples, points: Points, settings: Settings) -> Stage[int]:
+def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settings, progress: Progress) -> Shell:
+    """Return a shell around what the normals say is inside; the one that leaks where they say nothing of the kind."""
+    if not samples.normals.any():
+        return shell
+    places, threads = np.concatenate([samples.positions, shell.spanned.places]), settings.run.threads
+    lowest, keys = cubes_over(places, shell.cell)
+    leaky = close_leaks(cells_of(once_each(keys)), TRIED[-1][-1:], threads=threads, progress=progress)
+    asked = float(shell.cell.min()) if settings.cubes.cell_mm else None
+    found = fill_inside(samples, leaky, lowest, shell.cell, cell=asked, threads=threads, progress=progress)
+    middles = found.lowest + found.cell * (found.leak_test.faces.cells + 0.5)
+    share = float(made_up(middles, samples, found.cell).mean())
+    if found.met < MET or (share > MADE_UP and not settings.cubes.fill_holes):
+        return shell
+    where = _place(found.doubtful + origin)
+    doubt = f"the shell of cubes does not hold: the normals tell inside from outside, least surely around {where}"
+    return Shell(np.full(3, found.cell), found.lowest, found.cubes, shell.spanned, found.leak_test, doubt)
+
+
+def _is_wide(shell: Shell, samples: Samples) -> bool:
+    """Tell whether the cubes are so much wider than the points lie apart that these have no say."""
+    return float(shell.cell.min()) > ACROSS * float(np.median(samples.spacing))
+
+
+def _is_flat(samples: Samples) -> bool:
+    return is_flat(samples.positions, float(np.median(samples.spacing)))
+
+
+def _walls(shell: Shell, samples: Samples, points: Points, origin: Floats, settings: Settings) -> Stage[int]:
     """Count the walls of a shell.
 
     Raises
     ------
     GeometryError
-        Where the outside leaks in; names the widest gap. Where the points fill a solid, as that.
+        Where the outside leaks in, with the widest gap, or the points fill a solid.
     """
     tight = shell.leak_test.tight
-    flat = not tight and is_flat(samples.positions, float(np.median(samples.spacing)))
+    flat = not tight and _is_flat(samples)
     walls = count_walls(settings, tight=tight, flat=flat)
     if walls is not None:
         return walls
@@ -173,15 +242,19 @@ def _walls(shell: Shell, samples: Samples, points: Points, settings: Settings) -
             "the points fill a solid, and do not lie on its surface", found=f"{len(points.cloud)} points",
             expected="points on the surface of the object", hint="--filled, for the boundary of what they fill",
         )  # fmt: skip
+    if _is_wide(shell, samples):
+        raise too_wide(shell.cell)
     cell = float(shell.cell.min())
     found = gaps(samples, cell, threads=settings.run.threads)
-    where = [f"a gap of {gap.size:.4g} around {_place(gap.place + lowest_corner(points))}" for gap in found[:1]]
+    if not found and shell.is_thin:
+        return walls_found(1, BOTH_SIDES)
+    where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]
     raise GeometryError(
         ("the points look like an open surface: " if found else "")
         + "the outside leaks into the shell of cubes, so its surface would have two walls",
         found=f"{len(found)} border(s), the widest {where[0]}" if found else f"cell = {cell:.4g}",
         expected="points all around the object, without gaps as wide as its holes",
-        hint="--open for a sheet with borders, a larger --closing or --cell, or --allow-leaks",
+        hint="--fill-holes to cap what is open, --open for a sheet with borders, or --allow-leaks",
     )
 
 
@@ -211,13 +284,17 @@ def _fitted(
     edge, threads = float(shell.cell.min()), settings.run.threads
     start = rough.mesh.vertices
     fitted = fit_to_surface(start, rough.ring, samples, edge, settings.fit, threads=threads, progress=progress)
-    return Rest(TriMesh(fitted.vertices, fitted.faces), any_of(fitted.filled[fitted.faces]), fitted)
+    mesh, filled = TriMesh(fitted.vertices, fitted.faces), fitted.filled
+    if shell.doubt:
+        filled = filled | holes(mesh, samples, edge)
+        mesh = mesh.moved(capped(mesh, filled)) if settings.cubes.fill_holes else mesh
+    return Rest(mesh, any_of(filled[mesh.faces]), fitted)
 
 
 WAY = Way(
     applies=lambda settings, input: input in POINTS,
     because=on_input,
-    reads=CUBES | parameters("stacks", "open", "attraction", "damping", "step"),
+    reads=CUBES | parameters("fill_holes", "stacks", "open", "attraction", "damping", "step"),
     surface=surface_of_cloud,
     of_body=body_of_cubes,
 )

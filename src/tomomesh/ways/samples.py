@@ -35,6 +35,8 @@ NOISE = (1.8, 1.3, 1.0)
 ones fill thin parts. Chosen: half of them changes the distance by +0.2 %, twice by -1.6 %."""
 STEPS = 64
 """Steps between numbers that the extent of a cloud must hold: its cubes and the vertices between are smaller yet."""
+ACROSS = 4
+"""Cubes across an object under which nothing is inside: two sides, which may lie across two cubes each."""
 STRAYS = 0.05
 """Share of strays among the points over which a result is warned of. A warning's threshold, chosen: no mesh depends on
 it."""
@@ -94,6 +96,38 @@ def cell_edges(samples: Samples, settings: Settings) -> list[Floats]:
     own = dict.fromkeys(max(fine * spacing, factor * noise) for factor in NOISE)
     asked = [settings.cubes.cell_mm] if settings.cubes.cell_mm else [(edge,) for edge in own]
     return [np.broadcast_to(np.array(one) * settings.cubes.cell_factor, 3).copy() for one in asked]
+
+
+def require_parts(samples: Samples, cell: Floats, axes: int) -> None:
+    """Refuse cubes that are wider than the points' extent leaves room for: two sides, and a cube inside.
+
+    Parameters
+    ----------
+    samples : Samples
+    cell : (3,) float array
+        Edge of the cubes along each axis.
+    axes : int
+        Along how many axes there must be room: 3 for a solid, 2 for a sheet.
+
+    Raises
+    ------
+    GeometryError
+        Naming the widest edge that could do.
+    """
+    extents = np.ptp(samples.positions, axis=0)
+    across = np.sort(extents / cell)[-axes]
+    if 0 < across < ACROSS and cell.min() > ACROSS * float(np.median(samples.spacing)):
+        raise too_wide(cell, f"at most {cell.max() * across / ACROSS:.2g}, {ACROSS} of them across the points")
+
+
+def too_wide(
+    cell: Floats, expected: str = "both sides of every part in cubes of their own, and some between them"
+) -> GeometryError:
+    """Return the error of cubes in whose shell the object has no inside."""
+    return GeometryError(
+        "the cubes are wider than the parts of the object", found=f"cell = {cell.max():.4g}", expected=expected,
+        hint="a smaller --cell, or none: it is found from the points",
+    )  # fmt: skip
 
 
 def points_in_words(report: dict[str, Any]) -> str:

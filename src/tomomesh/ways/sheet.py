@@ -13,7 +13,7 @@ from ..pointcloud.bridges import bridges
 from ..results import Surface
 from ..stage import Stage, folded, timed
 from .points import place_found
-from .samples import cell_edges, lowest_corner, settle
+from .samples import cell_edges, lowest_corner, require_parts, settle
 from .sections import body_of_cubes, fit_found, shell_found, walls_found
 from .way import POINTS, Way, parameters
 
@@ -44,6 +44,7 @@ def surface_of_sheet(points: Points, settings: Settings, progress: Progress) -> 
 @timed("fit")
 def _lay(samples: Samples, settings: Settings, progress: Progress) -> Stage[OpenSheet]:
     cell, threads = cell_edges(samples, settings)[0], settings.run.threads
+    require_parts(samples, cell, 2)
     spanned = bridges(samples, float(cell.min()), threads=threads, progress=progress)
     made = open_sheet(samples, spanned, cell, settings, CrossingFaces(threads), progress)
     every = np.ones(made.leak_test.faces.count, bool)

@@ -133,9 +133,17 @@ def touches(reached: Bitmask, b: int, column: int) -> bool:
     return bool(touched != ZERO)
 
 
-@kernel("void(u8[:,::1], i4[:,::1], u8[:,::1])")
-def flood(open_: Bitmask, table: Table, reached: Bitmask) -> None:
-    """Walk over faces from the cubes that are reached to all open ones.
+@kernel("void(u8[:,::1], i4[:,::1], u8[:,::1], b1[::1], i8[::1], i8[::1], i8)")
+def flood(
+    open_: Bitmask,
+    table: Table,
+    reached: Bitmask,
+    waiting: NDArray[np.bool_],
+    queue: NDArray[np.int64],
+    line: NDArray[np.int64],
+    most: int,
+) -> None:
+    """Walk over faces from the cubes that are reached to open ones, for some blocks of those that wait.
 
     Parameters
     ----------
@@ -143,17 +151,25 @@ def flood(open_: Bitmask, table: Table, reached: Bitmask) -> None:
         Cubes that may be entered.
     table : (b, 27) int32 array
     reached : (b + s, 8) uint64 array
-        Where to start, the rows for space without blocks among it. Result: all that is reached.
+        Where to start, the rows for space without blocks among it. Result: what is reached; all, once none waits.
+    waiting : (b,) bool array
+        The blocks that wait: all on entry. Changed in place, as the next two.
+    queue : (b,) int64 array
+        A ring of those that wait, in their order.
+    line : (2,) int64 array
+        Where the first of them stands, and how many there are.
+    most : int
+        Blocks to work on.
 
     Notes
     -----
     A block is worked on until nothing in it changes, and again whenever a neighbor of it has changed.
     """
     count = len(table)
-    waiting = np.ones(count, np.bool_)
-    queue = np.arange(count)
-    head, length = 0, count
-    while length:
+    head, length = line[0], line[1]
+    for _ in range(most):
+        if length == 0:
+            break
         b = queue[head]
         head, length = (head + 1) % count, length - 1
         waiting[b] = False
@@ -173,6 +189,7 @@ def flood(open_: Bitmask, table: Table, reached: Bitmask) -> None:
                         waiting[any_] = True
                         queue[(head + length) % count] = any_
                         length += 1
+    line[0], line[1] = head, length
 
 
 @kernel("i8(u8[:,::1], i4[:,::1], u8[:,::1], u8[:,::1], i8, i8)")
