@@ -12,7 +12,7 @@ from ..measure.intersections import self_intersections
 from ..measure.tree import Tree
 from ..model.columns import any_of
 from ..progress import Progress, silent
-from .ground import EVEN, Ground, even_edge
+from .ground import EVEN, Ground, area_of, even_edge
 from .making import Making
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     Marks = NDArray[np.bool_]
 
-ROUNDS = 4
+ROUNDS = 5
 """Most rounds of splits, collapses, flips and moves."""
 FEW = 0.1
 """Splits and collapses a vertex in a round after which there is no other. Chosen: voxels' meshes take three rounds.
@@ -123,15 +123,16 @@ def remesh(
     GeometryError
         Where the shape cannot be kept with so few faces; names how many it takes.
     """
-    _require_room(mesh, edge)
-    ground, best = _ground(mesh, edge, most), None
+    area = area_of(mesh, threads)
+    _require_room(area, edge)
+    ground, best = _ground(mesh, area, edge, most, threads), None
     found = np.zeros(len(mesh.vertices), np.bool_)
     for _ in range(TRIES):
         making = _made(ground, found, most or np.inf, threads, progress)
         made, under = making.mesh()
         crosses = self_intersections(made, threads=threads)
         if (best is None or crosses.sum() < best.crossing.sum()) and len(made.faces) <= (most or np.inf):
-            best = Remeshed(made, crosses, even_edge(made, len(made.faces)), int(found.sum()), mesh)
+            best = Remeshed(made, crosses, even_edge(area_of(made, threads), len(made.faces)), int(found.sum()), mesh)
         if not crosses.any():
             break
         found = found | _under(ground, made, under, crosses)
@@ -145,11 +146,11 @@ def remesh(
     if best.crossing.any() and (most is None or len(mesh.faces) <= most):
         crosses = self_intersections(mesh, threads=threads) if crossing is None else crossing
         if crosses.sum() < best.crossing.sum():
-            return Remeshed(mesh, crosses, even_edge(mesh, len(mesh.faces)), len(mesh.vertices), mesh)
+            return Remeshed(mesh, crosses, even_edge(area, len(mesh.faces)), len(mesh.vertices), mesh)
     return best
 
 
-def _require_room(mesh: TriMesh, edge: float | None) -> None:
+def _require_room(area: float, edge: float | None) -> None:
     """Refuse edges so short that the faces would not fit into the memory.
 
     Raises
@@ -157,7 +158,6 @@ def _require_room(mesh: TriMesh, edge: float | None) -> None:
     ResourceError
         Naming how many faces there would be, and which edges would do.
     """
-    area = float(mesh.face_areas.sum())
     if edge is not None and area > MOST_FACES * EVEN * edge**2:
         raise ResourceError(
             "edges so short make too many faces", found=f"--edge = {edge:g}, {area / (EVEN * edge**2):.3g} faces",
@@ -170,12 +170,12 @@ def faces_under(made: TriMesh, before: TriMesh, threads: int = 0) -> NDArray[np.
     return Tree.of_faces(before).nearest(made.corners.mean(axis=1), threads=threads)[1]
 
 
-def _ground(mesh: TriMesh, edge: float | None, most: int | None) -> Ground:
+def _ground(mesh: TriMesh, area: float, edge: float | None, most: int | None, threads: int) -> Ground:
     """Look at the surface, and choose lengths of edges for as many faces as there are, or are asked for, at most."""
-    usual = edge or even_edge(mesh, min(len(mesh.faces), most or len(mesh.faces)))
-    ground = Ground.of(mesh, usual)
+    usual = edge or even_edge(area, min(len(mesh.faces), most or len(mesh.faces)))
+    ground = Ground.of(mesh, usual, threads)
     if edge is not None and most is None:
-        return ground.scaled(edge / even_edge(mesh, ground.forecast())).with_specks(SPECK, ROUND)
+        return ground.scaled(edge / even_edge(area, ground.forecast())).with_specks(SPECK, ROUND)
     fewest = min(len(mesh.faces), AIM * (most or np.inf))
     ground = ground.scaled(max(ground.forecast() / fewest, 1.0) ** 0.5)
     return ground if most is not None else ground.with_specks(SPECK, ROUND)
@@ -186,7 +186,7 @@ def _made(ground: Ground, kept: Marks, most: float, threads: int, progress: Prog
     making = Making(ground, kept, threads)
     for count in range(ROUNDS):
         progress("remesh", count, ROUNDS)
-        if _round(making) < FEW:
+        if _round(making, split=count > 0) < FEW and count > 0:
             break
     progress("remesh", ROUNDS, ROUNDS)
     _move(making, LAST)
@@ -201,15 +201,19 @@ def _made(ground: Ground, kept: Marks, most: float, threads: int, progress: Prog
     return making
 
 
-def _round(making: Making) -> float:
+def _round(making: Making, *, split: bool = True) -> float:
     """Change edges and move vertices; return the splits and collapses a vertex."""
-    changes = making.split() + making.collapse()
+    marks, before = making.marks(), int(making.counts[0])
+    if split:
+        marks = making.split(marks)
+    changes = int(making.counts[0]) - before + making.collapse(marks)
     making.flip()
-    _move(making, 1)
+    making.move()
     return changes / making.vertices
 
 
 def _move(making: Making, times: int) -> None:
+    making.flip()
     for _ in range(times):
         making.move()
         making.flip()
