@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-MESH_FORMATS = ("stl", "ply", "obj", "off", "glb", "vtp", "3mf", "gii")
+MESH_FORMATS = ("stl", "ply", "obj", "off", "glb", "vtp", "3mf", "gii", "surf.gii")
 POINT_FORMATS = ("ply", "xyz", "csv", "npy", "vtp")
 LABEL_FORMATS = ("nii", "nii.gz")
 CHECKED_FORMATS = ("stl", "ply", "obj", "off")
 CLOUD_FORMATS = ("ply", "xyz", "txt", "csv", "npy", "npz", "pcd", "las", "laz", "e57", "obj", "off", "stl")
-STUDY_FORMATS = ("nii", "nii.gz", "nrrd", "mha", "mgh", "mgz", "npy", "tif", "tiff", "dcm", "ima", "zip")
+STUDY_FORMATS = ("nii", "nii.gz", "nrrd", "mha", "mgh", "mgz", "npy", "tif", "tiff", "dcm", "ima", "zip", "ozx")
 """Single files that hold a whole study."""
 HEADER_FORMATS = ("nhdr", "mhd", "hdr", "hdr.gz", "img", "img.gz")
 """Studies whose header and voxels lie in two files."""

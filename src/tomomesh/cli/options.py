@@ -23,7 +23,7 @@ from .formats import (
     STUDY,
     STUDY_FORMATS,
 )
-from .parameter_options import LISTED, SEVERAL, add_parameter
+from .parameter_options import FIXED, LISTED, SEVERAL, add_parameter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -107,24 +107,39 @@ def build_parser() -> argparse.ArgumentParser:
     network.add_argument("--film", action="store_true", help="write the training as an animated GIF too")
     _add_outputs(network)
     _add_settings(
-        network,
-        ("window", "network", "run"),
-        without=("slices", "way", "signal", "contours", "space", "select", "keep", "units", *MESH_ONLY, *STUDY_ONLY),
-    )
+        network, ("window", "network", "run"),
+        without=(
+            "slices", "way", "signal", "contours", "space", "select", "keep", "units", "precision", *MESH_ONLY,
+            *STUDY_ONLY,
+        ),
+    )  # fmt: skip
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
-    inspect.add_argument("study", metavar="STUDY", help=f"{STUDY}, or - with --input-format")
+    inspect.add_argument(
+        "study", metavar="STUDY", nargs="+", help=f"{STUDY}, or its slices one by one, or - with --input-format"
+    )
     _add_streams(inspect, STUDY_FORMATS)
     inspect.add_argument("--json", action="store_true", help="print the findings as JSON")
     _add_settings(inspect, ("read", "crop"), paper=False)
 
     check = _command(commands, "check", "the quality report of any mesh")
     check.add_argument("mesh", metavar="MESH", help=CHECKED)
-    check.add_argument("--against", metavar="MESH", help="a mesh that it should equal: distances both ways")
+    check.add_argument(
+        "--against", metavar="MESH|STUDY",
+        help="what it should equal: a mesh, or the voxels of a window or of labels (--select) of a study; Dice's "
+        "coefficient, and distances both ways",
+    )  # fmt: skip
+    check.add_argument(
+        "--mesh-frame", choices=("lps", "ras", "voxel"),
+        help="what the coordinates of MESH are in, where a study is beside it (default: as its file states, else lps)",
+    )  # fmt: skip
     check.add_argument("--report", metavar="FILE.json", help="write the report")
     check.add_argument("--json", action="store_true", help="print the report as JSON")
     check.add_argument("--print", dest="print_check", action="store_true", help="tell whether it can be printed, too")
-    _add_settings(check, ("printing",), without=(*CUTS, "print_check"), paper=False)
+    _add_settings(
+        check, ("read", "crop", "window", "printing"), without=(*CUTS, "print_check"),
+        paper=False,
+    )  # fmt: skip
 
     part = _command(commands, "print", "a closed mesh in, a part to print out: scaled, cut flat, hollowed")
     part.add_argument("mesh", metavar="MESH", help=CHECKED)
@@ -144,17 +159,42 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
-    """Join the numbers after an option that takes several into one word, so that a file may follow them."""
+    """Take the numbers after an option with spaces or with commas between them.
+
+    Those of an option that takes one number or several become one word, so that a file may follow them; those of an
+    option that takes a fixed count become as many.
+    """
     words: list[str] = []
     for word in arguments:
         option, _, values = words[-1].partition("=") if words else ("", "", "")
+        own, _, listed = word.partition("=")
         if option in SEVERAL and values.count(",") < 2 and _is_number(word):
             words[-1] = f"{option}={values},{word}" if values else f"{option}={word}"
-        elif option in LISTED and not values and all(map(_is_number, word.split(","))):
+        elif option in LISTED and not values and _are_numbers(word):
             words[-1] = f"{option}={word}"  # a list that begins with a minus would look like an option
+        elif own in FIXED and _are_numbers(listed):
+            words += [own, *_listed(listed)]
+        elif "," in word and _are_numbers(word) and _takes_more(words):
+            words += _listed(word)
         else:
             words.append(word)
     return words
+
+
+def _takes_more(words: Sequence[str]) -> bool:
+    """Tell whether the last option takes more numbers than it has."""
+    numbers = 0
+    while numbers < len(words) and _is_number(words[-1 - numbers]):
+        numbers += 1
+    return numbers < len(words) and numbers < FIXED.get(words[-1 - numbers], 0)
+
+
+def _listed(word: str) -> list[str]:
+    return [part for part in word.split(",") if part.strip()]
+
+
+def _are_numbers(word: str) -> bool:
+    return bool(_listed(word)) and all(map(_is_number, _listed(word)))
 
 
 def _is_number(word: str) -> bool:
@@ -184,8 +224,8 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "study",
         metavar="STUDY",
-        nargs="?",
-        help=f"{STUDY}, or - with --input-format; --labels-in may stand in its place",
+        nargs="*",
+        help=f"{STUDY}, or its slices one by one, or - with --input-format; --labels-in may stand in its place",
     )
     parser.add_argument(
         "--labels-in",
@@ -201,8 +241,10 @@ def _add_streams(
     """Add the options that name formats where no suffix does."""
     group = parser.add_argument_group("Streams")
     group.add_argument(
-        "--input-format", choices=read, default=usual, help="what is read from standard input (default %(default)s)"
-    )
+        "--input-format", choices=read,
+        help=f"what is read from standard input (default {usual}), or from a file whose suffix does not tell",
+    )  # fmt: skip
+    parser.set_defaults(usual_format=usual)
     if written:
         group.add_argument("--format", choices=written, help="what is written to standard output (-o -)")
 

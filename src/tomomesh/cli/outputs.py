@@ -88,7 +88,10 @@ def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progr
     stage_one = surface.segmentation
     at_vertices, on_faces = _fields(surface, chosen.output)
     mesh, frame = _placed(surface, chosen.output, settings)
-    io.write_mesh(mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces)
+    io.write_mesh(
+        mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces,
+        z_up=surface.part is not None, precision=settings.run.precision,
+    )  # fmt: skip
     told: dict[str, dict[str, Any]] = {"written": frame}
     if getattr(chosen, "points", None):
         write_points(surface.points, stage_one, chosen.points, settings, surface.place)
@@ -128,7 +131,7 @@ def write_points(
     else:
         frame = io.frame_of_study(settings.run.frame, stage_one.volume.grid)
         points, named = frame.points(points), {"unit": frame.unit, "frame": frame.name}
-    io.write_points(points, path, **named)
+    io.write_points(points, path, **named, precision=settings.run.precision)
     return named
 
 
@@ -166,7 +169,7 @@ def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any
     filled = surface.filled
     if surface.segmentation is not None:
         filled = surface.cap_faces if filled is None else surface.cap_faces | filled
-    return at_vertices, {} if filled is None else {"filled": filled}
+    return at_vertices, {} if filled is None or not filled.any() else {"filled": filled}
 
 
 def write_stage_one(chosen: Namespace, found: Segmentation[Any]) -> None:

@@ -23,6 +23,12 @@ SEVERAL = tuple(
     option for _, entry in parameters() if entry.metadata["length"] == (1, 3) for option in spellings(entry.name)
 )
 """Options that take one number or three."""
+FIXED = {
+    option_of(entry.name): entry.metadata["length"][0]
+    for _, entry in parameters()
+    if len(entry.metadata["length"]) == 1
+}
+"""Options that take several numbers, and how many."""
 LISTED = tuple(option_of(entry.name) for _, entry in parameters() if entry.metadata["length"] == LAYERS)
 """Options that take one number, or several with commas between."""
 

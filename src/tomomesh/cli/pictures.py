@@ -8,6 +8,7 @@ import numpy as np
 
 from ..show import draw_all
 from ..show.film import film
+from ..show.fit import draw_learning
 from ..show.maps import SHEETS, draw_maps
 from ..show.plane import Plane
 from ..show.render import View
@@ -64,6 +65,7 @@ def pictures_of_network(trained: TrainedNetwork, title: str, axes: slice) -> Ite
     start = trained.start[:, axes]
     yield "01-topologies", draw_update_regions()
     yield "02-network", draw_adapted(inputs[:, axes], codebook[:, axes], graph, start=start, title=title)
+    yield "02-learning", draw_learning(trained.history)
     if graph.name in SHEETS:
         winners, _ = match(np.ascontiguousarray(codebook.T), np.ascontiguousarray(inputs.T))
         yield "02-maps", draw_maps(codebook, graph, winners)

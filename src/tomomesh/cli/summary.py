@@ -33,7 +33,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
         *_of_even(report),
         f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}, "
         f"{quality['self_intersections'] or 'no'} face(s) pass through others",
-        f"          {quality['components']} component(s), genus {quality['genus']}, "
+        f"          {pieces_in_words(quality)}, genus {quality['genus']}, "
         f"area {quality['area_mm2']:.6g} {unit}^2{_of_volume(quality, unit)}{_of_rings(quality)}",
         f"distance  points to surface: mean {quality['points_to_surface_mean_mm']:.3g}, "
         f"95 % {quality['points_to_surface_p95_mm']:.3g}, largest {quality['points_to_surface_max_mm']:.3g} {unit}",
@@ -95,7 +95,7 @@ def of_check(report: dict[str, Any]) -> list[str]:
     lines = [
         f"mesh      {report['vertices']} vertices, {report['faces']} faces",
         f"topology  {shape}; {same} after welding at 32 bits",
-        f"          {report['components']} component(s), Euler number {report['euler_number']}"
+        f"          {pieces_in_words(report)}, Euler number {report['euler_number']}"
         + (f", genus {report['genus']}" if report["sound"] else "")
         + loops,
         f"crossing  {report['self_intersections'] or 'no'} face(s) pass through others",
@@ -107,14 +107,25 @@ def of_check(report: dict[str, Any]) -> list[str]:
         *_parts(report),
         *_of_print(report),
     ]
-    if "mean_mm" in report:
-        lines += [
-            f"distance  to the other: mean {report['mean_mm']:.4g}, 95 % {report['p95_mm']:.4g}, "
-            f"largest {report['max_mm']:.4g}",
-            f"          from the other: mean {report['back_mean_mm']:.4g}, 95 % {report['back_p95_mm']:.4g}, "
-            f"largest {report['back_max_mm']:.4g}",
-        ]
-    return lines
+    return lines + _of_agreement(report)
+
+
+def _of_agreement(report: dict[str, Any]) -> list[str]:
+    """Say in a table how near a mesh is to what it should equal."""
+    if "against" not in report:
+        return []
+    what = {"mesh": "the other", "labels": "the labels", "window": "the window"}[report["against"]["against"]]
+    dice = "none, as what is open has no inside" if report["dice"] is None else f"{report['dice']:.4f}"
+    rows = {f"to {what}": "", f"from {what}": "back_"}
+    return [
+        f"against   {what}: Dice {dice}",
+        f"          {'distance':24}{'mean':>10}{'95 %':>10}{'largest':>10}",
+        *(
+            f"          {row:24}" + "".join(f"{report[f'{way}{key}_mm']:10.4g}" for key in ("mean", "p95", "max"))
+            for row, way in rows.items()
+        ),
+        *(f"note      {note}" for note in report["against"]["notes"]),
+    ]
 
 
 def of_part(told: dict[str, Any], output: str) -> list[str]:
@@ -215,6 +226,13 @@ def _of_fit(report: dict[str, Any]) -> str:
     if fit["converged"] is None:
         return "none"
     return f"{fit['iterations']} steps, {'at rest' if fit['converged'] else 'NOT at rest'}"
+
+
+def pieces_in_words(quality: dict[str, Any]) -> str:
+    """Count the pieces of a mesh, and the cavities in them, whose linings are components too."""
+    if not quality["cavities"]:
+        return f"{quality['components']} component(s)"
+    return f"{quality['pieces']} piece(s) with {quality['cavities']} cavity(ies)"
 
 
 def limit_in_words(limit: float | list[float | None] | None) -> str:

@@ -38,7 +38,9 @@ class Shape:
     depth: float
 
 
-def filled_between(stack: Stack, *, threads: int = 0, progress: Progress = silent) -> Values:
+def filled_between(
+    stack: Stack, heights: Floats | None = None, *, threads: int = 0, progress: Progress = silent
+) -> Values:
     """Interpolate the inside of slices to voxels.
 
     Along each link the distances f of both slices follow, at each pixel, a cubic over the height whose slopes are
@@ -50,6 +52,8 @@ def filled_between(stack: Stack, *, threads: int = 0, progress: Progress = silen
     Parameters
     ----------
     stack : Stack
+    heights : (K,) float array, optional
+        Of the layers of voxels, rising; those of `stack`'s own voxels where not given.
     threads : int
     progress : callable
 
@@ -59,8 +63,8 @@ def filled_between(stack: Stack, *, threads: int = 0, progress: Progress = silen
         Negative inside; in voxels.
     """
     shapes = _shapes(stack, threads)
-    volume = np.full(stack.shape, FAR, np.float32)
-    height = stack.low[2] + stack.edge * np.arange(len(volume))
+    height = stack.low[2] + stack.edge * np.arange(stack.shape[0]) if heights is None else heights
+    volume = np.full((len(height), *stack.shape[1:]), FAR, np.float32)
     spans = [_Span(stack, shapes, link, height) for link in stack.links]
     filled = 0
     for units in _rounds(spans):

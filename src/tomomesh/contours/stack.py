@@ -133,8 +133,7 @@ def contour_surface(
     _refuse_open(found, slices, allow_leaks)
     asked = edge or slices.spacing
     stack = _stack(drawn, found, slices, asked)
-    levels = filled_between(stack, threads=threads, progress=progress)
-    np.negative(levels, out=levels)
+    levels = _levels(stack, threads, progress)
     volume = _volume(levels, stack, slices)
     inside = levels > 0
     _require_any(inside, stack.edge)
@@ -149,6 +148,45 @@ def contour_surface(
         edges, rest, np.isinf(away), stack, slices_at(slices.heights), sum(len(outlined.rings) for outlined in found),
         sum(len(outlined.open) for outlined in found), max(outlined.reach for outlined in found), asked, levels.size,
     )  # fmt: skip
+
+
+def solid_between(
+    slices: Slices, heights: Floats, *, threads: int = 0, progress: Progress = silent
+) -> tuple[NDArray[np.float32], Floats, float]:
+    """Interpolate the inside of rings that are known to layers of pixels.
+
+    Parameters
+    ----------
+    slices : Slices
+        With `rings`; the pixels are as wide as its `spacing`, or wider where there would be too many.
+    heights : (K,) float array
+        Of the layers, rising.
+    threads : int
+    progress : callable
+
+    Returns
+    -------
+    levels : (K, J, I) float32 array
+        Depths in pixels, over 0 inside.
+    low : (2,) float array
+        The middle of the first pixel, in the frame of the slices.
+    edge : float
+        Of a pixel.
+
+    Raises
+    ------
+    EmptyError
+        Where fewer than two slices enclose anything.
+    """
+    drawn, found = _drawn(np.empty((0, 3)), slices, False, threads, progress)
+    stack = _stack(drawn, found, slices, slices.spacing)
+    return _levels(stack, threads, progress, heights), stack.low[:2], stack.edge
+
+
+def _levels(stack: Stack, threads: int, progress: Progress, heights: Floats | None = None) -> NDArray[np.float32]:
+    """Return depths inside of the parts and between them."""
+    levels = filled_between(stack, heights, threads=threads, progress=progress)
+    return np.negative(levels, out=levels)
 
 
 def _drawn(

@@ -11,7 +11,7 @@ from .clouds.write import POINT_WRITERS, write_points
 from .dicom import Listing, Series
 from .documents import read_settings, write_document, write_settings, write_table
 from .files.atomic import check_output, replacing
-from .frames import Frame, frame_of_study
+from .frames import Frame, frame_of_study, in_lps
 from .meshes.frame import frame_of_file
 from .meshes.read import MESH_READERS, read_mesh
 from .meshes.write import MESH_WRITERS, keeps, write_mesh
@@ -36,6 +36,7 @@ __all__ = [
     "find_studies",
     "frame_of_file",
     "frame_of_study",
+    "in_lps",
     "keeps",
     "list_series",
     "read_mesh",

@@ -75,6 +75,8 @@ class Volume:
         What the reader decided or dropped, one line each, without patient data.
     padding : (lowest, highest) or None
         Gray levels that stand for nothing measured, where the file names them.
+    other_frame : str
+        The option that takes the file's other frame, where it holds two that disagree.
 
     Examples
     --------
@@ -94,6 +96,7 @@ class Volume:
     unit: str = "stored"
     notes: tuple[str, ...] = ()
     padding: tuple[float, float] | None = None
+    other_frame: str = ""
 
     def __repr__(self) -> str:
         k, j, i = self.shape

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,10 +15,11 @@ from ..kernels.remeshing.links import KEPT
 from ..kernels.remeshing.moves import lift_vertices, move_vertices
 from ..kernels.remeshing.splits import split_edges
 from ..kernels.threads import in_blocks
+from ..model.columns import any_of
 from ..model.mesh import TriMesh
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -28,6 +30,8 @@ BLOCK = 30_000
 SPLITS = 12
 """Most passes over all edges in which they are split before vertices move. An edge waits for the longer sides of its
 faces."""
+RINGS = 2
+"""Rings of faces around those that pass through others that change with them."""
 LIFTS = 2
 """Rounds in which vertices leave the surface before, so that faces do not all lie inside of it where it bends."""
 ROOM = 3
@@ -37,8 +41,13 @@ ROOM = 3
 class Making:
     """A mesh in the making over the surface before. See `tomomesh.kernels.remeshing.links` for the arrays."""
 
-    def __init__(self, ground: Ground, kept: NDArray[np.bool_], threads: int) -> None:
-        """Begin with the surface itself, of which some vertices (n,) are kept with the edges between them."""
+    def __init__(
+        self, ground: Ground, kept: NDArray[np.bool_], threads: int, some: NDArray[np.bool_] | None = None
+    ) -> None:
+        """Begin with the surface itself, of which some vertices (n,) are kept with the edges between them.
+
+        Where only `some` of its faces (m,) are to be made even, whole pieces, the mesh consists of them alone.
+        """
         self._ground, self._threads = ground, threads
         self.corners, self.twins = ground.faces.reshape(-1).copy(), ground.twins.copy()
         self.places, self.valence = ground.mesh.vertices.copy(), ground.valence.copy()
@@ -47,9 +56,13 @@ class Making:
         self.outs = np.full(len(self.places), -1, np.int32)
         self.outs[self.corners] = np.arange(len(self.corners))
         self.under = self.outs // 3
+        if some is not None:
+            gone = np.repeat(~some, 3)
+            self.outs[self.corners[gone]], self.corners[gone] = -1, -1
         along = np.flatnonzero(ground.creases)
-        self.under[self.corners[along]] = along // 3
+        self.under[ground.faces.reshape(-1)[along]] = along // 3
         self.ups = ground.normals[self.under]
+        self._begun = self.places
         self.counts = np.array([len(self.places), len(self.corners) // 3])
 
     @property
@@ -76,6 +89,29 @@ class Making:
         self._ground = ground
         under = np.maximum(self.under, 0)
         self.sizes = ground.sizes[ground.faces[under]].mean(axis=1)
+
+    @contextmanager
+    def only_around(self, some: NDArray[np.bool_]) -> Iterator[Callable[[], NDArray[np.bool_]]]:
+        """Want edges half as long at some faces (m,), and let nothing change but there and a few rings around.
+
+        What is yielded tells, after that, which faces have changed.
+        """
+        near = self._corners_of(some)
+        near[self.faces[any_of(near[self.faces])]] = True
+        self.sizes[near] *= 0.5
+        self._ground = self._ground.finer_at(self.under[near])
+        for _ in range(RINGS):
+            near[self.faces[any_of(near[self.faces])]] = True
+        kinds = self.kinds
+        self.kinds = np.where(near, kinds, np.uint8(KEPT))
+        yield lambda: any_of(np.concatenate([near, np.ones(len(self.outs) - len(near), np.bool_)])[self.faces])
+        self.kinds[: len(kinds)][~near] = kinds[~near]
+
+    def _corners_of(self, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Mark the corners (n,) of some faces (m,)."""
+        corners = np.zeros(len(self.outs), np.bool_)
+        corners[self.faces[some]] = True
+        return corners
 
     def marks(self) -> NDArray[np.uint8]:
         """Mark edges that are too long or too short, at the first of their half edges, (3 m,)."""
@@ -158,9 +194,16 @@ class Making:
         def work(start: int, stop: int) -> None:
             lift_vertices(self.places, self.corners, self.twins, self.outs, self.kinds, self.ups, goals, start, stop)
 
+        self._begun = self.places.copy()
         in_blocks(find, int(self.counts[1]), block=BLOCK, threads=self._threads)
         for _ in range(LIFTS):
             self._over_vertices(work)
+
+    def lower(self, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Put the corners of some faces (m,) back where they were lifted from; return which faces have changed."""
+        near = self._corners_of(some)
+        self.places[near] = self._begun[near]
+        return any_of(near[self.faces])
 
     def _over_vertices(self, work: Callable[[int, int], None]) -> None:
         in_blocks(work, int(self.counts[0]), block=BLOCK, threads=1)

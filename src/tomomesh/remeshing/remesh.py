@@ -8,19 +8,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import GeometryError, ResourceError
-from ..measure.intersections import self_intersections
+from ..measure.intersections import crossing_of, self_intersections
 from ..measure.tree import Tree
 from ..model.columns import any_of
+from ..model.mesh import TriMesh
 from ..progress import Progress, silent
-from .ground import EVEN, Ground, area_of, even_edge
+from .ground import EVEN, Ground, area_of, even_edge, usual_edge
 from .making import Making
+from .specks import NOTHING, LeftOut, without_specks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..model.mesh import TriMesh
-
     Marks = NDArray[np.bool_]
+    Made = tuple[TriMesh, NDArray[np.int32], Marks]
+    """A mesh, the face of the surface before under each vertex, and the faces that pass through others."""
 
 ROUNDS = 5
 """Most rounds of splits, collapses, flips and moves."""
@@ -32,6 +34,9 @@ LAST = 1
 """Moves after the last round, each with flips."""
 TRIES = 4
 """How often the surface is remeshed anew where faces pass through others, with what is under those kept as it was."""
+REPAIRS = 1
+"""How often edges become half as long where faces pass through others before their piece is made anew. Chosen: it helps
+one time in four, a second time never did."""
 REACH = 2
 """Rings of faces around such places that are kept too, on the mesh before."""
 SPECK = 48
@@ -44,8 +49,12 @@ AIM = 0.97
 """Share of the most faces that is aimed at, for the number that a length of edges leads to varies by some percent."""
 MOST_FACES = 40_000_000
 """Faces over which edges are refused as too short: they would take some 16 gigabytes."""
-COARSER = 12
-"""Most rounds in which edges become longer until there are no more faces than asked for."""
+MORE = 1.3
+"""Factor between the numbers of faces that are tried where fewer were asked for than can be: how much too large the one
+may be that is named."""
+COARSER, ABOUT = 12, 4
+"""Most rounds in which edges become longer until there are no more faces than asked for; or, where no number and no
+length was, than before."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +71,9 @@ class Remeshed:
     kept : int
         Vertices of the mesh before that are kept, as even triangles would pass through others there.
     before : TriMesh
-        The mesh before.
+        The mesh before, without what was left out.
+    left_out : LeftOut
+        Components too small for as few faces as were asked for.
     """
 
     mesh: TriMesh
@@ -70,18 +81,26 @@ class Remeshed:
     edge: float
     kept: int
     before: TriMesh
+    left_out: LeftOut = NOTHING
 
     @property
     def report(self) -> dict[str, Any]:
         """What is told of it."""
-        moved = self.mesh is not self.before
-        return {"done": moved, "edge_mm": self.edge, "faces_before": len(self.before.faces), "kept_vertices": self.kept}
+        return {
+            "done": self.mesh is not self.before,
+            "edge_mm": self.edge,
+            "faces_before": len(self.before.faces),
+            "kept_vertices": self.kept,
+            "left_out_components": self.left_out.pieces,
+            "left_out_share": self.left_out.share,
+        }
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What must be known of it."""
         said = "the triangles are not even: even ones would pass through each other where sheets nearly touch"
-        return (said,) if self.mesh is self.before else ()
+        left = (self.left_out.told,) if self.left_out.pieces else ()
+        return (*((said,) if self.mesh is self.before else ()), *left)
 
 
 def remesh(
@@ -89,6 +108,7 @@ def remesh(
     *,
     edge: float | None = None,
     most: int | None = None,
+    like: float = np.inf,
     crossing: Marks | None = None,
     threads: int = 0,
     progress: Progress = silent,
@@ -106,7 +126,9 @@ def remesh(
     edge : float, optional
         Length of edges. Where it is not given, as many faces as there are now suffice.
     most : int, optional
-        Most faces.
+        Most faces. Where there are more, components that are too small for so few are left out (`specks`).
+    like : float
+        Factor by which the volume may change at most.
     crossing : (m,) bool array, optional
         Faces that pass through others before, where that is known.
     threads : int
@@ -116,41 +138,80 @@ def remesh(
     Returns
     -------
     Remeshed
-        Of as many components and handles, and no more faces that pass through others.
+        Of as many components and handles, and, where no number of faces is asked for, no more faces that pass through
+        others.
 
     Raises
     ------
     GeometryError
-        Where the shape cannot be kept with so few faces; names how many it takes.
+        Where the shape cannot be kept with so few or so large faces; names a number that is enough.
     """
-    area = area_of(mesh, threads)
-    _require_room(area, edge)
-    ground, best = _ground(mesh, area, edge, most, threads), None
-    found = np.zeros(len(mesh.vertices), np.bool_)
-    for _ in range(TRIES):
-        making = _made(ground, found, most or np.inf, threads, progress)
-        made, under = making.mesh()
-        crosses = self_intersections(made, threads=threads)
-        if (best is None or crosses.sum() < best.crossing.sum()) and len(made.faces) <= (most or np.inf):
-            best = Remeshed(made, crosses, even_edge(area_of(made, threads), len(made.faces)), int(found.sum()), mesh)
-        if not crosses.any():
+    _require_room(mesh, edge)
+    whole, left_out = mesh, NOTHING
+    if most is not None and most < len(mesh.faces):
+        mesh, left_out = without_specks(mesh, most)
+        crossing = None if left_out.pieces else crossing
+    ground, best = _ground(mesh, edge, most, threads), None
+    found, limit = np.zeros(len(mesh.vertices), np.bool_), most or (len(mesh.faces) if edge is None else np.inf)
+    made, under, crosses = _made(ground, found, limit, threads, progress)
+    for tried in range(TRIES):
+        if most is not None and len(made.faces) > most:
+            break  # what is kept takes more faces still
+        if best is None or crosses.sum() < best.crossing.sum():
+            best = Remeshed(made, crosses, usual_edge(made, threads), int(found.sum()), mesh, left_out)
+        if not crosses.any() or tried == TRIES - 1:
             break
         found = found | _under(ground, made, under, crosses)
-    if best is None:
-        raise GeometryError(
-            "the mesh cannot be kept closed and manifold with so few faces",
-            found=f"--target-faces = {most}",
-            expected=f"about {len(made.faces)} or more",
-            hint="more faces, or --smooth, which takes small detail away first",
-        )
+        made, under, crosses = _made_anew(ground, found, (made, under, crosses), limit, threads, progress)
+    if best is None or not _is_like(best.mesh, mesh, like):
+        if most is None:
+            raise _too_long(edge, share_of(made, mesh))
+        raise _too_few(whole, most, made, like, threads, progress)
     if best.crossing.any() and (most is None or len(mesh.faces) <= most):
         crosses = self_intersections(mesh, threads=threads) if crossing is None else crossing
         if crosses.sum() < best.crossing.sum():
-            return Remeshed(mesh, crosses, even_edge(area, len(mesh.faces)), len(mesh.vertices), mesh)
+            return Remeshed(mesh, crosses, usual_edge(mesh, threads), len(mesh.vertices), mesh, left_out)
     return best
 
 
-def _require_room(area: float, edge: float | None) -> None:
+def share_of(made: TriMesh, before: TriMesh) -> float:
+    """Return the volume of a mesh over that of the mesh before; 1 where that has none."""
+    volume = float(before.face_volumes.sum())
+    return float(made.face_volumes.sum()) / volume if volume > 0 else 1.0
+
+
+def _is_like(made: TriMesh, before: TriMesh, like: float) -> bool:
+    return bool(1 / like <= share_of(made, before) <= like) if np.isfinite(like) else True
+
+
+def _too_few(mesh: TriMesh, most: int, made: TriMesh, like: float, threads: int, progress: Progress) -> GeometryError:
+    """Return the refusal of so few faces, naming a number that was tried and is enough."""
+    share, enough = share_of(made, mesh), max(len(made.faces), int(MORE * most))
+    while enough < len(mesh.faces):
+        kept, _ = without_specks(mesh, enough)
+        found, _, _ = _made(
+            _ground(kept, None, enough, threads), np.zeros(len(kept.vertices), np.bool_), enough, threads, progress
+        )
+        if len(found.faces) <= enough and _is_like(found, kept, like):
+            break
+        enough = max(len(found.faces), int(MORE * enough))
+    return GeometryError(
+        "so few faces do not keep the shape, closed and with its handles",
+        found=f"--target-faces = {most}, {len(made.faces)} faces with {share:.0%} of the volume",
+        expected=f"{enough} or more",
+        hint=f"--target-faces {enough}" + (", or --allow-far" if len(made.faces) <= most else ""),
+    )  # fmt: skip
+
+
+def _too_long(edge: float | None, share: float) -> GeometryError:
+    """Return the refusal of edges so long that they lose the shape."""
+    return GeometryError(
+        "edges so long do not keep the shape", found=f"--edge = {edge}, {share:.0%} of the volume",
+        hint="a shorter --edge, or --allow-far",
+    )  # fmt: skip
+
+
+def _require_room(mesh: TriMesh, edge: float | None) -> None:
     """Refuse edges so short that the faces would not fit into the memory.
 
     Raises
@@ -158,6 +219,7 @@ def _require_room(area: float, edge: float | None) -> None:
     ResourceError
         Naming how many faces there would be, and which edges would do.
     """
+    area = area_of(mesh) if edge is not None else 0.0
     if edge is not None and area > MOST_FACES * EVEN * edge**2:
         raise ResourceError(
             "edges so short make too many faces", found=f"--edge = {edge:g}, {area / (EVEN * edge**2):.3g} faces",
@@ -170,8 +232,9 @@ def faces_under(made: TriMesh, before: TriMesh, threads: int = 0) -> NDArray[np.
     return Tree.of_faces(before).nearest(made.corners.mean(axis=1), threads=threads)[1]
 
 
-def _ground(mesh: TriMesh, area: float, edge: float | None, most: int | None, threads: int) -> Ground:
+def _ground(mesh: TriMesh, edge: float | None, most: int | None, threads: int) -> Ground:
     """Look at the surface, and choose lengths of edges for as many faces as there are, or are asked for, at most."""
+    area = area_of(mesh, threads)
     usual = edge or even_edge(area, min(len(mesh.faces), most or len(mesh.faces)))
     ground = Ground.of(mesh, usual, threads)
     if edge is not None and most is None:
@@ -181,16 +244,18 @@ def _ground(mesh: TriMesh, area: float, edge: float | None, most: int | None, th
     return ground if most is not None else ground.with_specks(SPECK, ROUND)
 
 
-def _made(ground: Ground, kept: Marks, most: float, threads: int, progress: Progress) -> Making:
-    """Go round after round, and on with longer edges while there are too many faces."""
-    making = Making(ground, kept, threads)
+def _made(
+    ground: Ground, kept: Marks, most: float, threads: int, progress: Progress, some: Marks | None = None
+) -> Made:
+    """Go round after round, and on with longer edges while there are too many faces; of `some` faces (m,) alone."""
+    making = Making(ground, kept, threads, some)
     for count in range(ROUNDS):
         progress("remesh", count, ROUNDS)
         if _round(making, split=count > 0) < FEW and count > 0:
             break
     progress("remesh", ROUNDS, ROUNDS)
     _move(making, LAST)
-    for _ in range(COARSER):
+    for _ in range(COARSER if most < len(ground.faces) else ABOUT):
         if len(making.faces) <= most:
             break
         ground = ground.scaled((len(making.faces) / (AIM * most)) ** 0.5)
@@ -198,7 +263,47 @@ def _made(ground: Ground, kept: Marks, most: float, threads: int, progress: Prog
         _round(making)
         _move(making, LAST)
     making.lift()
-    return making
+    return _repaired(making, most, threads)
+
+
+def _repaired(making: Making, most: float, threads: int) -> Made:
+    """Where faces pass through others, put vertices back onto the surface before, and then make edges shorter."""
+    made, under = making.mesh()
+    crosses = self_intersections(made, threads=threads)
+    best = made, under, crosses
+    for repair in (Making.lower, *REPAIRS * (_refine,)):
+        if not crosses.any():
+            break
+        around = repair(making, crosses)
+        made, under = making.mesh()
+        crosses = crossing_of(made, around, threads=threads)
+        if len(made.faces) > most:
+            break
+        if crosses.sum() < best[2].sum():
+            best = made, under, crosses
+    return best
+
+
+def _refine(making: Making, crosses: Marks) -> Marks:
+    """Make edges half as long at some faces (m,); return which faces have changed then."""
+    with making.only_around(crosses) as changed:
+        _round(making)
+    return changed()
+
+
+def _made_anew(ground: Ground, kept: Marks, before: Made, most: float, threads: int, progress: Progress) -> Made:
+    """Make those pieces anew of which faces pass through others, and leave the others as they are."""
+    made, under, crosses = before
+    piece = ground.pieces[under[made.faces[:, 0]]]
+    again = np.zeros(int(ground.pieces.max()) + 1, np.bool_)
+    again[piece[crosses]] = True
+    left, used = made.faces[~again[piece]], np.zeros(len(made.vertices), np.bool_)
+    used[left] = True
+    other, below, _ = _made(ground, kept, max(most - len(left), 1), threads, progress, again[ground.pieces])
+    faces = np.concatenate([(np.cumsum(used) - 1)[left], other.faces + used.sum()])
+    joined = TriMesh(np.concatenate([made.vertices[used], other.vertices]), faces)
+    fresh = np.arange(len(faces)) >= len(left)
+    return joined, np.concatenate([under[used], below]), crossing_of(joined, fresh, threads=threads)
 
 
 def _round(making: Making, *, split: bool = True) -> float:

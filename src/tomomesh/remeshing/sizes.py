@@ -24,9 +24,7 @@ ROUNDS = 2
 steps of one voxel count for little."""
 
 
-def wanted_sizes(
-    vertices: Floats, faces: NDArray[np.int32], normals: Floats, areas: Floats, edge: float
-) -> Floats:
+def wanted_sizes(vertices: Floats, faces: NDArray[np.int32], normals: Floats, areas: Floats, edge: float) -> Floats:
     """Return the length that edges should have at each vertex, (n,).
 
     An edge of length L on a surface of curvature k leaves the middle of its face k L^2 / 6 off the surface (Dunyach

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import GeometryError, UsageError
 from ..model.volume import AXES, Volume, order_along
 from ..stage import Stage, folded, timed
 from .body import Cleaned
 from .crop import crop, inside_roi
 from .grid import onto_grid
-from .labels import doubted, labels_in
+from .labels import doubted, labels_in, whole
 from .selection import Chosen, choose
 
 if TYPE_CHECKING:
@@ -72,6 +72,8 @@ def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> S
             found=type(volume).__name__,
             expected="read_volume(path) or Volume.from_stored(array, affine)",
         )
+    if settings.window.select is not None and labels is None:
+        volume = whole(volume)
     axis = _slice_axis(volume, settings.network.slices)
     part, box = crop(volume, settings.crop, axis)
     study = part.along(axis)
@@ -81,7 +83,12 @@ def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> S
         notes += labels.notes
     chosen = _choose(study, labels, settings)
     kept = tuple(box[n] for n in order_along(axis))
-    section = _section(study, AXES[axis], _cropped(kept, volume.along(axis).shape), notes + _dropped(chosen, settings))
+    section = _section(
+        study,
+        AXES[axis],
+        _cropped(kept, volume.along(axis).shape),
+        notes + _dropped(chosen, settings) + _sparse(chosen),
+    )
     doubt = settings.window.select is not None and doubted(study if labels is None else labels)
     warnings = (*_doubts(chosen.value, settings), *((doubt,) if doubt else ()))
     window = {"window": _window(chosen.value, settings)}
@@ -99,7 +106,15 @@ def _fitting(labels: Volume, volume: Volume, settings: Settings) -> Volume:
     """Lay a label map onto the study's grid; refuse one of which no label is asked for."""
     if settings.window.select is None:
         raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
-    return onto_grid(labels, volume)
+    labels = whole(labels)
+    try:
+        return onto_grid(labels, volume)
+    except GeometryError as fault:
+        if option := volume.other_frame or labels.other_frame:
+            whose = "study" if volume.other_frame else "label map"
+            fault.args = (f"{fault} Or: {option}, for the {whose} holds two frames that disagree.",)
+            fault.flags += (option.split()[0],)
+        raise
 
 
 @timed("window")
@@ -139,6 +154,10 @@ def _dropped(chosen: Stage[Chosen], settings: Settings) -> tuple[str, ...]:
         f"{found.dropped} of {found.components} components of the window ({found.dropped_voxels} voxels) were "
         "left out, which lie in nothing that is 12 mm thick, as a scanner's table: --keep all keeps them",
     )
+
+
+def _sparse(chosen: Stage[Chosen]) -> tuple[str, ...]:
+    return (chosen.value.told,) if chosen.value.told else ()
 
 
 def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:

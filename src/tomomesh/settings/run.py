@@ -29,6 +29,12 @@ class RunSettings(Group):
         "voxels (voxel)",
         choices=("lps", "ras", "voxel"),
     )
+    precision: str = param(
+        "64",
+        "bits of the coordinates in .ply and .vtp, which some viewers want to be 32; 64 all the same where 32 would "
+        "let two vertices fall together",
+        choices=("64", "32"),
+    )
     local_origin: bool = param(
         False, "count a cloud's coordinates from its lowest corner, which report and file name: for STL far from 0"
     )

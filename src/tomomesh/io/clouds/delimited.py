@@ -10,7 +10,6 @@ import numpy as np
 from ...model.points import COLORS
 from ..fields import AXES, IDS, flat_columns
 from ..files.atomic import replacing
-from ..files.signature import signature
 from ..text import delimiter_of, first_row, parse_rows, read_lines, typed
 
 if TYPE_CHECKING:
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
 
     from ...model.points import PointSet
     from ..fields import Cloud, Fields
+    from ..meshes.attributes import MeshAttributes
 
 AXIS = re.compile(r"([xyz])(\W.*|_(mm|cm|m|um|km|in|ft))?", re.IGNORECASE)
 """What the column of a coordinate is called: ``x``, ``X_mm``, ``x [m]``."""
@@ -88,15 +88,15 @@ def read_obj(path: Path) -> Cloud:
     return rows[:, :3], dict(zip(COLORS, colors, strict=False))
 
 
-def write_xyz(points: PointSet, path: str | Path, unit: str, frame: str) -> None:
+def write_xyz(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
     """Write positions under a comment."""
     rows = (f"{x!r} {y!r} {z!r}" for x, y, z in points.positions.tolist())
-    _write_lines(path, [f"# {signature(unit, frame)}", *rows])
+    _write_lines(path, [f"# {beside.head}", *rows])
 
 
-def write_csv(points: PointSet, path: str | Path, unit: str, frame: str) -> None:
+def write_csv(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
     """Write positions, ids and attributes under a line of names."""
-    head = [axis if unit == "unknown" else f"{axis}_{unit}" for axis in AXES]
+    head = [axis if beside.unit == "unknown" else f"{axis}_{beside.unit}" for axis in AXES]
     others = flat_columns(points.attributes, len(points), [*AXES, *head, *IDS])
     ids = (points.slices, points.neurons, points.kinds)
     columns: list[NDArray[Any]] = [*points.positions.T, *ids, *others.values()]

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..colors import named_colors
 from ..files.atomic import replacing
-from ..volumes.nifti import FLIP
-from .attributes import single_precision
+from ..volumes.nifti_frame import FLIP
+from .attributes import MM, single_precision
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,16 +20,14 @@ if TYPE_CHECKING:
     from ..fields import Fields
     from .attributes import MeshAttributes
 
-MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
-"""Millimeters in a unit; GIFTI has no other unit."""
-
 SCANNER, UNKNOWN = "NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_UNKNOWN"
 
 
 def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write 32-bit coordinates in millimeters, RAS where the mesh has a patient frame, and the fields at vertices.
 
-    The array of positions says which: ``NIFTI_XFORM_SCANNER_ANAT``, else ``NIFTI_XFORM_UNKNOWN``.
+    The array of positions says which: ``NIFTI_XFORM_SCANNER_ANAT``, else ``NIFTI_XFORM_UNKNOWN``. No other array has a
+    frame (GIFTI 1.0, 2.3.4), though nibabel gives one to each; ITK and gifti_tool complain of them.
 
     Raises
     ------
@@ -47,12 +45,14 @@ def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None
         coordsys=GiftiCoordSystem(space, space, np.eye(4)),
         meta=GiftiMetaData(written_by=beside.head, coordinates="RAS, mm" if patient else beside.unit),
     )
-    faces = GiftiDataArray(mesh.faces.astype(np.int32), "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32")
-    more = [
+    others = [GiftiDataArray(mesh.faces.astype(np.int32), "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32")]
+    others += [
         GiftiDataArray(values, intent, "NIFTI_TYPE_FLOAT32", meta=GiftiMetaData(Name=name))
         for name, intent, values in _arrays(beside.vertex_fields)
     ]
-    image = GiftiImage(darrays=[points, faces, *more], meta=GiftiMetaData(Description=beside.head))
+    for array in others:
+        array.coordsys = None
+    image = GiftiImage(darrays=[points, *others], meta=GiftiMetaData(Description=beside.head))
     with replacing(path) as file:
         file.write(image.to_xml())
 

@@ -1,5 +1,7 @@
 """3MF: the zip of XML that slicers for 3D printing read.
 
+In millimeters always: Slic3r, OpenSCAD and assimp pass over the unit that a model names.
+
 Written with the standard library: it is one text in a zip with two fixed companions. trimesh's exporter stamps the time
 and random ids into the file, and lib3mf is a compiled library; it judges what is written here in the tests.
 """
@@ -7,6 +9,7 @@ and random ids into the file, and lib3mf is a compiled library; it judges what i
 from __future__ import annotations
 
 import zipfile
+from dataclasses import replace
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
@@ -15,6 +18,7 @@ import numpy as np
 from ...errors import OutputError
 from ..colors import named_colors
 from ..files.atomic import replacing
+from .attributes import MM
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,9 +26,6 @@ if TYPE_CHECKING:
 
     from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
-
-UNITS = {"um": "micron", "mm": "millimeter", "cm": "centimeter", "m": "meter"}
-"""Units to the names that 3MF has for them."""
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 MATERIAL = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
@@ -51,22 +52,23 @@ COLORS_ID, MESH_ID = 1, 2
 
 
 def write_3mf(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write one object of 64-bit coordinates, with colors at its corners where there are any.
+    """Write one object of 64-bit coordinates in millimeters, with colors at its corners where there are any.
 
     Raises
     ------
     OutputError
         For coordinates of an unknown unit: 3MF has none without.
     """
-    if beside.unit not in UNITS:
+    if beside.unit not in MM:
         raise OutputError(
             "a 3MF file names a unit, and that of the coordinates is unknown",
             file=str(path),
             found=f"unit = {beside.unit}",
-            expected=" | ".join(UNITS),
+            expected=" | ".join(MM),
             hint="--units",
         )
-    members = {**COMPANIONS, "3D/3dmodel.model": "".join(_model(mesh, beside))}
+    sized = mesh.moved(MM[beside.unit] * mesh.vertices)
+    members = {**COMPANIONS, "3D/3dmodel.model": "".join(_model(sized, replace(beside, unit="mm")))}
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in members.items():
             entry = zipfile.ZipInfo(name, FIRST_DAY)
@@ -77,7 +79,7 @@ def write_3mf(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
 def _model(mesh: TriMesh, beside: MeshAttributes) -> Iterator[str]:
     colors = named_colors(beside.vertex_fields)
     palette, numbers = np.unique(colors[1], axis=0, return_inverse=True) if colors else (None, np.zeros(0, np.int64))
-    yield f'{DECLARATION}<model unit="{UNITS[beside.unit]}" xml:lang="en-US" xmlns="{CORE}" xmlns:m="{MATERIAL}">\n'
+    yield f'{DECLARATION}<model unit="millimeter" xml:lang="en-US" xmlns="{CORE}" xmlns:m="{MATERIAL}">\n'
     yield f'<metadata name="Application">tomomesh</metadata>\n<metadata name="Description">{beside.head}</metadata>\n'
     yield "<resources>\n"
     if palette is not None:

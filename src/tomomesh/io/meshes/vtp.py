@@ -13,6 +13,7 @@ import numpy as np
 from ..colors import named_colors
 from ..fields import IDS, flat_columns
 from ..files.atomic import replacing
+from .attributes import narrowed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,7 +37,7 @@ PARTS = ("Verts", "Lines", "Strips", "Polys")
 
 
 def write_vtp_mesh(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write a mesh of 64-bit coordinates with all its fields; colors are one array named ``RGB``."""
+    """Write a mesh with all its fields, of 64-bit coordinates unless asked else; colors are one array named ``RGB``."""
     point_data, cell_data = _arrays(beside.vertex_fields), _arrays(beside.face_fields)
     _write(path, beside, mesh.vertices, "Polys", mesh.faces, point_data, cell_data)
 
@@ -78,7 +79,7 @@ def _write(
                 f'<Piece NumberOfPoints="{len(positions)}"{counts}>',
                 *_section("PointData", point_data),
                 *_section("CellData", cell_data),
-                *_section("Points", {"Points": positions}),
+                *_section("Points", {"Points": narrowed(positions, single=beside.single)}),
                 *(line for name in PARTS for line in _cells(name, cells if name == part else cells[:0])),
                 "</Piece>",
                 "</PolyData>",

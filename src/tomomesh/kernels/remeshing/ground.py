@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compile import kernel
-from .links import TINY, after
+from .links import TINY
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -141,9 +141,7 @@ def walk_along(
     return face if best < np.inf else -1
 
 
-@kernel(
-    "void(f8[:,::1], i4[:,::1], i4[::1], i4[::1], i4[::1], f8[:,::1], i4[::1], i4[::1], f8[:,::1], i8, i8)"
-)
+@kernel("void(f8[:,::1], i4[:,::1], i4[::1], i4[::1], i4[::1], f8[:,::1], i4[::1], i4[::1], f8[:,::1], i8, i8)")
 def find_goals(
     surface: Floats, faces: Ints, twins: Ints, fans: Ints, first: Ints, places: Floats, corners: Ints, under: Ints,
     goals: Floats, start: int, stop: int,

@@ -12,10 +12,12 @@ from ....errors import EmptyError, FormatError, GeometryError
 from ....model.volume import Volume
 from ...files.limits import require_memory
 from ...files.source import third_party
+from ...names import shown
 from ..headers.dataset import read_dataset
-from ..headers.header import frames_of, numbers
-from ..headers.names import shown
+from ..headers.header import frames_of
+from ..headers.values import numbers
 from ..pixels.decoder import Decoder
+from ..pixels.tables import PALETTE
 from .lattice import lattice_of
 
 if TYPE_CHECKING:
@@ -129,6 +131,8 @@ def _header(path: Path) -> Segmentation:
         kind = str(header.get("SegmentationType", "")) or "missing"
         if kind not in ("BINARY", "FRACTIONAL", LABELMAP):
             raise FormatError("the segmentation is of an unknown type", file=name, found=f"SegmentationType = {kind}")
+        if header.get("PhotometricInterpretation") == PALETTE:  # its colors are for the eye: the numbers are segments
+            header.PhotometricInterpretation = "MONOCHROME2"
         described = [item for item in header.get("SegmentSequence") or [] if item.get("SegmentNumber") != 0]
         labels = {_number(item, "SegmentNumber", name): shown(item.get("SegmentLabel")) for item in described}
         segments = [0 if kind == LABELMAP else _segment_of(header, n, name) for n in range(len(frames))]

@@ -13,9 +13,9 @@ from ....errors import EmptyError, FormatError, GeometryError, ResourceError, To
 from ....measure.polygon import side_lengths
 from ....model.points import NEURON, RING, STRUCTURE, PointSet
 from ...files.source import counted, third_party
+from ...names import shown
 from ..headers.dataset import read_dataset
 from ..headers.kinds import STRUCTURES, storage_class
-from ..headers.names import shown
 from .contours import CLOSED, OPEN, corners_of, ends_meet
 from .planes import directions, planes_of
 from .rings import filled, parted, pieces_of, thinned

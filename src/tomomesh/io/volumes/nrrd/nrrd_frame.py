@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...errors import FormatError, GeometryError
-from .affine import (
+from ....errors import FormatError, GeometryError
+from ..affine import (
     GIVEN,
     SPACING_HINT,
     UNTURNED,
@@ -19,14 +19,14 @@ from .affine import (
     required_spacing,
     upright,
 )
-from .raster import floats_of
+from ..raster import floats_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from ...settings import ReadSettings
+    from ....settings import ReadSettings
 
 SPACES = {
     "left-posterior-superior": (1, 1, 1), "lps": (1, 1, 1),
