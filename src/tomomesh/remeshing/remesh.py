@@ -8,35 +8,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import GeometryError, ResourceError
-from ..measure.intersections import crossing_of, self_intersections
+from ..measure.intersections import self_intersections
 from ..measure.tree import Tree
 from ..model.columns import any_of
-from ..model.mesh import TriMesh
 from ..progress import Progress, silent
 from .ground import EVEN, Ground, area_of, even_edge, usual_edge
-from .making import Making
+from .rounds import AIM, made_anew, made_even
 from .specks import NOTHING, LeftOut, without_specks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Marks = NDArray[np.bool_]
-    Made = tuple[TriMesh, NDArray[np.int32], Marks]
-    """A mesh, the face of the surface before under each vertex, and the faces that pass through others."""
+    from ..model.mesh import TriMesh
 
-ROUNDS = 5
-"""Most rounds of splits, collapses, flips and moves."""
-FEW = 0.1
-"""Splits and collapses a vertex in a round after which there is no other. Chosen: voxels' meshes take three rounds.
-With half of it they take a fourth, which adds a tenth to the time and 0.5 degrees to the smallest angles (1 %); with
-twice as much two, which cost 1 degree and leave 3 % more faces."""
-LAST = 1
-"""Moves after the last round, each with flips."""
+    Marks = NDArray[np.bool_]
+
 TRIES = 4
 """How often the surface is remeshed anew where faces pass through others, with what is under those kept as it was."""
-REPAIRS = 1
-"""How often edges become half as long where faces pass through others before their piece is made anew. Chosen: it helps
-one time in four, a second time never did."""
 REACH = 2
 """Rings of faces around such places that are kept too, on the mesh before."""
 SPECK = 48
@@ -45,16 +33,11 @@ shape."""
 ROUND = 0.1
 """Roundness of such a component under which it is kept as it is: it is as flat as a leaf, and its two sides
 would pass through each other."""
-AIM = 0.97
-"""Share of the most faces that is aimed at, for the number that a length of edges leads to varies by some percent."""
 MOST_FACES = 40_000_000
 """Faces over which edges are refused as too short: they would take some 16 gigabytes."""
 MORE = 1.3
 """Factor between the numbers of faces that are tried where fewer were asked for than can be: how much too large the one
 may be that is named."""
-COARSER, ABOUT = 12, 4
-"""Most rounds in which edges become longer until there are no more faces than asked for; or, where no number and no
-length was, than before."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +136,7 @@ def remesh(
         crossing = None if left_out.pieces else crossing
     ground, best = _ground(mesh, edge, most, threads), None
     found, limit = np.zeros(len(mesh.vertices), np.bool_), most or (len(mesh.faces) if edge is None else np.inf)
-    made, under, crosses = _made(ground, found, limit, threads, progress)
+    made, under, crosses = made_even(ground, found, limit, threads, progress)
     for tried in range(TRIES):
         if most is not None and len(made.faces) > most:
             break  # what is kept takes more faces still
@@ -162,7 +145,7 @@ def remesh(
         if not crosses.any() or tried == TRIES - 1:
             break
         found = found | _under(ground, made, under, crosses)
-        made, under, crosses = _made_anew(ground, found, (made, under, crosses), limit, threads, progress)
+        made, under, crosses = made_anew(ground, found, (made, under, crosses), limit, threads, progress)
     if best is None or not _is_like(best.mesh, mesh, like):
         if most is None:
             raise _too_long(edge, share_of(made, mesh))
@@ -189,7 +172,7 @@ def _too_few(mesh: TriMesh, most: int, made: TriMesh, like: float, threads: int,
     share, enough = share_of(made, mesh), max(len(made.faces), int(MORE * most))
     while enough < len(mesh.faces):
         kept, _ = without_specks(mesh, enough)
-        found, _, _ = _made(
+        found, _, _ = made_even(
             _ground(kept, None, enough, threads), np.zeros(len(kept.vertices), np.bool_), enough, threads, progress
         )
         if len(found.faces) <= enough and _is_like(found, kept, like):
@@ -242,86 +225,6 @@ def _ground(mesh: TriMesh, edge: float | None, most: int | None, threads: int) -
     fewest = min(len(mesh.faces), AIM * (most or np.inf))
     ground = ground.scaled(max(ground.forecast() / fewest, 1.0) ** 0.5)
     return ground if most is not None else ground.with_specks(SPECK, ROUND)
-
-
-def _made(
-    ground: Ground, kept: Marks, most: float, threads: int, progress: Progress, some: Marks | None = None
-) -> Made:
-    """Go round after round, and on with longer edges while there are too many faces; of `some` faces (m,) alone."""
-    making = Making(ground, kept, threads, some)
-    for count in range(ROUNDS):
-        progress("remesh", count, ROUNDS)
-        if _round(making, split=count > 0) < FEW and count > 0:
-            break
-    progress("remesh", ROUNDS, ROUNDS)
-    _move(making, LAST)
-    for _ in range(COARSER if most < len(ground.faces) else ABOUT):
-        if len(making.faces) <= most:
-            break
-        ground = ground.scaled((len(making.faces) / (AIM * most)) ** 0.5)
-        making.rescaled(ground)
-        _round(making)
-        _move(making, LAST)
-    making.lift()
-    return _repaired(making, most, threads)
-
-
-def _repaired(making: Making, most: float, threads: int) -> Made:
-    """Where faces pass through others, put vertices back onto the surface before, and then make edges shorter."""
-    made, under = making.mesh()
-    crosses = self_intersections(made, threads=threads)
-    best = made, under, crosses
-    for repair in (Making.lower, *REPAIRS * (_refine,)):
-        if not crosses.any():
-            break
-        around = repair(making, crosses)
-        made, under = making.mesh()
-        crosses = crossing_of(made, around, threads=threads)
-        if len(made.faces) > most:
-            break
-        if crosses.sum() < best[2].sum():
-            best = made, under, crosses
-    return best
-
-
-def _refine(making: Making, crosses: Marks) -> Marks:
-    """Make edges half as long at some faces (m,); return which faces have changed then."""
-    with making.only_around(crosses) as changed:
-        _round(making)
-    return changed()
-
-
-def _made_anew(ground: Ground, kept: Marks, before: Made, most: float, threads: int, progress: Progress) -> Made:
-    """Make those pieces anew of which faces pass through others, and leave the others as they are."""
-    made, under, crosses = before
-    piece = ground.pieces[under[made.faces[:, 0]]]
-    again = np.zeros(int(ground.pieces.max()) + 1, np.bool_)
-    again[piece[crosses]] = True
-    left, used = made.faces[~again[piece]], np.zeros(len(made.vertices), np.bool_)
-    used[left] = True
-    other, below, _ = _made(ground, kept, max(most - len(left), 1), threads, progress, again[ground.pieces])
-    faces = np.concatenate([(np.cumsum(used) - 1)[left], other.faces + used.sum()])
-    joined = TriMesh(np.concatenate([made.vertices[used], other.vertices]), faces)
-    fresh = np.arange(len(faces)) >= len(left)
-    return joined, np.concatenate([under[used], below]), crossing_of(joined, fresh, threads=threads)
-
-
-def _round(making: Making, *, split: bool = True) -> float:
-    """Change edges and move vertices; return the splits and collapses a vertex."""
-    marks, before = making.marks(), int(making.counts[0])
-    if split:
-        marks = making.split(marks)
-    changes = int(making.counts[0]) - before + making.collapse(marks)
-    making.flip()
-    making.move()
-    return changes / making.vertices
-
-
-def _move(making: Making, times: int) -> None:
-    making.flip()
-    for _ in range(times):
-        making.move()
-        making.flip()
 
 
 def _under(ground: Ground, made: TriMesh, under: NDArray[np.int32], marked: Marks) -> Marks:

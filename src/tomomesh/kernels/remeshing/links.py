@@ -41,8 +41,9 @@ FREE, CREASE, FIXED, KEPT = 0, 1, 2, 3
 """Vertices that go anywhere on the surface, along a crease, or nowhere; and those whose edges to each other stay too,
 as at a border."""
 LONG, SHORT = 1.45, 4 / 5
-"""Shares of its wanted length over and under which an edge is split or collapsed: after either, both what was and what
-is made lie nearer to that length (Botsch & Kobbelt 2004)."""
+"""Shares of its wanted length over and under which an edge is split or collapsed. Botsch & Kobbelt (2004) split from
+4/3: then more of the halves are too short at once, and collapse. Chosen: 4/3 takes a tenth more time for the same
+angles, 1.6 costs a degree of the smallest ones."""
 TINY = 1e-300
 """Least divisor: a face without area has no angle."""
 UPRIGHT = 0.5
