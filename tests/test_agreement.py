@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import COMPILED, law, seeds, size, solids
-from studies import rotation, write_nifti
+from studies import rotation, shared, write_nifti
 from test_cli import fails
 from test_end_to_end import ball
 from tomomesh import TriMesh, Volume, compare_with_study, read_mesh, write_mesh
@@ -225,6 +225,14 @@ class TestCommand:
         assert checked(made, "cm.ply", "ras.stl", capsys)["max_mm"] < 1e-4
         fails(["check", str(made / "ras.stl"), "--against", str(made / "voxel.stl")], 5, capsys)
 
+    def test_a_mesh_counted_from_a_corner_is_brought_back(self, made: Path, capsys: CaptureFixture[str]) -> None:
+        mesh = read_mesh(made / "lps.stl")
+        write_mesh(mesh.moved(mesh.vertices / 10 - [1.5, -20, 3]), made / "l.ply", unit="cm", frame="local:1.5,-20.0,3")
+        write_mesh(mesh, made / "u.ply", frame="unknown")
+        assert checked(made, "l.ply", "u.ply", capsys)["max_mm"] < 1e-9
+        write_mesh(mesh, made / "odd.ply", frame="local:1,2")
+        assert checked(made, "odd.ply", "u.ply", capsys)["max_mm"] < 1e-9
+
     def test_a_mesh_without_a_frame_is_taken_for_lps_and_told(self, made: Path, capsys: CaptureFixture[str]) -> None:
         mesh = read_mesh(made / "ras.stl")
         trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(made / "other.stl")
@@ -250,5 +258,24 @@ class TestCommand:
 
     def test_options_of_a_study_without_one(self, made: Path, capsys: CaptureFixture[str]) -> None:
         fails(["check", str(made / "lps.stl"), "--select", "5"], 2, capsys)
+        fails(["check", str(made / "lps.stl"), "--against", str(made / "ras.stl"), "--lower", "5"], 2, capsys)
         fails(["check", str(made / "lps.stl"), "--against", str(made / "labels.nii")], 2, capsys)
         fails(["check", str(made / "lps.stl"), "--against", str(made / "none.nii.gz")], 3, capsys)
+
+
+@pytest.mark.skipif(not COMPILED, reason="a whole study takes minutes without the compiler")
+def test_labels_of_a_body_are_followed_by_even_triangles_of_32_bits(
+    tmp_path: Path, capsys: CaptureFixture[str]
+) -> None:
+    """Finite elements want no slivers."""
+    labels = str(shared("totalsegmentator/example_seg_dicom.nii.gz"))
+    line = ["--select", "20", "--network", "none", "-o", str(tmp_path / "m.stl"), "--quiet"]
+    assert main(["reconstruct", "--labels-in", labels, *line]) == 0
+    judge = trimesh.load(tmp_path / "m.stl")
+    assert judge.is_volume
+    assert np.rad2deg(judge.face_angles.min()) > 20
+    assert judge.edges_unique_length.min() > 0.2
+    found = checked(tmp_path, "m.stl", labels, capsys, "--select", "20")
+    assert found["dice"] > 0.99
+    assert found["p95_mm"] < 1
+    assert found["max_mm"] < 2

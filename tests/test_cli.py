@@ -139,6 +139,7 @@ class TestOtherCommands:
         assert main(["demo", "-o", str(folder)]) == 0
         names = {"mesh.stl", "points.ply", "labels.nii.gz", "truth.ply", "report.json", "settings.toml", "figures"}
         assert {path.name for path in folder.iterdir()} == names
+        assert trimesh.load(folder / "truth.ply").is_volume
         assert "truth" in json.loads((folder / "report.json").read_text())
         said = capsys.readouterr().out
         assert len(said.splitlines()) <= 15

@@ -215,7 +215,7 @@ def _cloud_of_a_pole(tmp_path: Path) -> Path:
 class TestPly:
     def test_three_draws_what_is_written_with_32_bits(self, tmp_path: Path) -> None:
         """Its geometries take the numbers as they stand, and WebGL has none of 64 bits."""
-        for bits in ("32", "64"):
+        for bits in (32, 64):
             write_mesh(lopsided(), tmp_path / f"m{bits}.ply", precision=bits)
         told = asked_of_node("three", tmp_path / "m32.ply", tmp_path / "m64.ply")
         assert [one["array"] for one in told] == ["Float32Array", "Float64Array"]
@@ -224,14 +224,14 @@ class TestPly:
     def test_32_bits_are_left_where_vertices_would_fall_together(self, tmp_path: Path, suffix: str) -> None:
         for shift, dtype in ((0.0, np.float32), (1e9, np.float64)):
             mesh = lopsided(shift)
-            write_mesh(mesh, tmp_path / f"m{suffix}", precision="32")
+            write_mesh(mesh, tmp_path / f"m{suffix}", precision=32)
             vertices, _, _ = of_vtk(tmp_path / f"m{suffix}") if suffix == ".vtp" else of_meshio(tmp_path / "m.ply")
             np.testing.assert_array_equal(vertices, mesh.vertices.astype(dtype))
 
     def test_points_in_32_bits(self, tmp_path: Path) -> None:
         points = PointSet.from_positions(sphere(50))
         for suffix in (".ply", ".vtp"):
-            write_points(points, tmp_path / f"p{suffix}", precision="32")
+            write_points(points, tmp_path / f"p{suffix}", precision=32)
         meshio = pytest.importorskip("meshio", reason="the package meshio is not installed")
         assert meshio.read(tmp_path / "p.ply").points.dtype == np.float32
         np.testing.assert_array_equal(of_vtk_points(tmp_path / "p.vtp"), points.positions.astype(np.float32))
@@ -274,3 +274,17 @@ class TestGifti:
         told = subprocess.run(command, capture_output=True, check=True, text=True)
         assert "is VALID" in told.stdout + told.stderr
         assert "**" not in told.stdout + told.stderr
+
+
+@pytest.mark.parametrize("suffix", [".3mf", ".gii"])
+def test_a_cloud_in_meters_is_written_in_millimeters_and_told_so(
+    tmp_path: Path, suffix: str, cloud_of_a_pole: Path
+) -> None:
+    """A ball of radius 10 m, three times as high."""
+    report = tmp_path / "report.json"
+    line = ["surface", str(cloud_of_a_pole), "-o", str(tmp_path / f"m{suffix}"), "--units", "m", "--quiet"]
+    assert main([*line, "--report", str(report)]) == 0
+    for read in CLIENTS[suffix]:
+        vertices, _, _ = read(tmp_path / f"m{suffix}")
+        assert np.ptp(vertices, axis=0) == pytest.approx([20e3, 20e3, 60e3], rel=0.05)
+    assert json.loads(report.read_text())["written"] == {"unit": "mm", "frame": "unknown"}

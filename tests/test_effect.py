@@ -13,10 +13,10 @@ from conftest import COMPILED
 from studies import write_nifti
 from tomomesh import PointSet, Settings, Volume, reconstruct, reconstruct_points
 from tomomesh.cli import main
+from tomomesh.effect import without_effect
 from tomomesh.settings import MATTERS, parameters
 from tomomesh.ways import WAYS as TABLE
 from tomomesh.ways import way_of
-from tomomesh.ways.effect import without_effect
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,7 +30,8 @@ OTHER: dict[str, Any] = {
     "epochs": 2, "start": "axes", "neighborhood": "bubble", "alpha": (0.3, 0.1), "alpha_fall": "exponential",
     "alpha_power": 1.5, "radius": (4.0, 0.9), "radius_fall": "linear", "radius_power": 3.0, "least_move": 0.5,
     "bridge": 1.1, "even": False, "trim": 1.5, "cell_mm": (1.5,), "cell_factor": 1.7, "caps": False, "closing": 3,
-    "stacks": "none", "allow_leaks": True, "open": True, "low_pass": 0, "attraction": "surface", "stiffness": 0.9,
+    "stacks": "none", "filled": True, "allow_leaks": True, "open": True, "low_pass": 0, "attraction": "surface",
+    "stiffness": 0.9,
     "damping": 0.9, "step": 0.5, "springs": "triangles", "limit": "shorten", "allow_returns": True,
     "units": "cm", "local_origin": True, "allow_far": True,
     "largest": True, "surface": "outer", "divide": False, "seed": 99, "cell_from": "nearest", "tracking": "faces",
@@ -39,10 +40,11 @@ OTHER: dict[str, Any] = {
 SOMETIMES = {*MATTERS, *(name for way in TABLE for name in way_of(way).reads)}
 """Parameters that are read on some ways alone, or beside some values of others alone."""
 ALWAYS = {
-    "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "level", "fill_chunks", "structure",
-    "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "keep", "slices", "way", "network",
-    "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow", "drain", "least_wall",
-    "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge", "precision",
+    "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "nifti_form", "level", "fill_chunks",
+    "structure", "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "fill_slices", "keep",
+    "slices", "way", "network", "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow",
+    "drain", "least_wall", "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge", "thickness",
+    "precision",
 }  # fmt: skip
 """Parameters that matter on every way, or that choose what is read, the way, or what becomes of the mesh."""
 STUDY: dict[str, dict[str, Any]] = {

@@ -32,7 +32,7 @@ GIVEN = ReadSettings(spacing_z=1.0, spacing=(1.0, 1.0, 1.0), fill_gaps=True, res
 """Every flag that stands in for a place."""
 
 
-def frames(affine: NDArray[np.float64], offsets: NDArray[np.float64], kind: str, **fields: Any) -> Dataset:
+def frames(affine: NDArray[np.float64], offsets: NDArray[np.floating[Any]], kind: str, **fields: Any) -> Dataset:
     """Return a file whose frames lie at offsets in mm along the normal of the first one's rows and columns."""
     normal = np.cross(affine[:3, 0], affine[:3, 1])
     normal /= np.linalg.norm(normal)
@@ -50,7 +50,7 @@ def frames(affine: NDArray[np.float64], offsets: NDArray[np.float64], kind: str,
     return data
 
 
-def dose(affine: NDArray[np.float64], offsets: NDArray[np.float64], **fields: Any) -> Dataset:
+def dose(affine: NDArray[np.float64], offsets: NDArray[np.floating[Any]], **fields: Any) -> Dataset:
     """Return a dose whose stored numbers are a fourth of the gray levels."""
     data = frames(affine, offsets, DOSE, Modality="RTDOSE", DoseUnits="GY", DoseGridScaling=0.25)
     data.FrameIncrementPointer = Tag("GridFrameOffsetVector")
@@ -117,9 +117,21 @@ class TestPlaces:
             assert_in_place(read_volume(path, settings=settings))
 
     @pytest.mark.parametrize("distance", [2.0, -2.0])
-    def test_an_old_capture_goes_along_its_normal(self, tmp_path: Path, distance: float) -> None:
-        data = frames(AXIAL, distance * np.arange(5), CAPTURE, SpacingBetweenSlices=distance)
-        assert_in_place(read_volume(save(data, tmp_path / "c.dcm")))
+    @pytest.mark.parametrize("kind", [CAPTURE, ULTRASOUND, STORAGE + "3", ANGIOGRAPHY])
+    def test_old_frames_with_a_distance_go_along_their_normal(self, tmp_path: Path, kind: str, distance: float) -> None:
+        """Volumes of ultrasound and of rotational angiography were written so, with a time for the viewer's film."""
+        fields = {"FrameTime": 30, "FrameIncrementPointer": Tag("FrameTime")}
+        data = frames(AXIAL, distance * np.arange(5), kind, SpacingBetweenSlices=distance, **fields)
+        volume = read_volume(save(data, tmp_path / "c.dcm"))
+        assert_in_place(volume)
+        assert "along their normal" in volume.notes[0]
+
+    def test_slice_locations_place_frames_where_they_begin_with_the_first(self, tmp_path: Path) -> None:
+        for first in (0.0, AXIAL[2, 3]):
+            data = frames(AXIAL, -STEP * np.arange(5), CAPTURE)
+            data.FrameIncrementPointer = Tag("SliceLocationVector")
+            data.SliceLocationVector = [first - STEP * n for n in range(5)]
+            assert_in_place(read_volume(save(data, tmp_path / "c.dcm")))
 
     def test_one_frame_alone_is_where_it_says(self, tmp_path: Path) -> None:
         path = save(dose(AXIAL, np.zeros(1)), tmp_path / "d.dcm")

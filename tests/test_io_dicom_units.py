@@ -111,7 +111,7 @@ class TestPadding:
     ) -> None:
         corner = np.zeros(STORED.shape, bool)
         corner[:, :2, :3] = True
-        stored = np.where(corner, 7, STORED).astype(kind)
+        stored: NDArray[Any] = np.where(corner, 7, STORED).astype(kind)
 
         def edit(data: Dataset, k: int) -> None:
             data.Modality, data.PhotometricInterpretation = modality, photometric

@@ -272,7 +272,7 @@ class TestGifti:
         (placed,) = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
         assert nibabel.nifti1.xform_codes.niistring[placed.coordsys.dataspace] == "NIFTI_XFORM_SCANNER_ANAT"
         np.testing.assert_array_equal(placed.coordsys.xform, np.eye(4))
-        assert image.meta["Description"] == f"tomomesh 0.1.0 unit=cm frame={frame}"
+        assert image.meta["Description"] == "tomomesh 0.1.0 unit=mm frame=RAS"
 
     def test_an_unknown_frame_is_said_to_be_unknown(self, tmp_path: Path) -> None:
         mesh = lopsided()

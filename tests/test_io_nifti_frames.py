@@ -138,7 +138,7 @@ class TestTwoFrames:
         k, j, i = np.indices((12, 12, 12))
         ball = ((i - 6) ** 2 + (j - 6) ** 2 + (k - 6) ** 2 <= 16).astype(np.int16)
         study = two_forms(tmp_path / "t.nii", AXIAL, OBLIQUE, 100 * ball)
-        image = SimpleITK.GetImageFromArray(ball)
+        image: Any = SimpleITK.GetImageFromArray(ball)
         image.SetSpacing((0.5, 0.7, 2.0))
         image.SetOrigin(OBLIQUE[:3, 3].tolist())
         image.SetDirection((OBLIQUE[:3, :3] / (0.5, 0.7, 2.0)).ravel().tolist())
@@ -162,9 +162,10 @@ class TestLabels:
         for form in (written.header.get_qform(), written.header.get_sform()):
             np.testing.assert_allclose(LPS_TO_RAS @ form, affine, atol=1e-4)
         assert int(written.header["qform_code"]) == int(written.header["sform_code"]) == 1
-        image = SimpleITK.ReadImage(str(tmp_path / "l.nii.gz"))
+        image: Any = SimpleITK.ReadImage(str(tmp_path / "l.nii.gz"))
         np.testing.assert_allclose(placed_by_itk(image), affine, atol=1e-4)
-        shape = SimpleITK.LabelShapeStatisticsImageFilter()
+        measure: Any = SimpleITK.LabelShapeStatisticsImageFilter
+        shape = measure()
         shape.Execute(image)
         voxels = np.argwhere(labels)[:, ::-1]
         assert shape.GetPhysicalSize(1) == pytest.approx(len(voxels) * 0.5 * 0.7 * 2.0, rel=1e-5)
@@ -187,7 +188,7 @@ class TestLabels:
         out = tmp_path / "out.nii.gz"
         command = ["reconstruct", str(study), "--lower", "50", "--way", "voxels", "--quiet", option, str(out)]
         assert main([*command, "-o", str(tmp_path / "m.stl")]) == 0
-        image = SimpleITK.ReadImage(str(out))
+        image: Any = SimpleITK.ReadImage(str(out))
         np.testing.assert_allclose(placed_by_itk(image), affine, atol=1e-4)
         size = np.count_nonzero(SimpleITK.GetArrayFromImage(image)) * np.prod(image.GetSpacing())
         assert size == pytest.approx(np.count_nonzero(ball) * 1.0 * 1.05 * 1.0, rel=0.1)

@@ -100,6 +100,13 @@ class TestNrrd:
         assert_in_place(volume)
         assert "millimeters" in volume.notes[0]
 
+    def test_each_axis_of_the_space_has_its_own_unit(self, tmp_path: Path) -> None:
+        scaled = np.diag([1000, 1, 0.1, 1.0]) @ AFFINES["oblique"]
+        told = {"space units": ["um", "mm", "cm"]}
+        path = self.write(tmp_path / "s.nrrd", scaled, **told)
+        volume = read_volume(path)
+        np.testing.assert_allclose(volume.grid.affine, AFFINES["oblique"], atol=1e-9)
+
     def test_spacings_alone_are_taken_and_told(self, tmp_path: Path) -> None:
         path = self.write(
             tmp_path / "s.nrrd", AFFINES["axial"], space=None, **{
@@ -158,7 +165,7 @@ CORE = np.linalg.norm(np.indices((12, 12, 12)) - 5.5, axis=0) < 2.5
 SHELL = BALL & ~CORE
 
 
-def layered(path: Path, layers: list[NDArray[Any]], kind: str = "list", last: bool = False, **told: str) -> Path:
+def layered(path: Path, layers: list[NDArray[Any]], kind: str = "list", last: bool = False, **told: Any) -> Path:
     """Write layers of a segmentation as Slicer does, the layers fastest, or slowest."""
     stored = np.stack(layers, axis=0 if last else -1).astype(np.uint8)
     sizes, directions, kinds = ["12"] * 3, ["(1,0,0)", "(0,1,0)", "(0,0,1)"], ["domain"] * 3
@@ -173,7 +180,7 @@ def layered(path: Path, layers: list[NDArray[Any]], kind: str = "list", last: bo
     return path
 
 
-def segment(number: int, name: str, label: int | None = None, layer: int | None = None) -> dict[str, str]:
+def segment(number: int, name: str, label: int | None = None, layer: int | None = None) -> dict[str, Any]:
     told = {"Name": name, "LabelValue": label, "Layer": layer, "Extent": "0 11 0 11 0 11"}
     return {f"Segment{number}_{key}": str(value) for key, value in told.items() if value is not None}
 
@@ -223,7 +230,7 @@ class TestSegments:
         assert volume.notes == ("segments: 5 Core, 9 Shell",)
 
     @pytest.mark.parametrize("told", [segment(0, "a", 1, 5), {"Segment0_Layer": "x"}, {"Segment0_LabelValue": "-1"}])
-    def test_headers_that_lie_are_refused(self, tmp_path: Path, told: dict[str, str]) -> None:
+    def test_headers_that_lie_are_refused(self, tmp_path: Path, told: dict[str, Any]) -> None:
         with pytest.raises(FormatError):
             read_volume(layered(tmp_path / "s.seg.nrrd", [BALL, CORE], **told))
 

@@ -32,7 +32,7 @@ offsets = st.tuples(*[st.integers(-4, 6)] * 3)
 sizes = st.tuples(*[st.integers(1, 8)] * 3)
 
 
-def volume(voxels: NDArray[np.int64], affine: NDArray[np.float64]) -> Volume:
+def volume(voxels: NDArray[Any], affine: NDArray[np.float64]) -> Volume:
     return Volume.from_stored(voxels, affine)
 
 

@@ -36,10 +36,19 @@ def executed(tmp_path_factory: pytest.TempPathFactory) -> NotebookNode:
     return found
 
 
-def test_is_kept_without_outputs(written: NotebookNode) -> None:
+def told(notebook: NotebookNode) -> list[tuple[list[str], list[str]]]:
+    """Return what each cell printed, and which kinds of picture it drew."""
+    code = [cell.outputs for cell in notebook.cells if cell.cell_type == "code"]
+    words = [[output.text for output in outputs if output.output_type == "stream"] for outputs in code]
+    drawn = [[kind for output in outputs for kind in output.get("data", {})] for outputs in code]
+    return list(zip(words, drawn, strict=True))
+
+
+def test_is_kept_with_its_pictures(written: NotebookNode, executed: NotebookNode) -> None:
+    """Who reads it where nothing runs sees what it draws; and what it says is what it says when it is run."""
     nbformat.validate(written)
-    code = [cell for cell in written.cells if cell.cell_type == "code"]
-    assert all(not cell.outputs and cell.execution_count is None for cell in code)
+    assert told(written) == told(executed)
+    assert sum(kinds.count("image/png") for _, kinds in told(written)) == 6
 
 
 def test_measures_what_it_says(executed: NotebookNode) -> None:

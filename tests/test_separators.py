@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from tomomesh.cli import main
-from tomomesh.cli.options import build_parser, joined
+from tomomesh.cli.options import build_parser
+from tomomesh.cli.parameter_options import joined
 
 ROI = ["-1", "2.5", "-3", "4", "5e1", "66"]
 
 
-def parsed(*words: str) -> dict[str, object]:
+def parsed(*words: str) -> dict[str, Any]:
     return vars(build_parser().parse_args(joined(["reconstruct", "study.npy", "-o", "m.stl", *words])))
 
 

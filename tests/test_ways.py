@@ -132,7 +132,7 @@ class TestTable:
         assert set(way.reads) <= set(choices)
         for conditions in way.reads.values():
             assert all(set(values) < set(choices[other]) for other, values in conditions.items())
-        assert (way.segment is None) == (name in ("nearest", "stack", "sheet", "cloud"))
+        assert (way.segment is None) == (name in ("filled", "nearest", "stack", "sheet", "cloud"))
 
     @pytest.mark.parametrize(
         ("input", "changes", "way"),

@@ -53,11 +53,15 @@ def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage
     InternalCheckError
         Where it is not what is promised.
     """
+    progress("checks", 0, 2)
     _check(made)
     walls = require_one_wall(made, settings)
-    smooth = _smooth(made, settings)
+    progress("checks", 2, 2)
+    smooth = _smooth(made, settings, progress)
     even = _even(smooth.value, settings, progress)
+    progress("judgement", 0, 1)
     judged = Stage(None, warnings=walls) if walls else _judged(even.value, settings)
+    progress("judgement", 1, 1)
     part = _print(even.value, settings, progress)
     surface = part.value
     later: list[Later] = [partial(_measure, surface, settings, progress)]
@@ -117,9 +121,14 @@ def _from_corner(mesh: TriMesh) -> tuple[NDArray[np.float64], TriMesh]:
     return low, mesh.moved(np.round((mesh.vertices - low) / step) * step)
 
 
-def _smooth(made: Surface, settings: Settings) -> Stage[Surface]:
+def _smooth(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:
     """Take away the detail that is shorter than what was asked for."""
-    return _faired(made, settings) if settings.run.smooth > 0 else Stage(made)
+    if settings.run.smooth <= 0:
+        return Stage(made)
+    progress("smooth", 0, 1)
+    smooth = _faired(made, settings)
+    progress("smooth", 1, 1)
+    return smooth
 
 
 @timed("smooth")
@@ -143,6 +152,9 @@ def _faired(made: Surface, settings: Settings) -> Stage[Surface]:
         "left": found.left,
     }
     left = f"{found.left} of {found.pieces} pieces are thinner than --smooth, and were left as they are"
+    if found.left == found.pieces:
+        largest = float(np.ptp(before.vertices, axis=0).max())
+        left = f"--smooth {settings.run.smooth:g} changes nothing: all is thinner than that, {largest:.3g} long at most"
     return Stage(smooth, {"smooth": told}, (left,) if found.left else ())
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import ndimage
 
 from .kernels.threads import in_blocks
 from .measure.links import Links
@@ -160,11 +161,11 @@ def sides_of(mask: Mask) -> Floats:
     >>> sides_of(np.ones((1, 1, 1), bool)).tolist()
     [[0.0, 0.0, -0.5], [0.0, 0.0, 0.5], [0.0, -0.5, 0.0], [0.0, 0.5, 0.0], [-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]]
     """
-    found = []
+    found, box = [], (ndimage.find_objects(mask.view(np.uint8)) or [(slice(0, 0),) * 3])[0]
     for axis in range(3):
-        framed = np.pad(mask, [(int(n == axis),) * 2 for n in range(3)])
+        framed = np.pad(mask[box], [(int(n == axis),) * 2 for n in range(3)])
         places = np.argwhere(np.diff(framed, axis=axis)).astype(np.float64)
-        places[:, axis] -= 0.5
+        places += [side.start - 0.5 * (n == axis) for n, side in enumerate(box)]
         found.append(places[:, ::-1])
     return np.concatenate(found)
 
@@ -186,11 +187,11 @@ def _filled(mask: Mask, threads: int) -> Mask:
 
 
 def _over_bare(filled: Mask) -> Mask:
-    """Fill a bare slice between two others where both of them are: a surface between networks goes through it."""
-    bare = 1 + np.flatnonzero(~filled[1:-1].any(axis=(1, 2)))
-    over = filled.copy()
-    over[bare] = filled[bare - 1] & filled[bare + 1]
-    return over
+    """Fill, in place, a bare slice between two others where both of them are: a surface goes through it."""
+    held = np.asarray(filled.any(axis=(1, 2)))
+    bare = 1 + np.flatnonzero(~held[1:-1] & held[:-2] & held[2:])
+    filled[bare] = filled[bare - 1] & filled[bare + 1]
+    return filled
 
 
 def _in(mask: Mask, places: Floats) -> Mask:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from argparse import Namespace
 from dataclasses import fields, replace
 from pathlib import Path
@@ -12,9 +13,13 @@ from .. import io
 from ..errors import UnreadableError, UsageError, printable
 from ..settings import Settings, option_of, parameters
 from . import summary
+from .against import compared, is_mesh
 from .bars import Bars
 from .batch import reconstruct_each
+from .faults import require_kind
 from .outputs import (
+    OF_STUDIES,
+    check_archive,
     check_files,
     check_folder,
     check_frame,
@@ -27,21 +32,19 @@ from .outputs import (
     write_stage_one,
     write_surface,
 )
-from .parts import frame_of_mesh, frame_of_part, turned
-from .sources import compared, gathered, read_study, sources_of
+from .parts import frame_of_mesh, frame_of_part
+from .sources import gathered, numbered, read_study, sources_of, window_of_picture
 from .streams import streamed
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from ..results import Surface
 
 
 def run(chosen: Namespace) -> None:
     """Run the command that was parsed."""
     with streamed(gathered(chosen)) as named:
-        _COMMANDS[named.command](named)
+        require_kind(named)
+        _COMMANDS[named.command](numbered(named))
 
 
 def settings_of(chosen: Namespace) -> Settings:
@@ -95,12 +98,13 @@ def _reconstruct(chosen: Namespace) -> None:
 
 
 def _reconstruct_one(chosen: Namespace, settings: Settings) -> Surface:
-    check_outputs(chosen, io.MESH_WRITERS, *sources_of(chosen, settings))
+    check_outputs(chosen, OF_STUDIES, *sources_of(chosen, settings))
     check_frame(chosen.output, settings)
     from ..pipeline import reconstruct
 
     with Bars(quiet=chosen.quiet) as progress:
         volume, labels = read_study(chosen, settings, progress)
+        check_archive(chosen, volume)
         surface = reconstruct(volume, settings, labels=labels, progress=progress, **given_of(chosen))
         return write_surface(chosen, surface, settings, progress)
 
@@ -145,16 +149,17 @@ def _network(chosen: Namespace) -> None:
     settings = replace(settings, network=settings.network.taking(settings.network.detailed or "ring"))
     folder = check_folder(chosen.output)
     check_files(chosen)
+    from ..effect import without_effect
     from ..som.region import train_region
     from ..som.shapes import SHAPES, shape
-    from ..ways.effect import without_effect
     from .pictures import film_of_network, pictures_of_network
 
     given = chosen.region in SHAPES
     if not given and not Path(chosen.region).exists():
         regions = f"{' | '.join(SHAPES)} | a PNG or TIFF file"
         raise UnreadableError("there is no such region", file=chosen.region, expected=regions)
-    inputs, area = shape(chosen.region) if given else (_window_of_picture(chosen.region, settings), 1.0)
+    notes: list[str] = []
+    inputs, area = shape(chosen.region) if given else (window_of_picture(chosen.region, settings, notes), 1.0)
     trained = train_region(inputs, settings.network, seed=settings.run.seed, pixel_area=area)
     make_folder(folder)
     title = f"A network over a {chosen.region if given else 'picture'}"
@@ -164,26 +169,10 @@ def _network(chosen: Namespace) -> None:
     if chosen.film:
         with io.replacing(folder / "02-film.gif") as file:
             file.write(film_of_network(trained, settings, area, title, axes))
-    warnings = without_effect(settings, given_of(chosen), input="color")  # a picture may be in color
+    warnings = notes + without_effect(settings, given_of(chosen), input="color")  # a picture may be in color
     report = {"network": trained.measures, "settings": settings.to_dict(), "warnings": warnings}
     write_documents(chosen, report, settings)
     _tell(chosen, report, summary.of_network(report, chosen.output))
-
-
-def _window_of_picture(path: str, settings: Settings) -> NDArray[np.float64]:
-    """Return the window's pixels of one picture as (column, -row[, layer]), so that up stays up."""
-    import numpy as np
-
-    from ..segmentation.signal import pixels_of
-    from ..segmentation.window import by_layer, choose_window, window
-
-    picture = io.read_picture(path)
-    lower, upper = choose_window(picture, settings.window)
-    mask = window(picture, lower=lower, upper=upper, layers=settings.window.layers)[0]
-    if picture.layers > 1 and settings.network.inputs == "layers":
-        mask = by_layer(picture, lower=lower, upper=upper)[0] & mask[..., None]
-    pixels = pixels_of(mask)
-    return np.asarray(pixels * np.array([1.0, -1.0, 1.0])[: pixels.shape[1]])
 
 
 def _inspect(chosen: Namespace) -> None:
@@ -202,7 +191,7 @@ def _check(chosen: Namespace) -> None:
 
     settings = settings_of(chosen)
     of_study = given_of(chosen).keys() - {entry.name for entry in fields(settings.printing)}
-    if of_study and not chosen.against:
+    if of_study and (not chosen.against or is_mesh(chosen.against)):
         asked_for = ", ".join(map(option_of, sorted(of_study)))
         raise UsageError("there is no study to choose voxels of", found=asked_for, expected="--against STUDY")
     mesh = io.read_mesh(chosen.mesh)
@@ -212,7 +201,7 @@ def _check(chosen: Namespace) -> None:
         report |= {key: found.pop(key) for key in [*found] if key == "dice" or key.endswith("_mm")}
         report["against"] = found
     if chosen.print_check:
-        from ..printing.part import MM, resized
+        from ..printing.part import MM, resized, turned
         from ..printing.verdict import verdict
 
         named = frame_of_mesh(chosen.mesh)
@@ -226,7 +215,7 @@ def _check(chosen: Namespace) -> None:
 def _print(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     check_outputs(chosen, io.MESH_WRITERS, chosen.mesh)
-    from ..printing.part import make_part
+    from ..printing.part import make_part, turned
 
     with Bars(quiet=chosen.quiet) as progress:
         mesh = io.read_mesh(chosen.mesh)
@@ -263,7 +252,8 @@ def _shown(chosen: Namespace) -> str:
 
 def _tell(chosen: Namespace, report: dict[str, Any], lines: list[str]) -> None:
     if chosen.json or not chosen.quiet:
-        _say(report, None if chosen.json else lines)
+        spent = f", computed in {time.perf_counter() - chosen.begun:.2f} s, reading and writing included"
+        _say(report, None if chosen.json else [line + spent * line.startswith("written ") for line in lines])
 
 
 def _say(report: dict[str, Any], lines: list[str] | None) -> None:

@@ -11,6 +11,7 @@ from .. import __version__
 from ..errors import UsageError
 from ..settings import Settings, option_of, parameters
 from ..ways import WAYS
+from .faults import likely_command, likely_option
 from .formats import (
     CHECKED,
     CLOUD,
@@ -22,8 +23,10 @@ from .formats import (
     POINT_FORMATS,
     STUDY,
     STUDY_FORMATS,
+    STUDY_MESH,
+    STUDY_MESH_FORMATS,
 )
-from .parameter_options import FIXED, LISTED, SEVERAL, add_parameter
+from .parameter_options import add_parameter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,7 +38,7 @@ TOLD = ("completion", "man")
 SHELLS = ("bash", "zsh", "fish", "tcsh")
 
 
-CUTS = ("scale", "flat_base", "hollow", "drain")
+CUTS = ("scale", "flat_base", "one_piece", "fill_cavities", "thicken", "hollow", "drain")
 """Parameters that change a part."""
 MESH_ONLY = ("local_origin", "smooth", "allow_far", "remesh", "edge", "target_faces")
 """Parameters of the run that matter to meshes alone."""
@@ -52,13 +55,34 @@ class _Parser(argparse.ArgumentParser):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(allow_abbrev=False, **kwargs)
+        self.commands: dict[str, argparse.ArgumentParser] = {}
 
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing a page and leaving."""
         raise UsageError(message, hint=f"`{self.prog} --help`")
 
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse; of an option or a command that there is not, say which was likely meant."""
+        words = list(args or ())
+        commands = [*self.commands]
+        if words and not words[0].startswith("-") and words[0] not in commands:
+            meant = likely_command(words[0], commands)
+            raise UsageError(
+                "there is no such command", found=words[0], expected=" | ".join(commands),
+                hint=meant or f"`{self.prog} --help`",
+            )  # fmt: skip
+        found, unknown = self.parse_known_args(words, namespace)
+        if unknown:
+            own = self.commands[found.command]
+            meant = likely_option(unknown[0], own._option_string_actions) if unknown[0].startswith("-") else ""
+            given = unknown[0].partition("=")
+            value = f"={given[2]}" if given[1] else "".join(f" {word}" for word in unknown[1:2])
+            said = f"unrecognized arguments: {' '.join(unknown)}"
+            raise UsageError(said, hint=f"{meant}{value}" if meant else f"`{own.prog} --help`")
+        return found
 
-def build_parser() -> argparse.ArgumentParser:
+
+def build_parser() -> _Parser:
     """Return the parser of all commands."""
     parser = _Parser(
         prog="tomomesh",
@@ -79,11 +103,13 @@ def build_parser() -> argparse.ArgumentParser:
     main = _command(commands, "reconstruct", "a study of slices in, a closed surface out", epilog=_ways("study"))
     _add_study(main)
     main.add_argument(
-        "-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format; with --each, a folder"
+        "-o", "--output", required=True, metavar="MESH", help=f"{STUDY_MESH}, or - with --format; with --each, a folder"
     )
-    _add_streams(main, STUDY_FORMATS, MESH_FORMATS)
+    _add_streams(main, STUDY_FORMATS, STUDY_MESH_FORMATS)
     _add_each(main)
-    _add_outputs(main, "points", "labels", "mask_out", "figures")
+    _add_outputs(main, "points", "labels", "mask_out", "figures").add_argument(
+        "--patient", action="store_true", help="copy the patient's fields of a DICOM study into MESH.dcm"
+    )
     _add_settings(main, (*STAGE_ONE, *STAGE_TWO, "run"))
 
     stage_one = _command(commands, "segment", "stage one alone: the neurons of all slices as points")
@@ -155,54 +181,8 @@ def build_parser() -> argparse.ArgumentParser:
     completion = _command(commands, "completion", "the script that completes commands and options in a shell")
     completion.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
     _command(commands, "man", "the manual page, for man and groff")
+    parser.commands = dict(commands.choices)
     return parser
-
-
-def joined(arguments: Sequence[str]) -> list[str]:
-    """Take the numbers after an option with spaces or with commas between them.
-
-    Those of an option that takes one number or several become one word, so that a file may follow them; those of an
-    option that takes a fixed count become as many.
-    """
-    words: list[str] = []
-    for word in arguments:
-        option, _, values = words[-1].partition("=") if words else ("", "", "")
-        own, _, listed = word.partition("=")
-        if option in SEVERAL and values.count(",") < 2 and _is_number(word):
-            words[-1] = f"{option}={values},{word}" if values else f"{option}={word}"
-        elif option in LISTED and not values and _are_numbers(word):
-            words[-1] = f"{option}={word}"  # a list that begins with a minus would look like an option
-        elif own in FIXED and _are_numbers(listed):
-            words += [own, *_listed(listed)]
-        elif "," in word and _are_numbers(word) and _takes_more(words):
-            words += _listed(word)
-        else:
-            words.append(word)
-    return words
-
-
-def _takes_more(words: Sequence[str]) -> bool:
-    """Tell whether the last option takes more numbers than it has."""
-    numbers = 0
-    while numbers < len(words) and _is_number(words[-1 - numbers]):
-        numbers += 1
-    return numbers < len(words) and numbers < FIXED.get(words[-1 - numbers], 0)
-
-
-def _listed(word: str) -> list[str]:
-    return [part for part in word.split(",") if part.strip()]
-
-
-def _are_numbers(word: str) -> bool:
-    return bool(_listed(word)) and all(map(_is_number, _listed(word)))
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _command(commands: Any, name: str, text: str, *, epilog: str | None = None) -> argparse.ArgumentParser:
@@ -244,7 +224,6 @@ def _add_streams(
         "--input-format", choices=read,
         help=f"what is read from standard input (default {usual}), or from a file whose suffix does not tell",
     )  # fmt: skip
-    parser.set_defaults(usual_format=usual)
     if written:
         group.add_argument("--format", choices=written, help="what is written to standard output (-o -)")
 
@@ -261,7 +240,7 @@ def _add_each(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--force", action="store_true", help="reconstruct again what is finished")
 
 
-def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
+def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> Any:
     """Add the options that name further files; what is shown goes with `_add_settings`."""
     kinds = {
         "points": ("FILE", f"write the points: {POINT}"),
@@ -275,6 +254,7 @@ def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
         group.add_argument(option_of(name), metavar=metavar, help=text)
     group.add_argument("--report", metavar="FILE.json", help="write the report")
     group.add_argument("--save-settings", metavar="FILE.toml", help="write the settings of this run, to repeat it")
+    return group
 
 
 def _add_settings(

@@ -1,19 +1,21 @@
-"""What a command reads, and what a mesh is compared with."""
+"""What a command reads."""
 
 from __future__ import annotations
 
 import shlex
 from argparse import Namespace
+from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .. import io
-from ..errors import GeometryError, UsageError
-from ..io.files.source import suffix_of
+from ..errors import UsageError
 
 if TYPE_CHECKING:
-    from ..model.mesh import TriMesh
-    from ..model.volume import Grid, Volume
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ..model.volume import Volume
     from ..settings import Settings
     from .bars import Bars
 
@@ -46,6 +48,38 @@ def _in_short(named: list[str]) -> str:
     return " ".join(map(shlex.quote, named))
 
 
+def numbered(chosen: Namespace) -> Namespace:
+    """Put numbers in the place of labels that were chosen by their names, as the label map has them.
+
+    Raises
+    ------
+    UsageError
+        For a name that it does not have.
+    """
+    asked = getattr(chosen, "select", ())
+    if not any(isinstance(label, str) for label in asked):
+        return chosen
+    path = getattr(chosen, "labels_in", None) or getattr(chosen, "against", None) or getattr(chosen, "study", None)
+    known = io.label_names(path) if isinstance(path, str) else {}
+    return Namespace(**vars(chosen) | {"select": tuple(_number_of(label, known, str(path)) for label in asked)})
+
+
+def _number_of(label: int | str, known: dict[str, int], path: str) -> int:
+    if isinstance(label, int):
+        return label
+    plain = {name.lower().replace(" ", "_"): number for name, number in known.items()}
+    wanted = label.lower().replace(" ", "_")
+    if wanted in plain:
+        return plain[wanted]
+    near = get_close_matches(wanted, plain, 3, 0.5)
+    told = ", ".join(f"{name} ({plain[name]})" for name in near)
+    raise UsageError(
+        "the label map has no label of that name" if known else "the label map names none of its labels",
+        file=path, found=f"--select {label}",
+        hint=told or f"`tomomesh inspect {shlex.quote(path)}`, which counts its labels, and --select N",
+    )  # fmt: skip
+
+
 def sources_of(chosen: Namespace, settings: Settings) -> list[str]:
     """Return the files that are read; refuse a label map without labels, and a command without any."""
     study = chosen.study if isinstance(chosen.study, tuple) else (chosen.study,)
@@ -70,43 +104,27 @@ def read_study(chosen: Namespace, settings: Settings, progress: Bars) -> tuple[V
     return volume, labels
 
 
-def compared(chosen: Namespace, mesh: TriMesh, settings: Settings) -> dict[str, Any]:
-    """Compare a mesh with another, or with a window or labels of a study, each in its own unit and frame.
+def window_of_picture(path: str, settings: Settings, notes: list[str]) -> NDArray[np.float64]:
+    """Return the window's pixels of one picture as (column, -row[, layer]), so that up stays up.
 
-    Raises
-    ------
-    GeometryError
-        For voxel indices beside a mesh in another frame.
+    Where no window was asked for, and what Otsu's threshold takes has most of the picture's border, that is the paper:
+    the figure is the rest, and a note says so.
     """
-    stated = io.frame_of_file(chosen.mesh)
-    stated |= {"frame": chosen.mesh_frame.replace("lps", "LPS").replace("ras", "RAS")} if chosen.mesh_frame else {}
-    if suffix_of(chosen.against) in io.MESH_READERS:
-        return _with_mesh(chosen.against, mesh, stated)
-    from ..agreement.study import compare_with_study
+    import numpy as np
 
-    study = io.read_volume(chosen.against, settings=settings.read, select=settings.window.select)
-    named = {"unit": "mm", "frame": "unknown"} | stated
-    found = compare_with_study(_in_lps(mesh, named, study.grid), study, settings)
-    notes = () if "frame" in stated else (f"{chosen.mesh} names no frame, and is taken for LPS (--mesh-frame)",)
-    what = "labels" if settings.window.select else "window"
-    return {"against": what, **found, "frame": named["frame"], "notes": [*notes, *study.notes]}
+    from ..segmentation.signal import pixels_of
+    from ..segmentation.window import by_layer, choose_window, window
 
-
-def _with_mesh(path: str, mesh: TriMesh, stated: dict[str, str]) -> dict[str, Any]:
-    """Compare two meshes; where one does not state its unit or frame, it is taken for the other's."""
-    from ..agreement.meshes import compare_with_mesh
-
-    other, its = io.read_mesh(path), io.frame_of_file(path)
-    own, its = {"unit": "mm", "frame": "unknown"} | its | stated, {"unit": "mm", "frame": "unknown"} | stated | its
-    if own != its:
-        if "voxel" in (own["frame"], its["frame"]):
-            raise GeometryError(
-                "voxel indices are no lengths", file=path, found=f"frame = {its['frame']}",
-                expected=f"frame = {own['frame']}", hint="--frame lps where the mesh is made",
-            )  # fmt: skip
-        mesh, other = _in_lps(mesh, own), _in_lps(other, its)
-    return {"against": "mesh", **compare_with_mesh(mesh, other), "frame": own["frame"], "notes": []}
-
-
-def _in_lps(mesh: TriMesh, named: dict[str, str], grid: Grid | None = None) -> TriMesh:
-    return io.in_lps(mesh, unit=named["unit"], frame=named["frame"], grid=grid)
+    picture, asked = io.read_picture(path), settings.window
+    lower, upper = choose_window(picture, asked)
+    mask = window(picture, lower=lower, upper=upper, layers=asked.layers)[0]
+    border = np.concatenate([mask[0], mask[-1], mask[1:-1, 0], mask[1:-1, -1]])
+    chosen = any(limit is not None for limit in (asked.lower, asked.upper, asked.preset))
+    dark = not chosen and border.mean() > 0.5 and not mask.all()
+    if dark:
+        notes.append("the border of the picture is bright: what is dark on it was taken (--lower for what is bright)")
+    mask = mask ^ dark
+    if picture.layers > 1 and settings.network.inputs == "layers":
+        mask = (by_layer(picture, lower=lower, upper=upper)[0] ^ dark) & mask[..., None]
+    pixels = pixels_of(mask)
+    return np.asarray(pixels * np.array([1.0, -1.0, 1.0])[: pixels.shape[1]])

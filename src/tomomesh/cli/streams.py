@@ -52,7 +52,7 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
     with private_folder() as folder, _named_as_typed(folder, typed):
         files = {}
         if source:
-            suffix_in = chosen.input_format or chosen.usual_format
+            suffix_in = chosen.input_format or SOURCES[source]
             place = Path(folder, f"input.{suffix_in}")
             files[source] = _received(place) if inside else _linked(place, typed)
             files["typed"] = f"{shlex.quote(typed)} --input-format {suffix_in}"

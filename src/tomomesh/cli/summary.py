@@ -8,6 +8,7 @@ from ..measure.topology import FAULTS
 from ..ways import way_of
 from ..ways.samples import points_in_words
 from ..ways.sections import unit_in_words
+from .against import of_agreement
 
 WIDTHS = ("thinnest_wall_mm", "thinnest_gap_mm")
 """Keys of the widths that are told of a part."""
@@ -21,7 +22,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
     """Say what was reconstructed, and how good it is."""
     quality = report["quality"]
     unit = unit_in_words(report)
-    shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
+    shape = "closed and manifold" if quality["sound"] else "NOT closed and manifold"
     shape = shape if quality["closed"] else "a manifold sheet"
     lines = [
         *_of_far(report),
@@ -77,7 +78,7 @@ def of_row(place: str, row: dict[str, Any]) -> str:
     if row.get("passed"):
         return f"{place}: finished before"
     shape = "sound" if row["sound"] else "NOT sound"
-    return f"{place}: {row['faces']} faces, {row['components']} component(s), {shape}, {row['seconds']:.1f} s"
+    return f"{place}: {row['faces']} faces, {pieces_in_words(row)}, {shape}, {row['seconds']:.1f} s"
 
 
 def of_batch(rows: list[dict[str, Any]], output: str) -> str:
@@ -107,25 +108,7 @@ def of_check(report: dict[str, Any]) -> list[str]:
         *_parts(report),
         *_of_print(report),
     ]
-    return lines + _of_agreement(report)
-
-
-def _of_agreement(report: dict[str, Any]) -> list[str]:
-    """Say in a table how near a mesh is to what it should equal."""
-    if "against" not in report:
-        return []
-    what = {"mesh": "the other", "labels": "the labels", "window": "the window"}[report["against"]["against"]]
-    dice = "none, as what is open has no inside" if report["dice"] is None else f"{report['dice']:.4f}"
-    rows = {f"to {what}": "", f"from {what}": "back_"}
-    return [
-        f"against   {what}: Dice {dice}",
-        f"          {'distance':24}{'mean':>10}{'95 %':>10}{'largest':>10}",
-        *(
-            f"          {row:24}" + "".join(f"{report[f'{way}{key}_mm']:10.4g}" for key in ("mean", "p95", "max"))
-            for row, way in rows.items()
-        ),
-        *(f"note      {note}" for note in report["against"]["notes"]),
-    ]
+    return lines + of_agreement(report)
 
 
 def of_part(told: dict[str, Any], output: str) -> list[str]:
@@ -230,9 +213,10 @@ def _of_fit(report: dict[str, Any]) -> str:
 
 def pieces_in_words(quality: dict[str, Any]) -> str:
     """Count the pieces of a mesh, and the cavities in them, whose linings are components too."""
-    if not quality["cavities"]:
+    lined = quality["cavities"] or 0
+    if not lined:
         return f"{quality['components']} component(s)"
-    return f"{quality['pieces']} piece(s) with {quality['cavities']} cavity(ies)"
+    return f"{quality['components'] - lined} piece(s) with {lined} cavity(ies)"
 
 
 def limit_in_words(limit: float | list[float | None] | None) -> str:
@@ -247,9 +231,10 @@ def _of_points(report: dict[str, Any]) -> str:
         return points_in_words(report)
     made = ""
     if points.get("on_bridges") or points.get("on_caps"):
-        bridges = "bridged gaps" if "networks" in report else "added voxels"
-        made = f", {points['on_bridges']} on {points['bridged_gaps']} {bridges}, {points['on_caps']} on caps"
-    return f"{points['count']}{made}, r = {points['spacing_mm']:.4g} {unit}"
+        bridges = "bridged gaps" if "networks" in report else "voxels added where two touch"
+        made = f", {points['on_bridges']} on {points['bridged_gaps']} {bridges}, "
+        made += f"{points['on_caps']} where the study ends" if points["on_caps"] else "none where the study ends"
+    return f"{points['count']}{made}; up to {points['spacing_mm']:.4g} {unit} apart"
 
 
 def _of_smooth(report: dict[str, Any]) -> list[str]:
@@ -299,4 +284,4 @@ def _ending(report: dict[str, Any], output: str) -> list[str]:
     warnings = [f"warning   {warning}" for warning in report["warnings"] if warning != _far(report)]
     notes = report.get("study", report["points"]).get("notes", [])
     told = [f"note      {'; '.join(notes)}"] if notes else []
-    return [*told, *warnings[:SHOWN], f"written   {output}, computed in {report['timings']['total_s']:.2f} s"]
+    return [*told, *warnings[:SHOWN], f"written   {output}"]

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 from scipy.interpolate import CubicSpline
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import pdist, squareform
 
 from ..measure.polygon import side_lengths
 
@@ -78,6 +80,18 @@ def fine_curve(ring: Floats, distance: float) -> Floats:
     smooth = without_noise(even)
     apart = (smooth != np.roll(smooth, -1, axis=0)).any(axis=1)
     return redrawn(smooth[apart], distance)
+
+
+def chord(curve: Floats) -> Floats:
+    """Return points from one end of an open curve (p, 2) to the other, as far apart as its own."""
+    distance = np.asarray(cKDTree(curve).query(curve, k=[2])[0])
+    tree = minimum_spanning_tree(squareform(pdist(curve)))
+    ways = dijkstra(tree, directed=False)
+    first = int(np.argmax(ways[0]))
+    last = int(np.argmax(ways[first]))
+    way = curve[last] - curve[first]
+    count = int(np.hypot(*way) / np.median(distance))
+    return np.asarray(curve[first] + np.arange(1, count)[:, None] / max(count, 1) * way)
 
 
 @dataclass(frozen=True)

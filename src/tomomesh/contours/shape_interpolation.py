@@ -151,6 +151,12 @@ class _Span:
         change, way = (g - f) / step, (other.center - one.center) / step
         before, after = self.stack.before.get(self.link.below), self.stack.after.get(self.link.above)
         slopes, ways = [change, change], [way, way]
+        if not before:
+            fall = self._toward_end(self.link.below, one, upward=False)
+            slopes[0] = (change - fall) / 2
+        if not after:
+            fall = self._toward_end(self.link.above, other, upward=True)
+            slopes[1] = (change + fall) / 2
         if before:
             last = self.shapes[before]
             step_before = one.height - last.height
@@ -168,6 +174,11 @@ class _Span:
             values = cubic(t, step, f, g, *slopes)
             center = cubic(t, step, one.center, other.center, *ways)
             self._lay(volume[layer], values, low, center)
+
+    def _toward_end(self, key: Key, shape: Shape, *, upward: bool) -> np.float32:
+        """Return how fast the outline of a part closes where its end begins, in voxels."""
+        end = self.stack.ending(key, upward)[0]
+        return np.float32(shape.depth * end.fall * self.stack.edge / (2 * end.reach))
 
     def _fill_end(self, volume: Values) -> None:
         shape, reach = self.shapes[self.link.below or self.link.above], self.end.reach / self.stack.edge

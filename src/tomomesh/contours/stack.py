@@ -6,9 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
-from scipy.spatial.distance import pdist, squareform
 
 from ..errors import EmptyError, GeometryError
 from ..isosurface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
@@ -17,7 +15,7 @@ from ..model.volume import Grid, Volume
 from ..progress import Progress, silent
 from ..settings import FitSettings
 from .assembly import Stack
-from .curves import DENSE, fine_curve
+from .curves import DENSE, chord, fine_curve
 from .levels import slices_at, typical_gap
 from .parts import Part
 from .rings import Outline, nested, outline
@@ -98,6 +96,7 @@ def contour_surface(
     slices: Slices,
     *,
     edge: float | None = None,
+    thickness: float | None = None,
     allow_leaks: bool = False,
     fit: FitSettings | None = None,
     threads: int = 0,
@@ -112,6 +111,8 @@ def contour_surface(
         As `find_slices` finds them.
     edge : float, optional
         Edge of the voxels; the sampling distance within the slices where not given.
+    thickness : float, optional
+        How thick a part is that goes on in no other slice; a slice distance where not given.
     allow_leaks : bool
         Close open contours by their chord.
     fit : FitSettings, optional
@@ -132,7 +133,7 @@ def contour_surface(
     drawn, found = _drawn(points, slices, allow_leaks, threads, progress)
     _refuse_open(found, slices, allow_leaks)
     asked = edge or slices.spacing
-    stack = _stack(drawn, found, slices, asked)
+    stack = _stack(drawn, found, slices, asked, thickness)
     levels = _levels(stack, threads, progress)
     volume = _volume(levels, stack, slices)
     inside = levels > 0
@@ -166,12 +167,8 @@ def solid_between(
 
     Returns
     -------
-    levels : (K, J, I) float32 array
-        Depths in pixels, over 0 inside.
-    low : (2,) float array
-        The middle of the first pixel, in the frame of the slices.
-    edge : float
-        Of a pixel.
+    (K, J, I) float32 array, (2,) float array, float
+        Depths in pixels, over 0 inside; the middle of the first pixel, in the frame of the slices; its edge.
 
     Raises
     ------
@@ -179,7 +176,7 @@ def solid_between(
         Where fewer than two slices enclose anything.
     """
     drawn, found = _drawn(np.empty((0, 3)), slices, False, threads, progress)
-    stack = _stack(drawn, found, slices, slices.spacing)
+    stack = _stack(drawn, found, slices, slices.spacing, None)
     return _levels(stack, threads, progress, heights), stack.low[:2], stack.edge
 
 
@@ -228,22 +225,10 @@ def _outlined(points: Floats, allow_leaks: bool) -> tuple[Floats, Outline]:
     found = outline(placed)
     if not (found.open and allow_leaks):
         return np.column_stack([placed, heights]), found
-    chords = [(_chord(placed[numbers]), heights[numbers].mean()) for numbers in found.open]
-    more = [np.column_stack([chord, np.full(len(chord), height)]) for chord, height in chords]
+    chords = [(chord(placed[numbers]), heights[numbers].mean()) for numbers in found.open]
+    more = [np.column_stack([line, np.full(len(line), height)]) for line, height in chords]
     closed, again = _outlined(np.concatenate([np.column_stack([placed, heights]), *more]), allow_leaks=False)
     return closed, Outline(again.rings, again.parts, found.open, again.reach)
-
-
-def _chord(curve: Floats) -> Floats:
-    """Return points from one end of an open curve (p, 2) to the other, as far apart as its own."""
-    distance = np.asarray(cKDTree(curve).query(curve, k=[2])[0])
-    tree = minimum_spanning_tree(squareform(pdist(curve)))
-    ways = dijkstra(tree, directed=False)
-    first = int(np.argmax(ways[0]))
-    last = int(np.argmax(ways[first]))
-    way = curve[last] - curve[first]
-    count = int(np.hypot(*way) / np.median(distance))
-    return np.asarray(curve[first] + np.arange(1, count)[:, None] / max(count, 1) * way)
 
 
 def _refuse_open(found: list[Outline], slices: Slices, allow_leaks: bool) -> None:
@@ -259,17 +244,19 @@ def _refuse_open(found: list[Outline], slices: Slices, allow_leaks: bool) -> Non
         )
 
 
-def _stack(drawn: list[Floats], found: list[Outline], slices: Slices, edge: float) -> Stack:
+def _stack(
+    drawn: list[Floats], found: list[Outline], slices: Slices, edge: float, thickness: float | None = None
+) -> Stack:
     """Link the parts of all slices."""
     parts = [
         part
         for k, (points, outlined) in enumerate(zip(drawn, found, strict=True))
         for part in _parts(points, outlined, DENSE * edge, k)
     ]
-    if len({part.plane for part in parts}) < 2:
+    if len({part.plane for part in parts}) < (2 if thickness is None else 1):
         raise EmptyError("the contours enclose nothing", expected="at least two slices with closed contours")
     links = link_parts(parts, slices.groups, edge, complete=slices.complete)
-    stack = Stack(parts, links, edge, float(typical_gap(slices.heights)))
+    stack = Stack(parts, links, edge, typical_gap(slices.heights) or thickness or 0.0, thickness)
     while np.prod(stack.shape) > MOST_VOXELS:
         stack = replace(stack, edge=COARSER * stack.edge)
     return stack

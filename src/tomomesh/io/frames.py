@@ -55,16 +55,27 @@ def in_lps(mesh: TriMesh, *, unit: str, frame: str, grid: Grid | None = None) ->
     ----------
     mesh : TriMesh
     unit, frame : str
-        As files name them; a frame other than RAS and voxel, and a unit that is unknown, are taken for LPS and mm.
+        As files name them; counted from a corner, ``local:x,y,z``, it is brought back. Another frame than these, RAS
+        and voxel, and a unit that is unknown, are taken for LPS and mm.
     grid : Grid, optional
         How the study keeps its voxels, for a mesh of voxel indices.
     """
     affine = np.diag([*3 * [MM.get(unit, 1.0)], 1.0])
+    affine[:3, 3] = affine[0, 0] * _corner(frame)
     if frame == "RAS":
         affine = FLIP @ affine
     elif frame == "voxel" and grid is not None:
         affine = grid.affine
     return Frame("mm", "LPS", affine).mesh(mesh)
+
+
+def _corner(frame: str) -> NDArray[np.float64]:
+    """Return the corner that a frame's coordinates are counted from, (3,)."""
+    try:
+        corner = np.array(frame.removeprefix("local:").split(","), np.float64)
+    except ValueError:
+        corner = np.zeros(0)
+    return corner if corner.shape == (3,) and np.isfinite(corner).all() else np.zeros(3)
 
 
 def frame_of_study(name: str, grid: Grid) -> Frame:

@@ -183,7 +183,7 @@ def _content_of(levels: Levels, mask: Mask, turned: Mask, axis: int, threads: in
     """Return the gray levels, or the averages that a mask would have."""
     voxels = np.asarray(levels.voxels)
     shares = _shares(levels, mask, axis)
-    if _are_steps(shares):
+    if _are_steps(shares) or _are_two(levels, mask):
         return Content(averages_of(turned, threads), Levels(voxels, 0.5, np.inf), OF_MASK, EVENED, of_mask=True)
     whole = np.ascontiguousarray(np.moveaxis(voxels, axis, 0), np.float32)
     high = float(np.percentile(shares, UPRIGHT)) if len(shares) else 1.0
@@ -229,6 +229,13 @@ def _faces_across(mask: Mask, axis: int) -> tuple[Index, Index]:
 
 def _are_steps(shares: NDArray[np.float64]) -> bool:
     return len(shares) > 0 and bool(np.median(shares) > STEPPED)
+
+
+def _are_two(levels: Levels, mask: Mask) -> bool:
+    """Tell whether the levels on both sides of the border are those of a mask, however thin what it holds is."""
+    faces = [_faces_across(mask, axis) for axis in range(3)]
+    inner, steps = (np.concatenate(each) for each in zip(*faces, strict=True))
+    return levels.are_two(inner, inner + steps)
 
 
 def _divided(mask: Mask, whole: Values) -> Index:

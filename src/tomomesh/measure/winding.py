@@ -30,7 +30,7 @@ def winding_number(mesh: TriMesh, place: NDArray[np.float64]) -> float:
     The sum of the solid angles of all faces over 4 pi (Jacobson, Kavan & Sorkine-Hornung 2013), each by the formula
     of van Oosterom & Strackee (1983). The place lies on no face.
     """
-    a, b, c = (mesh.corners[:, n] - place for n in range(3))
+    a, b, c = (mesh.vertices[mesh.faces[:, n]] - place for n in range(3))
     x, y, z = (np.sqrt((corner**2).sum(axis=1)) for corner in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=1)
     below = x * y * z + (a * b).sum(axis=1) * z + (b * c).sum(axis=1) * x + (c * a).sum(axis=1) * y

@@ -13,7 +13,7 @@ from ..measure.tree import Tree
 from ..model.columns import any_of
 from ..progress import Progress, silent
 from .ground import EVEN, Ground, area_of, even_edge, usual_edge
-from .rounds import AIM, made_anew, made_even
+from .rounds import AIM, ROUNDS, made_anew, made_even
 from .specks import NOTHING, LeftOut, without_specks
 
 if TYPE_CHECKING:
@@ -146,6 +146,7 @@ def remesh(
             break
         found = found | _under(ground, made, under, crosses)
         made, under, crosses = made_anew(ground, found, (made, under, crosses), limit, threads, progress)
+    progress("remesh", ROUNDS, ROUNDS)
     if best is None or not _is_like(best.mesh, mesh, like):
         if most is None:
             raise _too_long(edge, share_of(made, mesh))

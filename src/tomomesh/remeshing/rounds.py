@@ -44,14 +44,14 @@ def made_even(
     """Go round after round, and on with longer edges while there are too many faces; of `some` faces (m,) alone."""
     making = Making(ground, kept, threads, some)
     for count in range(ROUNDS):
-        progress("remesh", count, ROUNDS)
+        progress("remesh", count, ROUNDS + 1)
         if _round(making, split=count > 0) < FEW and count > 0:
             break
-    progress("remesh", ROUNDS, ROUNDS)
     _move(making, LAST)
-    for _ in range(COARSER if most < len(ground.faces) else ABOUT):
+    for count in range(COARSER if most < len(ground.faces) else ABOUT):
         if len(making.faces) <= most:
             break
+        progress("remesh", ROUNDS + count, ROUNDS + COARSER)
         ground = ground.scaled((len(making.faces) / (AIM * most)) ** 0.5)
         making.rescaled(ground)
         _round(making)

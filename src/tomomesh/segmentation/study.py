@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from .selection import Counts
     from .window import Limit
 
+CUT_OFF = 0.25
+"""Pixels of an end slice over those of the fullest from which a window is told to go on beyond the study. Only a note
+depends on it: a ball that ends within a slice has less there."""
 APART = 4
 """One slice in so many is looked at for labels. Only a warning depends on it; labels fill many slices."""
 
@@ -72,6 +75,8 @@ def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> S
             found=type(volume).__name__,
             expected="read_volume(path) or Volume.from_stored(array, affine)",
         )
+    if settings.window.fill_slices and settings.window.select is None:
+        raise UsageError("slices are filled between labels", found="--fill-slices", hint="--select with the labels")
     if settings.window.select is not None and labels is None:
         volume = whole(volume)
     axis = _slice_axis(volume, settings.network.slices)
@@ -87,7 +92,7 @@ def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> S
         study,
         AXES[axis],
         _cropped(kept, volume.along(axis).shape),
-        notes + _dropped(chosen, settings) + _sparse(chosen),
+        notes + _dropped(chosen, settings) + _sparse(chosen) + _cut_off(chosen.value.mask),
     )
     doubt = settings.window.select is not None and doubted(study if labels is None else labels)
     warnings = (*_doubts(chosen.value, settings), *((doubt,) if doubt else ()))
@@ -153,6 +158,15 @@ def _dropped(chosen: Stage[Chosen], settings: Settings) -> tuple[str, ...]:
     return (
         f"{found.dropped} of {found.components} components of the window ({found.dropped_voxels} voxels) were "
         "left out, which lie in nothing that is 12 mm thick, as a scanner's table: --keep all keeps them",
+    )
+
+
+def _cut_off(mask: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Say at which end slices a window is cut off, and goes on beyond the study."""
+    pixels = np.count_nonzero(mask, axis=(1, 2))
+    ends = [name for name, end in (("first", 0), ("last", -1)) if pixels[end] > CUT_OFF * pixels.max()]
+    return (
+        (f"the window is cut off at the {' and the '.join(ends)} slice: the surface is closed there",) if ends else ()
     )
 
 

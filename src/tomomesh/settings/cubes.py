@@ -46,6 +46,9 @@ class CubeSettings(Group):
     allow_leaks: bool = param(
         False, "write the surface even where the outside leaks in, or where it encloses less than half of its window"
     )
+    filled: bool = param(
+        False, "take points as filling a solid, not as lying on its surface, and write the boundary of what they fill"
+    )
     open: bool = param(False, "write an open surface as a one-sided sheet with its borders")
     surface: str = param(
         "auto",

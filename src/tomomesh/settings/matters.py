@@ -22,6 +22,7 @@ MATTERS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "alpha_power": {**ONLINE, "alpha_fall": ("power",)},
     "radius_power": {"radius_fall": ("power",)},
     "even": {"network": ("chain", "ring")},
+    "filled": POINTS,
     "units": POINTS,
     "local_origin": POINTS,
     "allow_far": {"input": ("gray", "color", "stack")},

@@ -36,7 +36,12 @@ class WindowSettings(Group):
         choices=PRESETS,
     )
     select: tuple[int, ...] | None = param(
-        None, "labels of a label map whose voxels are the window", kind=int, low=0, length=MANY
+        None,
+        "labels of a label map whose voxels are the window; on the command line by their names too, where the file has "
+        "them: a NIfTI label table (TotalSegmentator), a .seg.nrrd, a DICOM segmentation",
+        kind=int,
+        low=0,
+        length=MANY,
     )
     fill_slices: bool = param(
         False, "interpolate the slices without labels between those with, as one smooth solid, and end it beyond them"
@@ -58,8 +63,6 @@ class WindowSettings(Group):
         limited = self.lower is not None or self.upper is not None
         if self.preset is not None and limited:
             raise UsageError("two windows are asked for", found="--preset and a window", expected="one of them")
-        if self.fill_slices and self.select is None:
-            raise UsageError("slices are filled between labels", found="--fill-slices", hint="--select with the labels")
         if self.select is not None and (limited or self.preset is not None):
             raise UsageError("two windows are asked for", found="--select and a window", expected="one of them")
         if self.lower is not None and self.upper is not None:

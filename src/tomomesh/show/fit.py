@@ -64,13 +64,14 @@ def draw_learning(history: History, *, unit: str = "") -> Figure:
         Of the inputs.
     """
     online = bool((history.alpha < 1).any())
+    rate = np.where(history.alpha < 1, history.alpha, np.nan)  # the re-fit without strays is in batch
     figure, axes = canvas(9.2, 3.1, 1, 3)
     ending = f", {unit}" if unit else ""
     _curves(axes[0], {"quantization error": history.quantization_error})
     heading(axes[0], "Quantization error", f"mean distance of an input to its winner{ending}")
     _curves(axes[1], {"largest move": history.largest_move}, log=True)
     heading(axes[1], "Largest move", f"of a neuron in an epoch{ending}")
-    _curves(axes[2], {"radius": history.radius} | ({"learning rate": history.alpha} if online else {}), log=online)
+    _curves(axes[2], {"radius": history.radius} | ({"learning rate": rate} if online else {}), log=online)
     heading(axes[2], "Radius" + (" and learning rate" if online else ""), "of the neighborhood, hops")
     for ax in axes:
         ax.set_xlabel("epoch")

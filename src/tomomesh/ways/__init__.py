@@ -16,6 +16,7 @@ WAYS = {
     "contours": "a study, --way contours: several rings a slice, closed between the slices",
     "rings": "a study, --way ring: one ring a slice, cubes around its neurons, a mesh on the surface under them",
     "networks": "any other study: one network a slice, cubes around its neurons, a mesh that rests on them",
+    "filled": "points, --filled: the boundary of the solid that they fill",
     "nearest": "points, --attraction nearest: cubes around them, a mesh that rests on the points themselves",
     "stack": "points on parallel slices: each slice's inside, and the shape between the slices",
     "sheet": "points, --open: a one-sided sheet with borders",

@@ -7,6 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..cuberille.leak_test import SURE, close_leaks
 from ..cuberille.neighbors import once_each
@@ -22,6 +23,7 @@ from ..model.mesh import QuadMesh, TriMesh
 from ..opensurface.gaps import gaps
 from ..pointcloud.bridges import bridges
 from ..pointcloud.forecast import require_room
+from ..pointcloud.solid import fills_solid
 from ..results import Surface
 from ..stage import Stage, folded, measured, timed
 from .points import place_found
@@ -92,7 +94,7 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     settled = settle(points, settings, progress)
     samples, origin = settled.value, lowest_corner(points)
     shell = _close(points, samples, settings, progress)
-    walls = _walls(shell.value, samples, origin, settings)
+    walls = _walls(shell.value, samples, points, settings)
     rough = measured("smooth", _smoothed, shell.value, settings)
     kept, smoothed, ring = rough.value.faces, rough.value.mesh, rough.value.ring
     rest = measured("fit", _fitted, shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
@@ -103,15 +105,24 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     mesh, taken_back, crossing = apart.value
     cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64))
     trace = None if rest.value.fitted is None else rest.value.fitted.trace
+    filled = rest.value.filled | _interpolated(mesh.moved(mesh.vertices + origin), points)
     enclosed = hollow(shell.value.leak_test, shell.value.taken(settings), shell.value.cubes, shell.value.cell)
     surface = Surface(
         points.cloud, cuberille, smoothed.moved(smoothed.vertices + origin),
-        mesh.moved(mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=rest.value.filled,
+        mesh.moved(mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=filled,
         cavities=int(kept.inward.sum()), crossing=crossing,
         encloses=enclosed if walls.value == 1 else None,
     )  # fmt: skip
-    fitted = fit_found(trace, len(smoothed.vertices), taken_back=taken_back, filled=rest.value.filled)
+    fitted = fit_found(trace, len(smoothed.vertices), taken_back=taken_back, filled=filled)
     return folded(surface, settled, shell, walls, rough, rest, apart, fitted, place_found(points))
+
+
+def _interpolated(mesh: TriMesh, points: Points) -> NDArray[np.bool_]:
+    """Tell which faces (m,) are nearer to what was interpolated between the points than to these."""
+    if len(points.between) == 0:
+        return np.zeros(len(mesh.faces), np.bool_)
+    nearest = np.asarray(cKDTree(points.places).query(mesh.corners.mean(axis=1))[1])
+    return nearest >= len(points.cloud)
 
 
 @timed("cubes")
@@ -144,22 +155,27 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
     return best
 
 
-def _walls(shell: Shell, samples: Samples, origin: Floats, settings: Settings) -> Stage[int]:
+def _walls(shell: Shell, samples: Samples, points: Points, settings: Settings) -> Stage[int]:
     """Count the walls of a shell.
 
     Raises
     ------
     GeometryError
-        Where the outside leaks in; names the widest gap.
+        Where the outside leaks in; names the widest gap. Where the points fill a solid, as that.
     """
     tight = shell.leak_test.tight
     flat = not tight and is_flat(samples.positions, float(np.median(samples.spacing)))
     walls = count_walls(settings, tight=tight, flat=flat)
     if walls is not None:
         return walls
+    if fills_solid(points.places):
+        raise GeometryError(
+            "the points fill a solid, and do not lie on its surface", found=f"{len(points.cloud)} points",
+            expected="points on the surface of the object", hint="--filled, for the boundary of what they fill",
+        )  # fmt: skip
     cell = float(shell.cell.min())
     found = gaps(samples, cell, threads=settings.run.threads)
-    where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]
+    where = [f"a gap of {gap.size:.4g} around {_place(gap.place + lowest_corner(points))}" for gap in found[:1]]
     raise GeometryError(
         ("the points look like an open surface: " if found else "")
         + "the outside leaks into the shell of cubes, so its surface would have two walls",

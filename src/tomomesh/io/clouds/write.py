@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def write_points(
-    points: PointSet, path: str | Path, *, unit: str = "mm", frame: str = "LPS", precision: str = "64"
+    points: PointSet, path: str | Path, *, unit: str = "mm", frame: str = "LPS", precision: int = 64
 ) -> None:
     """Write a cloud.
 
@@ -35,7 +35,7 @@ def write_points(
         ``.xyz`` and ``.npy`` keep positions.
     unit, frame : str
         What the coordinates are in: named in the file where its format can.
-    precision : {"64", "32"}
+    precision : {64, 32}
         Bits of the coordinates in PLY and VTP; 64 all the same where 32 would let points fall together.
 
     Raises
@@ -46,7 +46,7 @@ def write_points(
         Where the file cannot be written.
     """
     check_output(path, POINT_WRITERS)
-    POINT_WRITERS[suffix_of(path)](points, path, MeshAttributes(unit, frame, {}, {}, single=precision == "32"))
+    POINT_WRITERS[suffix_of(path)](points, path, MeshAttributes(unit, frame, {}, {}, single=precision == 32))
 
 
 def _write_ply(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:

@@ -13,7 +13,9 @@ from ...model.volume import Volume
 from ..files.source import counted
 from .bad import leave_out
 from .files import read_frames
+from .headers.identity import identity_of
 from .headers.kinds import SEGMENTED, class_of
+from .headers.multiframe import placed_evenly
 from .headers.unit import gray_unit
 from .pixels.decoder import Decoder
 from .series.choice import choose, stacks_among
@@ -85,7 +87,8 @@ def _read(files: list[Path], settings: ReadSettings, study: str, others: Counter
     unit, in_unit = gray_unit(choice.frames)
     skipped = _left(stack) if broken or without else ()
     notes = left + broken + choice.notes + without + skipped + stack.notes + levels.notes + in_unit + _said(header)
-    return replace(Volume.from_stored(levels.voxels, stack.affine, unit=unit, notes=notes), padding=levels.padding)
+    read = Volume.from_stored(levels.voxels, stack.affine, unit=unit, notes=notes)
+    return replace(read, padding=levels.padding, dicom=identity_of(choice.frames))
 
 
 def _said(header: Any) -> tuple[str, ...]:
@@ -96,6 +99,8 @@ def _said(header: Any) -> tuple[str, ...]:
         notes.append("MONOCHROME1: HU were kept" if kept else "MONOCHROME1: gray levels were inverted")
     if class_of(header) == ULTRASOUND_VOLUME:
         notes.append("placed by the transducer, not by the patient: left, back and up are not known")
+    if placed_evenly(header):
+        notes.append("frames placed by SpacingBetweenSlices, one behind the other along their normal")
     return tuple(notes)
 
 

@@ -6,13 +6,16 @@ front, and ``extras`` of the mesh name unit and frame.
 
 from __future__ import annotations
 
+import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..colors import linear, named_colors
 from ..files.atomic import replacing
+from ..files.source import third_party
 from .attributes import MM, single_precision
+from .weld import weld
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,6 +23,7 @@ if TYPE_CHECKING:
     from ...model.mesh import TriMesh
     from ..fields import Fields
     from .attributes import MeshAttributes
+    from .through_trimesh import Arrays
 
 UPRIGHT = ((1, 0, 0), (0, 0, 1), (0, -1, 0))
 """Rows of the rotation that brings z to y."""
@@ -93,3 +97,34 @@ def _finish(tree: dict[str, Any], beside: MeshAttributes) -> None:
         tree["bufferViews"][accessors[number]["bufferView"]]["target"] = OF_VERTICES if name else OF_FACES
     if COLOR in attributes:
         attributes["COLOR_0"] = attributes.pop(COLOR)
+
+
+def read_glb(data: bytes, file: str) -> Arrays:
+    """Read vertices and faces: the numbers of the mesh where tomomesh wrote it, else placed by its nodes, in meters.
+
+    Equal positions become one vertex: exporters part them where normals or textures differ.
+    """
+    scene, named = _scene(data, file)
+    meshes = [*scene.geometry.values()] if named else scene.dump()
+    parts = [mesh for mesh in meshes if hasattr(mesh, "faces")]
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in parts)])
+    vertices = np.concatenate([np.empty((0, 3)), *(mesh.vertices for mesh in parts)])
+    faces = [np.empty((0, 3), np.int64), *(mesh.faces + n for mesh, n in zip(parts, first, strict=False))]
+    unique, numbers = weld(np.array(vertices, np.float64))
+    return unique, numbers[np.concatenate(faces)]
+
+
+def glb_frame(data: bytes, file: str) -> dict[str, str]:
+    """Return the unit and the frame of a file: its own where tomomesh wrote it, else meters, as glTF has it."""
+    return _scene(data, file)[1] or {"unit": "m"}
+
+
+def _scene(data: bytes, file: str) -> tuple[Any, dict[str, str]]:
+    """Return the scene, and unit and frame where its one mesh names them."""
+    import trimesh
+
+    with third_party("trimesh", file):
+        scene: Any = trimesh.load(io.BytesIO(data), file_type="glb", force="scene", process=False, skip_materials=True)
+        known = [mesh.metadata for mesh in scene.geometry.values()]
+    named = known[0] if len(known) == 1 and {"unit", "frame"} <= set(known[0]) else {}
+    return scene, {name: str(named[name]) for name in ("unit", "frame") if name in named}

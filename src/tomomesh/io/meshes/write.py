@@ -36,7 +36,7 @@ def write_mesh(
     vertex_fields: Mapping[str, NDArray[Any]] | None = None,
     face_fields: Mapping[str, NDArray[Any]] | None = None,
     z_up: bool = False,
-    precision: str = "64",
+    precision: int = 64,
 ) -> None:
     """Write a triangle mesh; the same mesh gives the same bytes.
 
@@ -56,7 +56,7 @@ def write_mesh(
         Numbers on the faces, kept by PLY and VTP.
     z_up : bool
         Whether z is up where the frame does not say so, as of a part to print: GLB has y up.
-    precision : {"64", "32"}
+    precision : {64, 32}
         Bits of the coordinates in PLY and VTP; 64 all the same where 32 would let vertices fall together.
 
     Raises
@@ -79,7 +79,7 @@ def write_mesh(
     check_output(path, MESH_WRITERS)
     at_vertices = flat_columns(vertex_fields or {}, len(mesh.vertices), AXES)
     on_faces = flat_columns(face_fields or {}, len(mesh.faces), ["count", "corners", "vertex_indices"])
-    beside = MeshAttributes(unit, frame, at_vertices, on_faces, z_up=z_up, single=precision == "32")
+    beside = MeshAttributes(unit, frame, at_vertices, on_faces, z_up=z_up, single=precision == 32)
     MESH_WRITERS[suffix_of(path)](mesh, path, beside)
 
 

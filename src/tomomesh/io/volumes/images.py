@@ -121,8 +121,8 @@ def _pixels(path: Path) -> tuple[NDArray[Any], tuple[str, ...]]:
                     found=f"mode = {image.mode}",
                     expected="gray or RGB",
                 )
-            white = getattr(image, "tag_v2", {}).get(PHOTOMETRIC) == WHITE_IS_ZERO
-            bits = image.tag_v2.get(BITS, (1,))[0] if white else 0
+            fields = getattr(image, "tag_v2", {})
+            bits = fields.get(BITS, (1,))[0] if fields.get(PHOTOMETRIC) == WHITE_IS_ZERO else 0
     pixels = native(pixels, file=path.name)
     if bits and pixels.dtype == np.uint8:
         pixels = 255 - pixels  # Pillow has turned them over

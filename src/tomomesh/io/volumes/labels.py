@@ -28,12 +28,12 @@ LARGEST_SIDE = 32767
 """NIfTI-1 keeps its sizes in 16 bits with a sign."""
 
 
-def write_labels(labels: NDArray[np.uint16], volume: Volume, path: str | Path) -> None:
+def write_labels(labels: NDArray[np.unsignedinteger[Any]], volume: Volume, path: str | Path) -> None:
     """Write labels on the grid of the study's own file, as NIfTI.
 
     Parameters
     ----------
-    labels : (K, J, I) uint16 array
+    labels : (K, J, I) uint8 or uint16 array
         In the order of ``volume.voxels``.
     volume : Volume
         The study; its `grid` says how the file stores its voxels.

@@ -73,7 +73,7 @@ def natural(path: Path) -> tuple[list[tuple[int, int, str]], str]:
 
 def _by_value(stems: Sequence[str]) -> Numbers | None:
     """Read numbers with their signs, fractions and exponents; None where these can be none."""
-    found = _alike(stems, VALUE)
+    found = _between_words(stems, VALUE)
     if found is None or any(map(CHAIN.search, stems)) or not all(map(_are_fractions, zip(*found, strict=True))):
         return None
     fields = list(zip(*found, strict=True))
@@ -84,7 +84,7 @@ def _by_value(stems: Sequence[str]) -> Numbers | None:
 
 def _by_parts(stems: Sequence[str]) -> Numbers | None:
     """Read whole numbers, whatever stands between them."""
-    found = _alike(stems, WHOLE)
+    found = _between_words(stems, WHOLE)
     return None if found is None else Numbers([tuple(Decimal(one[2]) for one in row) for row in found])
 
 
@@ -101,7 +101,7 @@ def _hexadecimal(stems: Sequence[str]) -> Numbers | None:
     return Numbers([(Decimal(value),) for value in values], note) if steps.min() == steps.max() > 0 else None
 
 
-def _alike(stems: Sequence[str], number: re.Pattern[str]) -> list[list[re.Match[str]]] | None:
+def _between_words(stems: Sequence[str], number: re.Pattern[str]) -> list[list[re.Match[str]]] | None:
     """Return the numbers of each name, None where the words between them differ."""
     words = {number.sub("\0", stem).casefold() for stem in stems}
     found = [list(number.finditer(stem)) for stem in stems]

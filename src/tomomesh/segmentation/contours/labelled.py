@@ -121,14 +121,14 @@ def filled_slices(mask: Mask, study: Volume, *, threads: int = 0, progress: Prog
         )  # fmt: skip
     planes = np.moveaxis(mask, found.axis, 0)
     columns, rows, across = _sizes(study.spacing_mm, found.axis)
+    heights = np.asarray(across * np.arange(len(planes)), np.float64)
     rings = tuple(
         tuple(_ring(loop.middles, (columns, rows), k * across) for loop in trace(planes[k])) for k in found.labelled
     )
     slices = Slices(
-        np.zeros(3), np.eye(3), found.labelled * across, np.zeros(len(rings), np.int64), np.empty(0, np.int64),
+        np.zeros(3), np.eye(3), heights[found.labelled], np.zeros(len(rings), np.int64), np.empty(0, np.int64),
         min(columns, rows), rings, complete=True,
     )  # fmt: skip
-    heights = np.arange(len(planes)) * across
     levels, low, edge = solid_between(slices, heights, threads=threads, progress=progress)
     depths = _resampled(levels, low, edge, (rows, columns), planes.shape)
     return replace(study, voxels=np.moveaxis(depths, 0, found.axis)), f"{found.told}: they were interpolated"
@@ -161,6 +161,6 @@ def _resampled(
     scale, first = np.array([1.0, *pixel]), np.array([0.0, *low[::-1]])
     scale[1:] /= edge
     depths = ndimage.affine_transform(
-        levels, scale, -first / edge, shape, np.float32, order=1, mode="constant", cval=-WIDEST
+        levels, scale, -first / edge, shape, output=np.float32, order=1, mode="constant", cval=-WIDEST
     )  # fmt: skip
     return np.asarray(np.clip(depths, -WIDEST, WIDEST, out=depths))

@@ -36,6 +36,8 @@ STORAGE = "1.2.840.10008.5.1.4.1.1."
 
 SLICE_VECTORS = ("GridFrameOffsetVector", "SliceVector", "SliceLocationVector")
 """Fields that number frames along the normal, or say how far apart they are."""
+EVENLY = ("ImagePositionPatient", "ImageOrientationPatient", "SpacingBetweenSlices")
+"""Fields that together say where each frame is, whatever its kind: films have no distance of slices."""
 COUNTED = {
     "FrameTime": TIMES, "FrameTimeVector": TIMES, "TimeSliceVector": TIMES, "TimeSlotVector": TIMES,
     "PhaseVector": TIMES, "RRIntervalVector": TIMES, "AngularViewVector": PROJECTIONS, "RotationVector": PROJECTIONS,
@@ -58,16 +60,16 @@ def no_slices(header: Any) -> str:
         return TILES
     if any(header.get(vector) for vector in SLICE_VECTORS):
         return ""
+    if class_of(header) in NUCLEAR:
+        kind = [*(header.get("ImageType") or []), "", "", ""][2]
+        words = (word for word in UNRECONSTRUCTED if word in kind and "RECON" not in kind)
+        return next((f"{UNRECONSTRUCTED[word]}, ImageType = {word}" for word in words), "")
+    if all(header.get(keyword) for keyword in EVENLY):
+        return ""
     if film:
         return f"{film}, Modality = {header.get('Modality')}"
-    return "" if PER_FRAME in header else _counted(header)
-
-
-def _counted(header: Any) -> str:
-    """Say what frames without functional groups are, by what counts them."""
-    kind = [str(word) for word in header.get("ImageType") or []][2:3]
-    if class_of(header) in NUCLEAR and kind and "RECON" not in kind[0]:
-        return next((f"{what}, ImageType = {word}" for word, what in UNRECONSTRUCTED.items() if word in kind[0]), "")
+    if PER_FRAME in header:
+        return ""
     return next((f"{COUNTED[one]}, counted by {one}" for one in counting(header) if one in COUNTED), "")
 
 
@@ -77,6 +79,13 @@ def counting(header: Any) -> list[str]:
 
     tags = header.get("FrameIncrementPointer") or []
     return [keyword_for_tag(tag) for tag in ([tags] if isinstance(tags, int) else list(tags))]
+
+
+def placed_evenly(header: Any) -> bool:
+    """Tell whether the distance of the slices alone places frames, in a kind of file that does not define it."""
+    several = int(header.get("NumberOfFrames") or 1) > 1 and PER_FRAME not in header
+    counted = any(header.get(vector) for vector in SLICE_VECTORS) or class_of(header) in NUCLEAR
+    return several and not counted and all(header.get(keyword) for keyword in EVENLY)
 
 
 def frame_places(header: Any, count: int, first: Floats | None, axes: Floats | None, name: str) -> list[Floats | None]:
@@ -125,7 +134,7 @@ def _offsets(header: Any, count: int, height: float, up: float, name: str) -> Fl
     if distance is None or not distance[0]:
         return None
     slices = vectors["SliceVector"]
-    return distance[0] * (np.arange(count) if slices is None else slices - slices[0])
+    return np.asarray(distance[0] * (np.arange(count) if slices is None else slices - slices[0]))
 
 
 def _from_first(found: Floats, height: float, up: float, words: str, name: str) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from ...files.source import third_party
 from ...names import shown
 from ..headers.dataset import read_dataset
 from ..headers.header import frames_of
+from ..headers.identity import identity_of
 from ..headers.values import numbers
 from ..pixels.decoder import Decoder
 from ..pixels.tables import PALETTE
@@ -108,7 +109,8 @@ def read_segmentation(path: Path, settings: ReadSettings, *, study: str, select:
     _require(found, voxels, select, study)
     empty = count - len(np.unique(levels))
     notes += (f"slices that the file leaves out, taken as background: {empty}",) if empty else ()
-    return Volume.from_stored(voxels, affine, notes=(f"segments: {_named(found.labels)}", *notes))
+    read = Volume.from_stored(voxels, affine, notes=(f"segments: {_named(found.labels)}", *notes))
+    return replace(read, dicom=identity_of(found.frames[:1]))
 
 
 def segments_of(path: Path) -> dict[int, str]:

@@ -59,6 +59,8 @@ LIST = ""
 
 COLORS = ("rgb-color", "3-color", "rgba-color", "4-color")
 """The format's kinds of an axis of color, as 3 or 4 bytes."""
+ITK_COLORS = ("vector",)
+"""What ITK calls that axis where the type of its pixels does not say that they are colors, as SimpleITK's does not."""
 
 KINDLESS = ("", "none", "???")
 """Kinds that say nothing; 3 or 4 bytes are taken for a color then."""
@@ -92,9 +94,9 @@ def read_nrrd(path: Path, settings: ReadSettings, select: Sequence[int] | None =
     spatial = is_spatial(fields, sizes, file=name)
     affine, notes = frame_of(fields, spatial, settings, file=name)
     segments = segments_in(fields, file=name)
-    if not segments:
-        _check_kinds(fields, sizes, spatial, name)
     stored = _channels_last(read_raster(_raster(fields, sizes, path, length, name), file=name), spatial)
+    if not segments:
+        _check_kinds(fields, sizes, spatial, stored, name)
     if segments:
         voxels, more = label_map(stored, segments, select, file=name)
     else:
@@ -198,13 +200,17 @@ def _after_lines(part: Path, start: int, lines: int, name: str) -> int:
     return start + ends[lines - 1]
 
 
-def _check_kinds(fields: HeaderFields, sizes: tuple[int, ...], spatial: list[bool], name: str) -> None:
-    """Refuse vectors and lists of three bytes, which are no colors."""
+def _check_kinds(
+    fields: HeaderFields, sizes: tuple[int, ...], spatial: list[bool], stored: NDArray[Any], name: str
+) -> None:
+    """Refuse vectors and lists of three bytes, which are no colors, but for those that ITK calls vectors."""
     kinds = fields.get("kinds", "").lower().split()
     if len(kinds) != len(sizes):
         return
     others = [(kind, size) for kind, size, space in zip(kinds, sizes, spatial, strict=True) if not space and size > 1]
-    if others and not (len(others) == 1 and others[0][0] in (*COLORS, *KINDLESS)):
+    if others and not (
+        len(others) == 1 and others[0][0] in (*COLORS, *KINDLESS, *(ITK_COLORS if _many_levels(stored) else ()))
+    ):
         raise FormatError(
             "the file holds several values a voxel",
             file=name,
@@ -212,6 +218,12 @@ def _check_kinds(fields: HeaderFields, sizes: tuple[int, ...], spatial: list[boo
             expected="one gray level, a color, or segments with names",
             hint="one of them, written to a file of its own; or the kind RGB-color in the header, where it is a color",
         )
+
+
+def _many_levels(stored: NDArray[Any]) -> bool:
+    """Tell whether a layer of bytes (K, J, I, channels) has more levels than a mask."""
+    layers = np.moveaxis(stored, 3, 0) if stored.dtype == np.uint8 else ()
+    return any(np.count_nonzero(np.bincount(layer.ravel(), minlength=256)) > 2 for layer in layers)
 
 
 def _channels_last(stored: NDArray[Any], spatial: list[bool]) -> NDArray[Any]:

@@ -6,21 +6,21 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from ..settings import MATTERS, asked_by, option_of
-from . import choose_way, way_of
-from .way import INPUTS, POINTS
+from .settings import MATTERS, asked_by, option_of
+from .ways import choose_way, way_of
+from .ways.way import INPUTS, POINTS
 
 if TYPE_CHECKING:
     from collections.abc import Collection
     from dataclasses import Field
 
-    from ..settings import Settings
+    from .settings import Settings
 
 GROUPS = ("network", "cubes", "fit")
 """Groups of parameters that a way must read for them to change anything."""
 BESIDE = ("seed",)
 """Parameters of other groups of which the same is true."""
-ALWAYS = ("way", "network", "space", "contours", "slices", "tolerance", "max_steps")
+ALWAYS = ("filled", "way", "network", "space", "contours", "slices", "tolerance", "max_steps")
 """Parameters of those groups that choose the way or matter on each."""
 INSTEAD = {"largest": "--keep largest"}
 """Parameter to what does the same on the voxels of a study, whichever way it goes."""

@@ -1,0 +1,167 @@
+"""Pages: nothing is covered, no half is empty, panels are of one scale, labels are no gray levels."""
+
+from __future__ import annotations
+
+import io
+import logging
+import signal
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+from PIL import Image
+
+from tomomesh import Volume, reconstruct
+from tomomesh.cli import main
+from tomomesh.cli.pictures import pictures
+from tomomesh.model.lattice import lattice
+from tomomesh.model.points import PointSet
+from tomomesh.settings import Settings
+from tomomesh.show import save
+from tomomesh.show.contact import scale_bar
+from tomomesh.show.maps import draw_maps
+from tomomesh.show.plane import PIXELS
+from tomomesh.show.space import MOST_LINED, draw_points, draw_surfaces
+from tomomesh.show.style import canvas
+from tomomesh.show.topologies import draw_adapted
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+
+def drawn(figure: Figure) -> NDArray[np.uint8]:
+    file = io.BytesIO()
+    save(figure, file)
+    with Image.open(file) as picture:
+        return np.asarray(picture.convert("RGB"))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_long_cloud_leaves_no_half_of_its_page_empty(axis: int) -> None:
+    """Rows and columns with ink reach over most of the page, whichever way the cloud is long."""
+    places = np.random.default_rng(0).uniform(-1, 1, (2000, 3))
+    places[:, axis] *= 20
+    ink: NDArray[np.bool_] = np.asarray(drawn(draw_points(PointSet.from_positions(places))) < 250).any(axis=2)
+    for side in (0, 1):
+        inked = np.flatnonzero(ink.any(axis=side))
+        assert np.diff(inked).max() < 0.3 * ink.shape[1 - side]
+
+
+def test_the_scale_bar_lies_outside_of_the_slice() -> None:
+    figure, (ax,) = canvas(2.0, 2.4)
+    ax.imshow(np.ones((50, 50, 3)))
+    ax.set_axis_off()
+    bounds = np.array([[0.0, 0.0], [50.0, 50.0]])
+    PIXELS.crop(ax, bounds)
+    scale_bar(ax, bounds, PIXELS)
+    figure.canvas.draw()
+    (bar,) = ax.lines
+    assert bar.get_window_extent().y0 > ax.get_window_extent().y1
+    shown = bar.get_transform().transform(bar.get_xydata())
+    left, right = ax.transData.transform([(0, 0), (10, 0)])[:, 0]
+    assert np.ptp(shown[:, 0]) == pytest.approx(right - left, abs=0.5)
+    assert "10 mm" in [text.get_text() for text in ax.texts]
+
+
+def test_many_squares_are_drawn_without_lines() -> None:
+    """Mean brightness of a fine surface is that of a coarse one: lines do not turn it to mud."""
+
+    def surface(count: int) -> NDArray[np.uint8]:
+        side = np.linspace(-1, 1, count)
+        x, z = (each.ravel() for each in np.meshgrid(side, side))
+        node = np.arange(count * count).reshape(count, count)
+        corners = np.stack([node[:-1, :-1], node[:-1, 1:], node[1:, 1:]], axis=-1).reshape(-1, 3)
+        from tomomesh.model.mesh import TriMesh
+
+        mesh = TriMesh(np.column_stack([x, np.zeros_like(x), z]), corners)
+        seen = drawn(draw_surfaces(None, mesh, None))
+        middle = tuple(slice(int(0.4 * n), int(0.5 * n)) for n in seen.shape[:2])
+        return seen[middle]
+
+    assert MOST_LINED < 2 * 200**2
+    assert surface(260).mean() > surface(130).mean()
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_panels_of_a_network_share_their_limits(dimensions: int) -> None:
+    region = np.random.default_rng(0).random((200, dimensions))
+    graph = lattice("grid", 12)
+    one, other = draw_adapted(region, region[:12], graph, start=3 * region[12:24]).axes
+    assert one.get_xlim() == other.get_xlim()
+    assert one.get_ylim() == other.get_ylim()
+    edges = one.collections[1]
+    assert isinstance(edges, LineCollection)
+    widths = np.asarray(edges.get_linewidth())
+    assert (np.ptp(widths) > 0) == (dimensions == 3)
+
+
+def test_the_scale_of_a_u_matrix_begins_at_its_least_distance() -> None:
+    graph = lattice("grid", 16)
+    figure = draw_maps(10 + graph.places + 0.1 * np.random.default_rng(0).random((16, 2)), graph, np.arange(16))
+    figure.canvas.draw()
+    distances, hits = (ax for ax in figure.axes if ax.get_label() == "<colorbar>")
+    assert distances.get_xlim()[0] > 0
+    assert hits.get_xlim()[0] == 0
+    first, second = (ax.get_window_extent() for ax in figure.axes[:2])
+    assert first.height == pytest.approx(second.height, rel=0.05)
+
+
+def test_labels_by_themselves_are_drawn_as_chosen_others_and_background() -> None:
+    labels = np.zeros((8, 12, 12), np.uint8)
+    labels[2:6, 2:8, 2:8], labels[2:6, 9:11, 2:8] = 7, 200
+    found = reconstruct(Volume.from_stored(labels, np.eye(4)), select=(7,))
+    stage_one = found.segmentation
+    assert stage_one is not None
+    window = dict(pictures(stage_one, None, Settings().replace(select=(7,))))["04-window"]
+    assert set(np.unique(np.asarray(window.axes[0].images[0].get_array()))) == {0, 1, 2}
+
+
+def test_a_window_that_goes_on_is_told_of() -> None:
+    levels = np.zeros((10, 16, 16), np.float32)
+    levels[:, 4:12, 4:12] = 100
+    notes = reconstruct(Volume.from_stored(levels, np.eye(4)), lower=50.0).report["study"]["notes"]
+    assert any("cut off at the first and the last slice" in note for note in notes)
+    levels[[0, -1]] = 0
+    notes = reconstruct(Volume.from_stored(levels, np.eye(4)), lower=50.0).report["study"]["notes"]
+    assert not any("cut off" in note for note in notes)
+
+
+def test_smoothing_longer_than_the_object_says_that_it_changes_nothing() -> None:
+    levels = np.zeros((10, 16, 16), np.float32)
+    levels[2:8, 4:12, 4:12] = 100
+    volume = Volume.from_stored(levels, np.eye(4))
+    told, plain = (reconstruct(volume, lower=50.0, smooth=length) for length in (500.0, 0.0))
+    assert sum("changes nothing" in warning for warning in told.report["warnings"]) == 1
+    np.testing.assert_array_equal(told.mesh.vertices, plain.mesh.vertices)
+
+
+def test_silent_stretches_are_told_of_and_the_time_is_the_whole(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    levels = np.zeros((10, 16, 16), np.uint8)
+    levels[2:8, 4:12, 4:12] = 100
+    np.save(tmp_path / "v.npy", levels)
+    line = [
+        "reconstruct",
+        str(tmp_path / "v.npy"),
+        "--spacing",
+        "1",
+        "1",
+        "1",
+        "-o",
+        str(tmp_path / "m.stl"),
+        "--way",
+        "voxels",
+    ]
+    before = [signal.getsignal(signal.SIGTERM), list(logging.getLogger().handlers)]
+    assert main(line) == 0
+    assert [signal.getsignal(signal.SIGTERM), list(logging.getLogger().handlers)] == before
+    said = capsys.readouterr()
+    stages = [row.split()[0] for row in said.err.splitlines()]
+    assert {"read", "window", "voxels", "fit", "checks", "remesh", "judgement", "measure"} <= set(stages)
+    assert "computed in" in said.out
+    assert "reading and writing included" in said.out
