@@ -86,6 +86,11 @@ class CrossingFaces:
         return marked_in(self._tree, any_of(moved[mesh.faces]), threads=self._threads)
 
 
+def crossing_of(mesh: TriMesh, some: NDArray[np.bool_], *, threads: int = 0) -> NDArray[np.bool_]:
+    """Mark the faces (m,) of a mesh that pass through `some` of them (m,), and these where they do."""
+    return marked_in(Tree.of_faces(mesh, threads=threads), some, threads=threads)
+
+
 def marked_in(
     tree: Tree, asked: NDArray[np.bool_] | None = None, *, threads: int = 0, progress: Progress = silent
 ) -> NDArray[np.bool_]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..kernels.remeshing.links import CREASE, FIXED, FREE, KEPT
+from ..kernels.remeshing.surface import find_sharp
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,21 +49,24 @@ def find_creases(
     edge : float
         What the length of a crease is compared with.
     """
-    starts, ends = mesh.half_edges.T
-    once = np.flatnonzero(np.arange(len(twins)) < twins)
-    turn = sum(normals[once // 3, axis] * normals[twins[once] // 3, axis] for axis in range(3))
-    found = once[turn < SHARP]
-    kinds = np.full(len(mesh.vertices), FREE, np.uint8)
-    found = found[~_doubled(mesh, starts[found], ends[found], BESIDE * edge)]
+    found, kinds = np.empty_like(twins), np.full(len(mesh.vertices), FREE, np.uint8)
+    found = found[: find_sharp(twins, normals, SHARP, found)]
+    found = found[~_doubled(mesh, *_ends(mesh, found), BESIDE * edge)]
     for _ in range(ROUNDS):
-        found = found[_lengths(mesh, starts[found], ends[found]) >= LONG * edge]
+        found = found[_lengths(mesh, *_ends(mesh, found)) >= LONG * edge]
+    starts, ends = _ends(mesh, found)
     creases = np.zeros(len(twins), np.bool_)
     creases[found], creases[twins[found]] = True, True
-    kinds[starts[found]] = kinds[ends[found]] = FIXED
-    kinds[_passed(mesh, starts[found], ends[found])[2]] = CREASE
-    border = twins < 0
-    kinds[starts[border]] = kinds[ends[border]] = KEPT
+    kinds[starts] = kinds[ends] = FIXED
+    kinds[_passed(mesh, starts, ends)[2]] = CREASE
+    for border in _ends(mesh, np.flatnonzero(twins < 0)):
+        kinds[border] = KEPT
     return creases, kinds
+
+
+def _ends(mesh: TriMesh, halves: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the vertices that half edges (e,) start from and run to."""
+    return mesh.faces[halves // 3, halves % 3], mesh.faces[halves // 3, (halves + 1) % 3]
 
 
 def _doubled(mesh: TriMesh, starts: NDArray[np.int64], ends: NDArray[np.int64], near: float) -> Marks:

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.remeshing.ground import gather_fans, link
 from ..kernels.remeshing.links import KEPT
+from ..kernels.remeshing.surface import face_normals, gather_fans, link
+from ..kernels.threads import in_blocks
 from ..measure.links import Links
+from ..measure.shape import areas_and_volumes
 from .creases import find_creases
 from .sizes import wanted_sizes
 
@@ -32,6 +34,8 @@ class Ground:
     faces : (m, 3) int32 array
     normals : (m, 3) float array
         Unit normals of the faces, 0 where a face has no area.
+    areas, volumes : (m,) float arrays
+        Of the faces, and signed ones under them.
     twins : (3 m,) int32 array
         The half edge that runs the other way; -1 at a border.
     valence : (n,) int32 array
@@ -51,6 +55,8 @@ class Ground:
     mesh: TriMesh
     faces: Ints
     normals: Floats
+    areas: Floats
+    volumes: Floats
     twins: Ints
     valence: Ints
     first: Ints
@@ -61,50 +67,78 @@ class Ground:
     kinds: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, mesh: TriMesh, edge: float) -> Ground:
+    def of(cls, mesh: TriMesh, edge: float, threads: int = 0) -> Ground:
         """Look at a mesh that is to have edges of about a length."""
         links = Links(mesh)
         faces, count = links.faces, len(mesh.vertices)
-        twins, outs = np.empty(faces.size, np.int32), np.empty(count, np.int32)
-        valence, first, fans = np.zeros(count, np.int32), np.zeros(count + 1, np.int32), np.empty_like(twins)
-        link(faces.reshape(-1), *links.edges, twins, outs, valence)
+        first, fans = np.zeros(count + 1, np.int32), np.empty(faces.size, np.int32)
         gather_fans(faces, first, fans)
-        normals = mesh.face_vectors / np.maximum(2 * mesh.face_areas, np.finfo(float).tiny)[:, None]
+        twins, valence = np.empty_like(fans), np.empty(count, np.int32)
+        in_blocks(
+            lambda start, stop: link(faces.reshape(-1), first, fans, twins, valence, start, stop),
+            count, block=BLOCK, threads=threads,
+        )  # fmt: skip
+        normals = np.empty((len(faces), 3))
+        in_blocks(
+            lambda start, stop: face_normals(mesh.vertices, faces, normals, start, stop),
+            len(faces), block=BLOCK, threads=threads,
+        )  # fmt: skip
+        areas, volumes = areas_and_volumes(links, threads=threads)
         creases, kinds = find_creases(mesh, twins, normals, edge)
-        sizes = wanted_sizes(mesh, faces, edge)
-        return cls(mesh, faces, normals, twins, valence, first, fans, links.face_pieces, sizes, creases, kinds)
-
-    @property
-    def ends(self) -> Ints:
-        """The vertex that each half edge runs to, (3 m,)."""
-        return self.faces[:, [1, 2, 0]].reshape(-1)
+        sizes = wanted_sizes(mesh.vertices, faces, normals, areas, edge)
+        return cls(
+            mesh, faces, normals, areas, volumes, twins, valence, first, fans, links.face_pieces, sizes, creases, kinds
+        )
 
     def scaled(self, share: float) -> Ground:
         """Return the same with other lengths of edges."""
         return replace(self, sizes=self.sizes * share)
+
+    def finer_at(self, faces: Ints) -> Ground:
+        """Return the same with edges half as long around some of its faces."""
+        sizes = self.sizes.copy()
+        sizes[np.unique(self.faces[faces])] *= 0.5
+        return replace(self, sizes=sizes)
 
     def with_specks(self, few: int, least: float) -> Ground:
         """Return the same with shorter edges where a component would have fewer faces, about.
 
         Such a component is kept as it is where it is less round than `least`: 36 pi V^2 / A^3, which is 1 for a ball.
         """
-        volume, area = (np.bincount(self.pieces, each) for each in (self.mesh.face_volumes, self.mesh.face_areas))
+        volume, area = (np.bincount(self.pieces, each) for each in (self.volumes, self.areas))
+        short = np.sqrt(area / (EVEN * few))
+        if short.min() >= self.sizes.max():
+            return self
         piece = np.empty(len(self.sizes), np.int32)
         piece[self.faces] = self.pieces[:, None]
-        short = np.sqrt(area / (EVEN * few))[piece]
-        flat = (36 * np.pi * volume**2 < least * area**3)[piece] & (short < self.sizes)
+        flat = (36 * np.pi * volume**2 < least * area**3)[piece] & (short[piece] < self.sizes)
         kinds = np.where(flat, np.uint8(KEPT), self.kinds)
-        return replace(self, sizes=np.minimum(self.sizes, short), kinds=kinds)
+        return replace(self, sizes=np.minimum(self.sizes, short[piece]), kinds=kinds)
 
     def forecast(self) -> float:
         """Return about how many faces a mesh of even triangles has with these lengths of edges."""
-        return float((self.mesh.face_areas / self.sizes[self.faces].mean(axis=1) ** 2).sum()) / EVEN
+        return float((self.areas / self.sizes[self.faces].mean(axis=1) ** 2).sum()) / (EVEN * LONGER**2)
 
 
+BLOCK = 20_000
+"""Faces or vertices handled at once: some milliseconds. No result depends on it."""
 EVEN = 0.25 * 3**0.5
 """Area of an equilateral triangle over the square of its side."""
+LONGER = 1.06
+"""Usual length of edges over what is wanted, which lies between those that are split and those that collapse: measured,
+1.05 to 1.08."""
 
 
-def even_edge(mesh: TriMesh, faces: float) -> float:
-    """Return the length of the edges of so many equilateral triangles that together are as large as a mesh."""
-    return float(np.sqrt(mesh.face_areas.sum() / (EVEN * faces)))
+def even_edge(area: float, faces: float) -> float:
+    """Return the length of the edges of so many equilateral triangles that together have an area."""
+    return float(np.sqrt(area / (EVEN * faces)))
+
+
+def area_of(mesh: TriMesh, threads: int = 0) -> float:
+    """Return the area of a mesh."""
+    return float(areas_and_volumes(Links(mesh), threads=threads)[0].sum())
+
+
+def usual_edge(mesh: TriMesh, threads: int = 0) -> float:
+    """Return the length of the edge of an equilateral triangle of the mean area of the faces of a mesh."""
+    return even_edge(area_of(mesh, threads), len(mesh.faces))

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..kernels.remeshing.collapses import collapse_edges
 from ..kernels.remeshing.flips import flip_edges
-from ..kernels.remeshing.ground import find_sags, project
+from ..kernels.remeshing.ground import find_goals
+from ..kernels.remeshing.lengths import TOO_LONG, TOO_SHORT, mark_lengths
 from ..kernels.remeshing.links import KEPT
-from ..kernels.remeshing.moves import accept, lift, relax
-from ..kernels.remeshing.splits import mark_long, split_edges
+from ..kernels.remeshing.moves import lift_vertices, move_vertices
+from ..kernels.remeshing.splits import split_edges
 from ..kernels.threads import in_blocks
+from ..model.columns import any_of
 from ..model.mesh import TriMesh
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -24,12 +27,12 @@ if TYPE_CHECKING:
 
 BLOCK = 30_000
 """Half edges, or vertices, worked on in one call: some tens of milliseconds. No result depends on it."""
-SPLITS, COLLAPSES = 12, 3
-"""Most passes over all edges in which they are split, or collapsed, before vertices move. An edge waits for the longer
-sides of its faces."""
-FEW = 0.01
-"""Share of the vertices: a pass that collapses fewer edges is the last for now."""
-LIFTS = 3
+SPLITS = 12
+"""Most passes over all edges in which they are split before vertices move. An edge waits for the longer sides of its
+faces."""
+RINGS = 2
+"""Rings of faces around those that pass through others that change with them."""
+LIFTS = 2
 """Rounds in which vertices leave the surface before, so that faces do not all lie inside of it where it bends."""
 ROOM = 3
 """New vertices that room is made for, for each edge that is too long: the halves of one may be too long again."""
@@ -38,8 +41,13 @@ ROOM = 3
 class Making:
     """A mesh in the making over the surface before. See `tomomesh.kernels.remeshing.links` for the arrays."""
 
-    def __init__(self, ground: Ground, kept: NDArray[np.bool_], threads: int) -> None:
-        """Begin with the surface itself, of which some vertices (n,) are kept with the edges between them."""
+    def __init__(
+        self, ground: Ground, kept: NDArray[np.bool_], threads: int, some: NDArray[np.bool_] | None = None
+    ) -> None:
+        """Begin with the surface itself, of which some vertices (n,) are kept with the edges between them.
+
+        Where only `some` of its faces (m,) are to be made even, whole pieces, the mesh consists of them alone.
+        """
         self._ground, self._threads = ground, threads
         self.corners, self.twins = ground.faces.reshape(-1).copy(), ground.twins.copy()
         self.places, self.valence = ground.mesh.vertices.copy(), ground.valence.copy()
@@ -48,8 +56,13 @@ class Making:
         self.outs = np.full(len(self.places), -1, np.int32)
         self.outs[self.corners] = np.arange(len(self.corners))
         self.under = self.outs // 3
+        if some is not None:
+            gone = np.repeat(~some, 3)
+            self.outs[self.corners[gone]], self.corners[gone] = -1, -1
         along = np.flatnonzero(ground.creases)
-        self.under[self.corners[along]] = along // 3
+        self.under[ground.faces.reshape(-1)[along]] = along // 3
+        self.ups = ground.normals[self.under]
+        self._begun = self.places
         self.counts = np.array([len(self.places), len(self.corners) // 3])
 
     @property
@@ -77,51 +90,72 @@ class Making:
         under = np.maximum(self.under, 0)
         self.sizes = ground.sizes[ground.faces[under]].mean(axis=1)
 
-    def split(self) -> int:
-        """Split edges that are too long; return how many."""
-        begun = int(self.counts[0])
-        marks: NDArray[np.bool_] = np.zeros(len(self.corners), np.bool_)
+    @contextmanager
+    def only_around(self, some: NDArray[np.bool_]) -> Iterator[Callable[[], NDArray[np.bool_]]]:
+        """Want edges half as long at some faces (m,), and let nothing change but there and a few rings around.
 
-        def mark(start: int, stop: int) -> None:
-            mark_long(self.places, self.corners, self.twins, self.kinds, self.sizes, marks, start, stop)
+        What is yielded tells, after that, which faces have changed.
+        """
+        near = self._corners_of(some)
+        near[self.faces[any_of(near[self.faces])]] = True
+        self.sizes[near] *= 0.5
+        self._ground = self._ground.finer_at(self.under[near])
+        for _ in range(RINGS):
+            near[self.faces[any_of(near[self.faces])]] = True
+        kinds = self.kinds
+        self.kinds = np.where(near, kinds, np.uint8(KEPT))
+        yield lambda: any_of(np.concatenate([near, np.ones(len(self.outs) - len(near), np.bool_)])[self.faces])
+        self.kinds[: len(kinds)][~near] = kinds[~near]
 
-        in_blocks(mark, 3 * int(self.counts[1]), block=BLOCK, threads=self._threads)
+    def _corners_of(self, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Mark the corners (n,) of some faces (m,)."""
+        corners = np.zeros(len(self.outs), np.bool_)
+        corners[self.faces[some]] = True
+        return corners
+
+    def marks(self) -> NDArray[np.uint8]:
+        """Mark edges that are too long or too short, at the first of their half edges, (3 m,)."""
+        marks = np.zeros(len(self.corners), np.uint8)
+
+        def work(start: int, stop: int) -> None:
+            mark_lengths(self.places, self.corners, self.twins, self.kinds, self.sizes, marks, start, stop)
+
+        in_blocks(work, 3 * int(self.counts[1]), block=BLOCK, threads=self._threads)
+        return marks
+
+    def split(self, marks: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Split edges that are too long; return the marks of all edges then."""
         for _ in range(SPLITS):
-            long = np.flatnonzero(marks)
+            long = np.flatnonzero(marks == TOO_LONG)
             if not len(long):
                 break
             self._make_room(len(long))
             marks = _longer(marks, len(self.corners))
             self._split(marks, long)
-        return int(self.counts[0]) - begun
+        return marks
 
-    def _split(self, marks: NDArray[np.bool_], long: NDArray[np.int64]) -> None:
+    def _split(self, marks: NDArray[np.uint8], long: NDArray[np.int64]) -> None:
         def work(start: int, stop: int) -> None:
             split_edges(
                 self.places, self.corners, self.twins, self.outs, self.valence, self.kinds, self.sharp, self.sizes,
-                self.under, self.counts, marks, long, start, stop,
+                self.under, self.ups, self.counts, marks, long, start, stop,
             )  # fmt: skip
 
         in_blocks(work, len(long), block=BLOCK, threads=1)
 
-    def collapse(self) -> int:
+    def collapse(self, marks: NDArray[np.uint8]) -> int:
         """Collapse edges that are too short; return how many."""
-        stamps, total = np.full(len(self.outs), -1, np.int32), 0
-        for _ in range(COLLAPSES):
-            made = 0
+        short, stamps, made = np.flatnonzero(marks == TOO_SHORT), np.full(len(self.outs), -1, np.int32), 0
 
-            def work(start: int, stop: int) -> None:
-                nonlocal made
-                made += collapse_edges(
-                    self.places, self.corners, self.twins, self.outs, self.valence, self.kinds, self.sharp,
-                    self.sizes, self.under, self._ground.normals, stamps, start, stop,
-                )  # fmt: skip
+        def work(start: int, stop: int) -> None:
+            nonlocal made
+            made += collapse_edges(
+                self.places, self.corners, self.twins, self.outs, self.valence, self.kinds, self.sharp, self.sizes,
+                self.ups, stamps, short, start, stop,
+            )  # fmt: skip
 
-            self._over_edges(work)
-            total += made
-            if made < FEW * self.counts[0]:
-                break
-        return total
+        in_blocks(work, len(short), block=BLOCK, threads=1)
+        return made
 
     def flip(self) -> None:
         """Flip edges where that makes angles larger."""
@@ -129,65 +163,50 @@ class Making:
         def work(start: int, stop: int) -> None:
             flip_edges(
                 self.places, self.corners, self.twins, self.outs, self.valence, self.kinds, self.sharp, self.sizes,
-                self.under, self._ground.normals, start, stop,
+                self.ups, start, stop,
             )  # fmt: skip
 
         self._over_edges(work)
 
     def move(self) -> None:
         """Move vertices evenly among their neighbors, along the surface before."""
-        moved, ground = np.empty_like(self.places), self._ground
+        ground = self._ground
 
         def work(start: int, stop: int) -> None:
-            relax(
-                self.places, self.corners, self.twins, self.outs, self.kinds, self.sharp, self.sizes, moved, start, stop
-            )
-
-        def lay(start: int, stop: int) -> None:
-            project(
-                ground.mesh.vertices, ground.faces, ground.creases.reshape(-1, 3), ground.twins, ground.fans,
-                ground.first, ground.sizes, self.outs, self.kinds, moved, self.under, self.sizes, start, stop,
+            move_vertices(
+                self.places, self.corners, self.twins, self.outs, self.kinds, self.sharp, self.sizes, self.under,
+                self.ups, ground.mesh.vertices, ground.faces, ground.creases.reshape(-1, 3), ground.twins, ground.fans,
+                ground.first, ground.normals, ground.sizes, start, stop,
             )  # fmt: skip
 
         self._over_vertices(work)
-        self._over_vertices(lay)
-        self._take(moved)
 
     def lift(self) -> None:
         """Move vertices off the surface before, so that each face lies on both its sides."""
-        begun, below = self.places.copy(), self.under[self.corners[::3]]
-        for _ in range(LIFTS):
-            self._lift(begun, below)
-
-    def _lift(self, begun: NDArray[np.float64], below: NDArray[np.int32]) -> None:
-        moved, ground, sags = np.empty_like(self.places), self._ground, np.zeros(len(self.corners) // 3)
+        goals, ground = np.zeros((len(self.corners) // 3, 3)), self._ground
 
         def find(start: int, stop: int) -> None:
-            find_sags(
-                ground.mesh.vertices, ground.faces, ground.twins, ground.fans, ground.first, begun, self.places,
-                self.corners, self.kinds, below, sags, start, stop,
+            find_goals(
+                ground.mesh.vertices, ground.faces, ground.twins, ground.fans, ground.first, self.places,
+                self.corners, self.under, goals, start, stop,
             )  # fmt: skip
 
         def work(start: int, stop: int) -> None:
-            lift(self.places, self.corners, self.twins, self.outs, self.kinds, sags, moved, start, stop)
+            lift_vertices(self.places, self.corners, self.twins, self.outs, self.kinds, self.ups, goals, start, stop)
 
+        self._begun = self.places.copy()
         in_blocks(find, int(self.counts[1]), block=BLOCK, threads=self._threads)
-        self._over_vertices(work)
-        self._take(moved)
+        for _ in range(LIFTS):
+            self._over_vertices(work)
 
-    def _take(self, moved: NDArray[np.float64]) -> None:
-        """Move vertices where no face turns over, one after the other."""
-
-        def take(start: int, stop: int) -> None:
-            accept(
-                self.places, self.corners, self.twins, self.outs, self.kinds, self._ground.normals, self.under, moved,
-                start, stop,
-            )  # fmt: skip
-
-        in_blocks(take, int(self.counts[0]), block=BLOCK, threads=1)
+    def lower(self, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Put the corners of some faces (m,) back where they were lifted from; return which faces have changed."""
+        near = self._corners_of(some)
+        self.places[near] = self._begun[near]
+        return any_of(near[self.faces])
 
     def _over_vertices(self, work: Callable[[int, int], None]) -> None:
-        in_blocks(work, int(self.counts[0]), block=BLOCK, threads=self._threads)
+        in_blocks(work, int(self.counts[0]), block=BLOCK, threads=1)
 
     def _over_edges(self, work: Callable[[int, int], None]) -> None:
         """Go over all half edges in their order: each change rests on those before."""
@@ -199,7 +218,7 @@ class Making:
         if n <= len(self.outs) and m <= len(self.corners):
             return
         n, m = n + (ROOM - 1) * vertices, m + 6 * (ROOM - 1) * vertices
-        for name in ("places", "outs", "valence", "kinds", "sizes", "under"):
+        for name in ("places", "outs", "valence", "kinds", "sizes", "under", "ups"):
             setattr(self, name, _longer(getattr(self, name), n))
         for name in ("corners", "twins", "sharp"):
             setattr(self, name, _longer(getattr(self, name), m))

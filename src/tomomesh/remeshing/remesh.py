@@ -12,8 +12,8 @@ from ..measure.intersections import self_intersections
 from ..measure.tree import Tree
 from ..model.columns import any_of
 from ..progress import Progress, silent
-from .ground import EVEN, Ground, even_edge
-from .making import Making
+from .ground import EVEN, Ground, area_of, even_edge, usual_edge
+from .rounds import AIM, ROUNDS, made_anew, made_even
 from .specks import NOTHING, LeftOut, without_specks
 
 if TYPE_CHECKING:
@@ -23,14 +23,6 @@ if TYPE_CHECKING:
 
     Marks = NDArray[np.bool_]
 
-ROUNDS = 4
-"""Most rounds of splits, collapses, flips and moves."""
-FEW = 0.1
-"""Splits and collapses a vertex in a round after which there is no other. Chosen: voxels' meshes take three rounds.
-With half of it they take a fourth, which adds a tenth to the time and 0.5 degrees to the smallest angles (1 %); with
-twice as much two, which cost 1 degree and leave 3 % more faces."""
-LAST = 1
-"""Moves after the last round, each with flips."""
 TRIES = 4
 """How often the surface is remeshed anew where faces pass through others, with what is under those kept as it was."""
 REACH = 2
@@ -41,15 +33,11 @@ shape."""
 ROUND = 0.1
 """Roundness of such a component under which it is kept as it is: it is as flat as a leaf, and its two sides
 would pass through each other."""
-AIM = 0.97
-"""Share of the most faces that is aimed at, for the number that a length of edges leads to varies by some percent."""
 MOST_FACES = 40_000_000
 """Faces over which edges are refused as too short: they would take some 16 gigabytes."""
 MORE = 1.3
 """Factor between the numbers of faces that are tried where fewer were asked for than can be: how much too large the one
 may be that is named."""
-COARSER = 12
-"""Most rounds in which edges become longer until there are no more faces than asked for."""
 
 
 @dataclass(frozen=True)
@@ -146,19 +134,18 @@ def remesh(
     if most is not None and most < len(mesh.faces):
         mesh, left_out = without_specks(mesh, most)
         crossing = None if left_out.pieces else crossing
-    ground, best = _ground(mesh, edge, most), None
-    found = np.zeros(len(mesh.vertices), np.bool_)
-    for _ in range(TRIES):
-        making = _made(ground, found, most or np.inf, threads, progress)
-        made, under = making.mesh()
+    ground, best = _ground(mesh, edge, most, threads), None
+    found, limit = np.zeros(len(mesh.vertices), np.bool_), most or (len(mesh.faces) if edge is None else np.inf)
+    made, under, crosses = made_even(ground, found, limit, threads, progress)
+    for tried in range(TRIES):
         if most is not None and len(made.faces) > most:
             break  # what is kept takes more faces still
-        crosses = self_intersections(made, threads=threads)
         if best is None or crosses.sum() < best.crossing.sum():
-            best = Remeshed(made, crosses, even_edge(made, len(made.faces)), int(found.sum()), mesh, left_out)
-        if not crosses.any():
+            best = Remeshed(made, crosses, usual_edge(made, threads), int(found.sum()), mesh, left_out)
+        if not crosses.any() or tried == TRIES - 1:
             break
         found = found | _under(ground, made, under, crosses)
+        made, under, crosses = made_anew(ground, found, (made, under, crosses), limit, threads, progress)
     progress("remesh", ROUNDS, ROUNDS)
     if best is None or not _is_like(best.mesh, mesh, like):
         if most is None:
@@ -167,7 +154,7 @@ def remesh(
     if best.crossing.any() and (most is None or len(mesh.faces) <= most):
         crosses = self_intersections(mesh, threads=threads) if crossing is None else crossing
         if crosses.sum() < best.crossing.sum():
-            return Remeshed(mesh, crosses, even_edge(mesh, len(mesh.faces)), len(mesh.vertices), mesh, left_out)
+            return Remeshed(mesh, crosses, usual_edge(mesh, threads), len(mesh.vertices), mesh, left_out)
     return best
 
 
@@ -186,8 +173,9 @@ def _too_few(mesh: TriMesh, most: int, made: TriMesh, like: float, threads: int,
     share, enough = share_of(made, mesh), max(len(made.faces), int(MORE * most))
     while enough < len(mesh.faces):
         kept, _ = without_specks(mesh, enough)
-        making = _made(_ground(kept, None, enough), np.zeros(len(kept.vertices), np.bool_), enough, threads, progress)
-        found, _ = making.mesh()
+        found, _, _ = made_even(
+            _ground(kept, None, enough, threads), np.zeros(len(kept.vertices), np.bool_), enough, threads, progress
+        )
         if len(found.faces) <= enough and _is_like(found, kept, like):
             break
         enough = max(len(found.faces), int(MORE * enough))
@@ -215,7 +203,7 @@ def _require_room(mesh: TriMesh, edge: float | None) -> None:
     ResourceError
         Naming how many faces there would be, and which edges would do.
     """
-    area = float(mesh.face_areas.sum())
+    area = area_of(mesh) if edge is not None else 0.0
     if edge is not None and area > MOST_FACES * EVEN * edge**2:
         raise ResourceError(
             "edges so short make too many faces", found=f"--edge = {edge:g}, {area / (EVEN * edge**2):.3g} faces",
@@ -228,49 +216,16 @@ def faces_under(made: TriMesh, before: TriMesh, threads: int = 0) -> NDArray[np.
     return Tree.of_faces(before).nearest(made.corners.mean(axis=1), threads=threads)[1]
 
 
-def _ground(mesh: TriMesh, edge: float | None, most: int | None) -> Ground:
+def _ground(mesh: TriMesh, edge: float | None, most: int | None, threads: int) -> Ground:
     """Look at the surface, and choose lengths of edges for as many faces as there are, or are asked for, at most."""
-    usual = edge or even_edge(mesh, min(len(mesh.faces), most or len(mesh.faces)))
-    ground = Ground.of(mesh, usual)
+    area = area_of(mesh, threads)
+    usual = edge or even_edge(area, min(len(mesh.faces), most or len(mesh.faces)))
+    ground = Ground.of(mesh, usual, threads)
     if edge is not None and most is None:
-        return ground.scaled(edge / even_edge(mesh, ground.forecast())).with_specks(SPECK, ROUND)
+        return ground.scaled(edge / even_edge(area, ground.forecast())).with_specks(SPECK, ROUND)
     fewest = min(len(mesh.faces), AIM * (most or np.inf))
     ground = ground.scaled(max(ground.forecast() / fewest, 1.0) ** 0.5)
     return ground if most is not None else ground.with_specks(SPECK, ROUND)
-
-
-def _made(ground: Ground, kept: Marks, most: float, threads: int, progress: Progress) -> Making:
-    """Go round after round, and on with longer edges while there are too many faces."""
-    making = Making(ground, kept, threads)
-    for count in range(ROUNDS):
-        progress("remesh", count, ROUNDS + 1)
-        if _round(making) < FEW:
-            break
-    _move(making, LAST)
-    for count in range(COARSER):
-        if len(making.faces) <= most:
-            break
-        progress("remesh", ROUNDS + count, ROUNDS + COARSER)
-        ground = ground.scaled((len(making.faces) / (AIM * most)) ** 0.5)
-        making.rescaled(ground)
-        _round(making)
-        _move(making, LAST)
-    making.lift()
-    return making
-
-
-def _round(making: Making) -> float:
-    """Change edges and move vertices; return the splits and collapses a vertex."""
-    changes = making.split() + making.collapse()
-    making.flip()
-    _move(making, 1)
-    return changes / making.vertices
-
-
-def _move(making: Making, times: int) -> None:
-    for _ in range(times):
-        making.move()
-        making.flip()
 
 
 def _under(ground: Ground, made: TriMesh, under: NDArray[np.int32], marked: Marks) -> Marks:

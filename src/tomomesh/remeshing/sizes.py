@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.remeshing.ground import find_bends, grade_sizes, mix_normals
+from ..kernels.remeshing.surface import find_bends, grade_sizes, mix_normals, vertex_normals
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..model.mesh import TriMesh
+    Floats = NDArray[np.float64]
 
 SAG = 0.015
 """How far the middle of a face may lie from the surface, in edges, where the surface bends."""
@@ -24,7 +24,7 @@ ROUNDS = 2
 steps of one voxel count for little."""
 
 
-def wanted_sizes(mesh: TriMesh, faces: NDArray[np.int32], edge: float) -> NDArray[np.float64]:
+def wanted_sizes(vertices: Floats, faces: NDArray[np.int32], normals: Floats, areas: Floats, edge: float) -> Floats:
     """Return the length that edges should have at each vertex, (n,).
 
     An edge of length L on a surface of curvature k leaves the middle of its face k L^2 / 6 off the surface (Dunyach
@@ -32,20 +32,21 @@ def wanted_sizes(mesh: TriMesh, faces: NDArray[np.int32], edge: float) -> NDArra
 
     Parameters
     ----------
-    mesh : TriMesh
+    vertices : (n, 3) float array
     faces : (m, 3) int32 array
-        Its own.
+    normals, areas : (m, 3), (m,) float arrays
+        Of the faces.
     edge : float
         Where the surface is as usual.
     """
-    normals = mesh.vertex_normals
+    mean, mixed = np.empty_like(vertices), np.empty_like(vertices)
+    vertex_normals(faces, normals, areas, mean)
     for _ in range(ROUNDS):
-        mixed = np.empty_like(normals)
-        mix_normals(faces, normals, mixed)
-        normals = mixed
-    bends = np.empty(len(normals))
-    find_bends(mesh.vertices, faces, normals, bends)
+        mix_normals(faces, mean, mixed)
+        mean, mixed = mixed, mean
+    bends = np.empty(len(mean))
+    find_bends(vertices, faces, mean, bends)
     flat = 6 * SAG * edge / (LONGEST * edge) ** 2
     sizes = np.maximum(np.sqrt(6 * SAG * edge / np.maximum(bends, flat)), SHORTEST * edge)
-    grade_sizes(mesh.vertices, faces, sizes, SLOPE)
+    grade_sizes(vertices, faces, sizes, SLOPE)
     return sizes

@@ -1,7 +1,4 @@
-"""Edges of a mesh in the making that are too short collapse. See `tomomesh.kernels.remeshing.links`.
-
-Every loop goes over half edges from `start` to `stop`, one of each pair, in their order.
-"""
+"""Edges of a mesh in the making that are too short collapse. See `tomomesh.kernels.remeshing.links`."""
 
 from __future__ import annotations
 
@@ -10,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compile import kernel
-from .links import CREASE, FIXED, KEPT, LONG, POOR, SHORT, after, before, face_shape, shapes_around, squared_length
+from .lengths import TOO_SHORT, class_of
+from .links import CREASE, FIXED, KEPT, LONG, POOR, after, before, face_shape, shapes_around
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -56,9 +54,9 @@ def may_collapse(
     return bool(common == 2)
 
 
-@kernel("b1(f8[:,::1], i4[::1], i4[::1], f8[:,::1], i4[::1], i8, f8[::1], f8)")
+@kernel("b1(f8[:,::1], i4[::1], i4[::1], f8[:,::1], i8, f8[::1], f8)")
 def keeps_shape(
-    places: Floats, corners: Ints, twins: Ints, normals: Floats, under: Ints, half: int, target: Floats, size: float
+    places: Floats, corners: Ints, twins: Ints, ups: Floats, half: int, target: Floats, size: float
 ) -> bool:
     """Tell whether the faces around the start of a half edge stay as good, but for the two beside it, as it moves."""
     x, y, z, most = target[0], target[1], target[2], LONG * size
@@ -75,7 +73,7 @@ def keeps_shape(
     u, v = corners[half], corners[twins[half]]
     _, _, _, one = face_shape(places, u, v, corners[before(half)])
     _, _, _, two = face_shape(places, v, u, corners[before(twins[half])])
-    was, now = shapes_around(places, corners, twins, normals, under, first, last, x, y, z)
+    was, now = shapes_around(places, corners, twins, ups, first, last, x, y, z)
     return bool(now >= min(was, one, two, POOR))
 
 
@@ -109,23 +107,21 @@ def collapse(corners: Ints, twins: Ints, outs: Ints, valence: Ints, sharp: Bools
 
 
 @kernel(
-    "i8(f8[:,::1], i4[::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], i4[::1], f8[:,::1], i4[::1], i8, i8)"
+    "i8(f8[:,::1], i4[::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], f8[:,::1], i4[::1], i8[::1], i8, i8)"
 )
 def collapse_edges(
     places: Floats, corners: Ints, twins: Ints, outs: Ints, valence: Ints, kinds: Bytes, sharp: Bools, sizes: Floats,
-    under: Ints, normals: Floats, stamps: Ints, start: int, stop: int,
+    ups: Floats, stamps: Ints, short: NDArray[np.int64], start: int, stop: int,
 ) -> int:  # fmt: skip
-    """Collapse edges that are too short, where the surface stays what it is and no face gets worse than it may."""
+    """Collapse edges that are too `short`, where the surface stays what it is and no face gets worse than it may."""
     made = 0
     target = np.empty(3)
-    for half in range(start, stop):
+    for n in range(start, stop):
+        half = short[n]
         other = twins[half]
-        if corners[half] < 0 or other < half:
+        if corners[half] < 0 or class_of(places, corners, kinds, sizes, half) != TOO_SHORT:
             continue
         u, v = corners[half], corners[other]
-        least = SHORT * 0.5 * (sizes[u] + sizes[v])
-        if squared_length(places, u, v) >= least * least:
-            continue
         if kinds[u] > kinds[v]:
             half, other, u, v = other, half, v, u
         if not may_collapse(corners, twins, outs, valence, kinds, sharp, stamps, half):
@@ -134,9 +130,9 @@ def collapse_edges(
         for axis in range(3):
             target[axis] = places[u, axis] + share * (places[v, axis] - places[u, axis])
         size = sizes[v] if share == 1.0 else 0.5 * (sizes[u] + sizes[v])
-        if not keeps_shape(places, corners, twins, normals, under, half, target, size):
+        if not keeps_shape(places, corners, twins, ups, half, target, size):
             continue
-        if share < 1.0 and not keeps_shape(places, corners, twins, normals, under, other, target, size):
+        if share < 1.0 and not keeps_shape(places, corners, twins, ups, other, target, size):
             continue
         for axis in range(3):
             places[v, axis] = target[axis]

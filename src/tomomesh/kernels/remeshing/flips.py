@@ -65,10 +65,10 @@ def flip(corners: Ints, twins: Ints, outs: Ints, valence: Ints, sharp: Bools, ha
     valence[d] += 1
 
 
-@kernel("i8(f8[:,::1], i4[::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], i4[::1], f8[:,::1], i8, i8)")
+@kernel("i8(f8[:,::1], i4[::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], f8[:,::1], i8, i8)")
 def flip_edges(
     places: Floats, corners: Ints, twins: Ints, outs: Ints, valence: Ints, kinds: Bytes, sharp: Bools, sizes: Floats,
-    under: Ints, normals: Floats, start: int, stop: int,
+    ups: Floats, start: int, stop: int,
 ) -> int:  # fmt: skip
     """Flip edges where that makes the smallest angle of the two faces beside it larger."""
     made = 0
@@ -94,7 +94,7 @@ def flip_edges(
         ox, oy, oz = px + qx, py + qy, pz + qz
         if not (upright(ox, oy, oz, rx, ry, rz) and upright(ox, oy, oz, sx, sy, sz)):
             continue
-        if not (faces_out(normals, under, c, a, d, rx, ry, rz) and faces_out(normals, under, d, b, c, sx, sy, sz)):
+        if not (faces_out(ups, c, a, d, rx, ry, rz) and faces_out(ups, d, b, c, sx, sy, sz)):
             continue
         size = np.sqrt(ox * ox + oy * oy + oz * oz)
         # twice the area of the four corners' shadow, times the distance of the two diagonals

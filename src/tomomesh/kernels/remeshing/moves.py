@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compile import kernel
-from .links import CREASE, FREE, POOR, TINY, after, before, face_shape, shapes_around
+from .ground import walk, walk_along
+from .links import CREASE, FREE, POOR, TINY, UPRIGHT, after, before, face_shape, shapes_around
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,89 +18,135 @@ if TYPE_CHECKING:
     Bytes = NDArray[np.uint8]
     Bools = NDArray[np.bool_]
 
+OVER = 1.5
+"""How far a vertex is lifted over what its own faces ask for: its neighbors' lifts come on top (successive
+over-relaxation). Chosen: with 1 it takes a round more to as small an error of the volume, with 2 some swing."""
 
-@kernel("void(f8[:,::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], f8[:,::1], i8, i8)")
+
+@kernel("void(f8[:,::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], i8, f8[::1])")
 def relax(
-    places: Floats, corners: Ints, twins: Ints, outs: Ints, kinds: Bytes, sharp: Bools, sizes: Floats, moved: Floats,
-    start: int, stop: int,
+    places: Floats, corners: Ints, twins: Ints, outs: Ints, kinds: Bytes, sharp: Bools, sizes: Floats, v: int,
+    place: Floats,
 ) -> None:  # fmt: skip
-    """Find where vertices (n, 3) lie evenly among their neighbors, within the surface or along a crease."""
+    """Find where a vertex lies evenly among its neighbors, within the surface or along a crease."""
+    sx = sy = sz = total = mx = my = mz = 0.0
+    place[0], place[1], place[2] = places[v, 0], places[v, 1], places[v, 2]
+    first = turn = outs[v]
+    while True:
+        b, c = corners[after(turn)], corners[before(turn)]
+        if kinds[v] == FREE:
+            nx, ny, nz, _ = face_shape(places, v, b, c)
+            mx, my, mz = mx + nx, my + ny, mz + nz
+            size = sizes[v] + sizes[b] + sizes[c]
+            weight = np.sqrt(nx * nx + ny * ny + nz * nz) / (size * size)
+            sx += weight * (places[b, 0] + places[c, 0] + places[v, 0]) / 3.0
+            sy += weight * (places[b, 1] + places[c, 1] + places[v, 1]) / 3.0
+            sz += weight * (places[b, 2] + places[c, 2] + places[v, 2]) / 3.0
+            total += weight
+        elif sharp[turn]:
+            sx, sy, sz = sx + places[b, 0], sy + places[b, 1], sz + places[b, 2]
+            total += 1.0
+        turn = twins[before(turn)]
+        if turn == first:
+            break
+    if total <= TINY:
+        return
+    dx, dy, dz = sx / total - places[v, 0], sy / total - places[v, 1], sz / total - places[v, 2]
+    if kinds[v] == FREE:
+        along = (dx * mx + dy * my + dz * mz) / max(mx * mx + my * my + mz * mz, TINY)
+        dx, dy, dz = dx - along * mx, dy - along * my, dz - along * mz
+    place[0], place[1], place[2] = places[v, 0] + dx, places[v, 1] + dy, places[v, 2] + dz
+
+
+@kernel("b1(f8[:,::1], i4[::1], i4[::1], i8, f8, f8, f8, f8, f8, f8)")
+def all_good(
+    places: Floats, corners: Ints, twins: Ints, first: int, x: float, y: float, z: float, ux: float, uy: float,
+    uz: float,
+) -> bool:  # fmt: skip
+    """Tell whether all faces around a vertex have no poor angle, and turn little from a normal, if it is at a place."""
+    turn = first
+    b = corners[after(turn)]
+    bx, by, bz = places[b, 0] - x, places[b, 1] - y, places[b, 2] - z
+    bb = bx * bx + by * by + bz * bz
+    while True:
+        side = before(turn)
+        c = corners[side]
+        cx, cy, cz = places[c, 0] - x, places[c, 1] - y, places[c, 2] - z
+        cc = cx * cx + cy * cy + cz * cz
+        bc = bx * cx + by * cy + bz * cz
+        nn = bb * cc - bc * bc
+        aa = bb + cc - 2.0 * bc
+        nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+        up = nx * ux + ny * uy + nz * uz
+        if not (up > 0.0 and up * up >= UPRIGHT * nn and nn >= POOR * max(bb * cc, bb * aa, cc * aa)):
+            return False
+        turn = twins[side]
+        if turn == first:
+            return True
+        bx, by, bz, bb = cx, cy, cz, cc
+
+
+@kernel("b1(f8[:,::1], i4[::1], i4[::1], i4[::1], f8[:,::1], i8, f8[::1])")
+def may_move(places: Floats, corners: Ints, twins: Ints, outs: Ints, ups: Floats, v: int, place: Floats) -> bool:
+    """Tell whether no face turns over, or gets a smaller angle than a poor one, as a vertex goes to a place."""
+    first = outs[v]
+    if all_good(
+        places, corners, twins, first, place[0], place[1], place[2], ups[v, 0], ups[v, 1], ups[v, 2]
+    ):  # fmt: skip
+        return True
+    was, now = shapes_around(places, corners, twins, ups, first, after(twins[first]), place[0], place[1], place[2])
+    return bool(now >= min(was, POOR))
+
+
+@kernel(
+    "void(f8[:,::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], i4[::1], f8[:,::1], f8[:,::1], i4[:,::1], "
+    "b1[:,::1], i4[::1], i4[::1], i4[::1], f8[:,::1], f8[::1], i8, i8)"
+)
+def move_vertices(
+    places: Floats, corners: Ints, twins: Ints, outs: Ints, kinds: Bytes, sharp: Bools, sizes: Floats, under: Ints,
+    ups: Floats, surface: Floats, faces: Ints, creases: Bools, across: Ints, fans: Ints, first: Ints, normals: Floats,
+    wanted: Floats, start: int, stop: int,
+) -> None:  # fmt: skip
+    """Move vertices, one after the other, evenly among their neighbors and along the surface before."""
+    spare, place, aim = np.empty(3), np.empty(3), np.empty(3)
     for v in range(start, stop):
-        for axis in range(3):
-            moved[v, axis] = places[v, axis]
         if outs[v] < 0 or kinds[v] > CREASE:
             continue
-        sx = sy = sz = total = mx = my = mz = 0.0
-        first = turn = outs[v]
-        while True:
-            b, c = corners[after(turn)], corners[before(turn)]
-            if kinds[v] == FREE:
-                nx, ny, nz, _ = face_shape(places, v, b, c)
-                mx, my, mz = mx + nx, my + ny, mz + nz
-                size = sizes[v] + sizes[b] + sizes[c]
-                weight = np.sqrt(nx * nx + ny * ny + nz * nz) / (size * size)
-                sx += weight * (places[b, 0] + places[c, 0] + places[v, 0]) / 3.0
-                sy += weight * (places[b, 1] + places[c, 1] + places[v, 1]) / 3.0
-                sz += weight * (places[b, 2] + places[c, 2] + places[v, 2]) / 3.0
-                total += weight
-            elif sharp[turn]:
-                sx, sy, sz = sx + places[b, 0], sy + places[b, 1], sz + places[b, 2]
-                total += 1.0
-            turn = twins[before(turn)]
-            if turn == first:
-                break
-        if total <= TINY:
+        relax(places, corners, twins, outs, kinds, sharp, sizes, v, aim)
+        if kinds[v] == CREASE:
+            face = walk_along(aim[0], aim[1], aim[2], surface, faces, creases, fans, first, under[v], spare, place)
+        else:
+            face = walk(aim[0], aim[1], aim[2], surface, faces, across, fans, first, under[v], spare, place)
+        if face < 0 or not may_move(places, corners, twins, outs, ups, v, place):
             continue
-        dx, dy, dz = sx / total - places[v, 0], sy / total - places[v, 1], sz / total - places[v, 2]
-        if kinds[v] == FREE:
-            along = (dx * mx + dy * my + dz * mz) / max(mx * mx + my * my + mz * mz, TINY)
-            dx, dy, dz = dx - along * mx, dy - along * my, dz - along * mz
-        moved[v, 0], moved[v, 1], moved[v, 2] = places[v, 0] + dx, places[v, 1] + dy, places[v, 2] + dz
+        under[v] = face
+        sizes[v] = (wanted[faces[face, 0]] + wanted[faces[face, 1]] + wanted[faces[face, 2]]) / 3.0
+        for axis in range(3):
+            places[v, axis], ups[v, axis] = place[axis], normals[face, axis]
 
 
-@kernel("void(f8[:,::1], i4[::1], i4[::1], i4[::1], u1[::1], f8[::1], f8[:,::1], i8, i8)")
-def lift(
-    places: Floats, corners: Ints, twins: Ints, outs: Ints, kinds: Bytes, sags: Floats, moved: Floats,
+@kernel("void(f8[:,::1], i4[::1], i4[::1], i4[::1], u1[::1], f8[:,::1], f8[:,::1], i8, i8)")
+def lift_vertices(
+    places: Floats, corners: Ints, twins: Ints, outs: Ints, kinds: Bytes, ups: Floats, goals: Floats,
     start: int, stop: int,
 ) -> None:  # fmt: skip
-    """Find where vertices (n, 3) go by the mean sag of the faces around each, along their normal."""
+    """Move vertices, one after the other, along their normal until the faces around each pass by their goals (m, 3)."""
+    place = np.empty(3)
     for v in range(start, stop):
-        for axis in range(3):
-            moved[v, axis] = places[v, axis]
         if outs[v] < 0 or kinds[v] != FREE:
             continue
         mx = my = mz = total = area = 0.0
+        x, y, z = places[v, 0], places[v, 1], places[v, 2]
         first = turn = outs[v]
         while True:
             nx, ny, nz, _ = face_shape(places, v, corners[after(turn)], corners[before(turn)])
-            size = np.sqrt(nx * nx + ny * ny + nz * nz)
-            mx, my, mz, area = mx + nx, my + ny, mz + nz, area + size
-            total += size * sags[turn // 3]
+            mx, my, mz, area = mx + nx, my + ny, mz + nz, area + np.sqrt(nx * nx + ny * ny + nz * nz)
+            f = turn // 3
+            total += nx * (goals[f, 0] - x) + ny * (goals[f, 1] - y) + nz * (goals[f, 2] - z)
             turn = twins[before(turn)]
             if turn == first:
                 break
-        along = total / max(area * np.sqrt(mx * mx + my * my + mz * mz), TINY)
-        moved[v, 0], moved[v, 1], moved[v, 2] = (
-            moved[v, 0] + along * mx,
-            moved[v, 1] + along * my,
-            moved[v, 2] + along * mz,
-        )
-
-
-@kernel("i8(f8[:,::1], i4[::1], i4[::1], i4[::1], u1[::1], f8[:,::1], i4[::1], f8[:,::1], i8, i8)")
-def accept(
-    places: Floats, corners: Ints, twins: Ints, outs: Ints, kinds: Bytes, normals: Floats, under: Ints, moved: Floats,
-    start: int, stop: int,
-) -> int:  # fmt: skip
-    """Move vertices, one after the other, where no face turns over or gets a smaller angle than a poor one."""
-    refused = 0
-    for v in range(start, stop):
-        if outs[v] < 0 or kinds[v] > CREASE:
-            continue
-        x, y, z = moved[v, 0], moved[v, 1], moved[v, 2]
-        was, now = shapes_around(places, corners, twins, normals, under, outs[v], after(twins[outs[v]]), x, y, z)
-        if now >= min(was, POOR):
-            places[v, 0], places[v, 1], places[v, 2] = x, y, z
-        else:
-            refused += 1
-    return refused
+        along = OVER * total / max(area * np.sqrt(mx * mx + my * my + mz * mz), TINY)
+        place[0], place[1], place[2] = places[v, 0] + along * mx, places[v, 1] + along * my, places[v, 2] + along * mz
+        if may_move(places, corners, twins, outs, ups, v, place):
+            places[v, 0], places[v, 1], places[v, 2] = place[0], place[1], place[2]

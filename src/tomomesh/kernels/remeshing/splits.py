@@ -1,14 +1,12 @@
-"""Edges of a mesh in the making that are too long are split. See `tomomesh.kernels.remeshing.links`.
-
-Edges are marked at the first of their half edges, and split in the order of these.
-"""
+"""Edges of a mesh in the making that are too long are split. See `tomomesh.kernels.remeshing.links`."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from ..compile import kernel
-from .links import CREASE, FREE, KEPT, LONG, after, before, squared_length
+from .lengths import TOO_LONG, class_of
+from .links import CREASE, FREE, after, before, squared_length
 
 if TYPE_CHECKING:
     import numpy as np
@@ -18,23 +16,6 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int32]
     Bytes = NDArray[np.uint8]
     Bools = NDArray[np.bool_]
-
-
-@kernel("b1(f8[:,::1], i4[::1], u1[::1], f8[::1], i8)")
-def is_long(places: Floats, corners: Ints, kinds: Bytes, sizes: Floats, half: int) -> bool:
-    """Tell whether an edge is too long, and may be split."""
-    u, v = corners[half], corners[after(half)]
-    most = LONG * 0.5 * (sizes[u] + sizes[v])
-    return bool(squared_length(places, u, v) > most * most and not kinds[u] == KEPT == kinds[v])
-
-
-@kernel("void(f8[:,::1], i4[::1], i4[::1], u1[::1], f8[::1], b1[::1], i8, i8)")
-def mark_long(
-    places: Floats, corners: Ints, twins: Ints, kinds: Bytes, sizes: Floats, marks: Bools, start: int, stop: int
-) -> None:
-    """Mark the edges that are too long, each at the first of its half edges."""
-    for half in range(start, stop):
-        marks[half] = corners[half] >= 0 and twins[half] > half and is_long(places, corners, kinds, sizes, half)
 
 
 @kernel("b1(f8[:,::1], i4[::1], i8)")
@@ -62,22 +43,23 @@ def split_face(corners: Ints, twins: Ints, outs: Ints, sharp: Bools, half: int, 
 
 
 @kernel(
-    "void(f8[:,::1], i4[::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], i4[::1], i8[::1], b1[::1], "
-    "i8[::1], i8, i8)"
+    "void(f8[:,::1], i4[::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], i4[::1], f8[:,::1], i8[::1], "
+    "u1[::1], i8[::1], i8, i8)"
 )
 def split_edges(
     places: Floats, corners: Ints, twins: Ints, outs: Ints, valence: Ints, kinds: Bytes, sharp: Bools, sizes: Floats,
-    under: Ints, counts: NDArray[np.int64], marks: Bools, long: NDArray[np.int64], start: int, stop: int,
+    under: Ints, ups: Floats, counts: NDArray[np.int64], marks: Bytes, long: NDArray[np.int64], start: int, stop: int,
 ) -> None:  # fmt: skip
-    """Split edges that were marked as too `long`, for which there is room, and mark those that are too long then."""
+    """Split edges that were marked as too `long`, for which there is room, and mark the edges around anew."""
     for n in range(start, stop):
         half = long[n]
         other = twins[half]
-        if not (marks[half] and is_longest(places, corners, half) and is_longest(places, corners, other)):
+        if not (marks[half] == TOO_LONG and is_longest(places, corners, half) and is_longest(places, corners, other)):
             continue
         u, v, m, g = corners[half], corners[after(half)], counts[0], counts[1]
         for axis in range(3):
             places[m, axis] = 0.5 * (places[u, axis] + places[v, axis])
+            ups[m, axis] = ups[u, axis]
         sizes[m] = 0.5 * (sizes[u] + sizes[v])
         under[m] = under[u]
         kinds[m] = CREASE if sharp[half] else FREE
@@ -95,4 +77,4 @@ def split_edges(
         for face in (half // 3, other // 3, g, g + 1):
             for side in range(3 * face, 3 * face + 3):
                 if twins[side] >= 0:
-                    marks[min(side, twins[side])] = is_long(places, corners, kinds, sizes, side)
+                    marks[min(side, twins[side])] = class_of(places, corners, kinds, sizes, side)
