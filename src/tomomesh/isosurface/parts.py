@@ -27,12 +27,16 @@ BESIDE = 4
 """Slices on each side that tell how what a voxel holds varies within it."""
 
 
-def parts_within(content: Content, index: Index, columns: Index, times: int, threads: int = 0) -> Values:
+def parts_within(
+    content: Content, mixed: NDArray[np.bool_], index: Index, columns: Index, times: int, threads: int = 0
+) -> Values:
     """Tell what is in the parts of voxels, from what these hold and what those around do.
 
     Parameters
     ----------
     content : Content
+    mixed : (K, J, I) bool array
+        Voxels of which parts may hold either of two levels; of others they stay between what the 27 around hold.
     index : (K, J, I) int32 array
         The column of each voxel; -1 where it is not divided.
     columns : (m, 3) int32 array
@@ -49,8 +53,8 @@ def parts_within(content: Content, index: Index, columns: Index, times: int, thr
     whole, size = content.whole, len(columns)
     low, high = np.empty(size, np.float32), np.empty(size, np.float32)
     in_blocks(lambda a, b: ranges_around(whole, columns, low, high, a, b), size, block=BLOCK, threads=threads)
-    for level in (content.inner, content.outer):
-        low, high = np.fmin(low, np.float32(level)), np.fmax(high, np.float32(level))
+    either, levels = mixed[tuple(columns.T)], np.sort(np.array((content.inner, content.outer), np.float32))
+    low[either], high[either] = levels
     parts = smooth_parts(whole, columns, times)
     for _ in range(ROUNDS):
         moved = np.empty_like(parts)

@@ -28,6 +28,8 @@ is that ratio, rounded, and from there on it is two."""
 MOST_PARTS = 16
 """Parts of a voxel at most, so that the thin voxels of a window, a byte each, stay bounded. Chosen: slices of 4 mm on
 pixels of .25 mm have as many; half leaves their parts twice as high as wide, twice changes thicker slices alone."""
+AROUND = np.ones((3, 3, 3), np.bool_)
+"""A voxel and those that touch it."""
 
 
 @dataclass(frozen=True)
@@ -139,21 +141,22 @@ def thinned(levels: Levels, mask: Mask, affine: NDArray[np.float64], threads: in
     turned = np.ascontiguousarray(np.moveaxis(mask, axis, 0))
     content = content_of(levels, mask, turned, axis, threads)
     whole, bounds = content.whole, content.bounds
-    columns = _divided(turned, content, times)
+    mixed = _mixed(turned, content, times)
+    columns = _divided(turned, whole, mixed)
     if not len(columns):
         return None
     index = np.full(turned.shape, -1, np.int32)
     index[tuple(columns.T)] = np.arange(len(columns), dtype=np.int32)
-    parts = parts_within(content, index, columns, times, threads)
+    parts = parts_within(content, mixed, index, columns, times, threads)
     thin = Levels(Columns(whole, index, parts, axis), bounds.lower, bounds.upper)
-    kept = np.moveaxis(_kept(bounds, turned, whole, columns, parts), 0, axis)
+    kept = np.moveaxis(_kept(content, turned, columns, parts), 0, axis)
     fine = _finer(affine, along, times)
     return Thinned(thin, np.ascontiguousarray(kept), fine, times, content.of_mask, content.bending)
 
 
-def _divided(mask: Mask, content: Content, times: int) -> Index:
-    """Return the voxels (m, 3) that are divided: those beside the border, if all levels around are known."""
-    beside, known = beside_border(mask) | _mixed(mask, content, times), np.isfinite(content.whole)
+def _divided(mask: Mask, whole: Values, mixed: Mask) -> Index:
+    """Return the voxels (m, 3) that are divided: mixed and beside the border, if all levels around are known."""
+    beside, known = beside_border(mask) | mixed, np.isfinite(whole)
     if not known.all():
         beside &= known & ~beside_border(known)
     return np.ascontiguousarray(np.argwhere(beside), np.int32)
@@ -162,25 +165,27 @@ def _divided(mask: Mask, content: Content, times: int) -> Index:
 def _mixed(mask: Mask, content: Content, times: int) -> Mask:
     """Tell which voxels hold enough of both of two levels to fill a part, and hang together with those that are kept.
 
-    What touches a voxel of the window that was left out belongs to that.
+    What is three voxels thick holds a level of its own; what touches a voxel of the window that was left out belongs
+    to that.
     """
     mixed = content.mixed(times)
     if not mixed.any():
         return mixed
+    mixed &= ~ndimage.binary_opening(mixed, AROUND)
     left_out = content.bounds.kept(content.whole) & ~mask
     if left_out.any():
-        mixed &= ~ndimage.binary_dilation(left_out, np.ones((3, 3, 3), np.bool_))
-    pieces, count = ndimage.label(mask | mixed, np.ones((3, 3, 3), np.bool_))
+        mixed &= ~ndimage.binary_dilation(left_out, AROUND)
+    pieces, count = ndimage.label(mask | mixed, AROUND)
     kept = np.zeros(count + 1, np.bool_)
     kept[pieces[mask]] = True
     return np.asarray(mixed & kept[pieces])
 
 
-def _kept(bounds: Levels, mask: Mask, whole: Values, columns: Index, parts: Values) -> Mask:
+def _kept(content: Content, mask: Mask, columns: Index, parts: Values) -> Mask:
     """Tell which thin voxels are kept: of voxels that were left out, or filled, all parts as they were."""
     place = tuple(columns.T)
-    inside = bounds.kept(parts)
-    as_before = bounds.kept(whole[place]) != mask[place]
+    inside = content.kept(parts)
+    as_before = content.bounds.kept(content.whole[place]) != mask[place]
     inside[as_before] = mask[place][as_before][:, None]
     thin = np.repeat(mask[:, None], parts.shape[1], axis=1)
     k, j, i = place
