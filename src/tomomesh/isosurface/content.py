@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 RAMP, SHARPEST = 1 / 3, 5.0
 """Share of a border's height between two pixels where it is a ramp over four, the least sharp that can be told; and
-the greatest sharpness. Chosen: half of the latter changes the distance of partial volumes by +4 %, twice by -0.5 %, and
+the greatest sharpness. Chosen: half of the latter changes the distance of partial volumes by +7 %, twice by -0.6 %, and
 turns 7 % more."""
 OF_MASK = 2.0
 """Sharpness of what comes from a mask, which tells nothing of it. Chosen: half changes the distance by +11 %, twice by
@@ -31,8 +31,8 @@ as after a windowed sinc filter: half changes the distance by -1 % and the turns
 there are two levels, it is as stiff as around a mask, whose steps it shall not follow either."""
 ALIKE, FEWEST = 0.01, 100
 """Share of a border's height by which the middle half of its ends may differ where there are two levels, and at how
-many places at least. Measured: partial volumes of labels differ by 0, a CT's skin by .04, other studies by .1 and more.
-Chosen: half and twice change nothing; at .05 a CT's skin has 671 pieces in place of 4, of what foam and sinuses hold."""
+many places at least. Measured: partial volumes of labels differ by 0, a CT's skin by .04, other studies by .1 and
+more. Chosen: half and twice change nothing; at .05 a CT's skin has 671 pieces in place of 4, of foam and sinuses."""
 UPRIGHT = 90
 """Percentile of the shares that tells how sharp borders are: where they slant, pixels hold a part of both sides, and
 look less sharp than they are. Chosen: 75 and 95 change the distance by 1 % at most; 75 turns 16 % more on partial

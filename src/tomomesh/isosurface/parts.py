@@ -20,11 +20,13 @@ if TYPE_CHECKING:
     Index = NDArray[np.int32]
 
 ROUNDS = 3
-"""Times that the parts follow their neighbors."""
+"""Times that the parts follow their neighbors. Chosen on slabs of two label heads and of an MR, as the other numbers
+here: one changes the distance to the thin study by +3 to +12 %, six by -0.3 to -2.5 %."""
 BLOCK = 4_000
 """Columns handled in one call: far below 100 ms."""
 BESIDE = 4
-"""Slices on each side that tell how what a voxel holds varies within it."""
+"""Slices on each side that tell how what a voxel holds varies within it. Chosen: half changes the distance by +0.3 %,
+six by -0.4 %."""
 
 
 def parts_within(
