@@ -46,7 +46,7 @@ def row(entry: Field[Any]) -> str:
     switch = meta["kind"] is bool
     spelled = [asked_by(entry)] if switch else spellings(entry.name)
     what = f"do not {meta['help']}" if switch and entry.default else meta["help"]
-    allowed = ", ".join(meta["choices"]) or f"{COUNTS[meta['length']]}{limits_of(entry)}"
+    allowed = ", ".join(map(str, meta["choices"])) or f"{COUNTS[meta['length']]}{limits_of(entry)}"
     default, paper = _value(entry.default), _value(meta["paper"])
     if switch:
         allowed, default, paper = "switch", "off", "" if meta["paper"] is UNSET else "given"

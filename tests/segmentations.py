@@ -137,3 +137,14 @@ def by_highdicom(masks: Masks, affine: NDArray[np.float64], path: Path, kind: st
 def written(masks: Masks, affine: NDArray[np.float64], path: Path, **options: Any) -> Path:
     """Write a segmentation frame by frame."""
     return save(segmentation(masks, affine, **options), path)
+
+
+def palette() -> Any:
+    """Return highdicom's colors for labels 0 to 255."""
+    import highdicom as hd
+
+    layers = [
+        hd.PaletteColorLUT(first_mapped_value=0, lut_data=np.arange(256, dtype=np.uint8)[::step], color=color)
+        for step, color in ((1, "red"), (-1, "green"), (1, "blue"))
+    ]
+    return hd.PaletteColorLUTTransformation(red_lut=layers[0], green_lut=layers[1], blue_lut=layers[2])

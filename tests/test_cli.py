@@ -139,6 +139,7 @@ class TestOtherCommands:
         assert main(["demo", "-o", str(folder)]) == 0
         names = {"mesh.stl", "points.ply", "labels.nii.gz", "truth.ply", "report.json", "settings.toml", "figures"}
         assert {path.name for path in folder.iterdir()} == names
+        assert trimesh.load(folder / "truth.ply").is_volume
         assert "truth" in json.loads((folder / "report.json").read_text())
         said = capsys.readouterr().out
         assert len(said.splitlines()) <= 15
@@ -156,7 +157,9 @@ class TestOtherCommands:
         line = ["network", region, "-o", str(tmp_path / "n"), "--network", network, "--neurons", "50", "--quiet"]
         assert main(line) == 0
         maps = {"02-maps.png"} if network == "grid" else set()
-        assert {path.name for path in (tmp_path / "n").iterdir()} == {"01-topologies.png", "02-network.png"} | maps
+        assert {path.name for path in (tmp_path / "n").iterdir()} == {
+            "01-topologies.png", "02-network.png", "02-learning.png", *maps,
+        }  # fmt: skip
 
     def test_inspect_suggests_windows(self, study: Path, capsys: CaptureFixture[str]) -> None:
         assert main(["inspect", str(study)]) == 0
@@ -182,7 +185,8 @@ class TestOtherCommands:
         assert main(["check", str(tmp_path / "good.ply"), "--against", str(tmp_path / "good.ply")]) == 0
         said = capsys.readouterr().out
         assert "closed, manifold, outward" in said
-        assert "to the other: mean 0" in said or re.search(r"mean \d(\.\d+)?e-", said)
+        assert "against   the other: Dice 1.0000" in said
+        assert re.search(r"mean +95 % +largest\n +to the other +(0|\d(\.\d+)?e-\d+) ", said)
         assert main(["check", str(tmp_path / "bad.ply")]) == 0
         assert "NOT sound: 3 boundary edges" in capsys.readouterr().out
 

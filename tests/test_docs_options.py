@@ -68,7 +68,7 @@ class TestFormats:
 
     def test_help_names_every_format(self) -> None:
         for command, option, suffixes in [
-            ("reconstruct", "--output", formats.MESH_FORMATS), ("reconstruct", "--points", formats.POINT_FORMATS),
+            ("reconstruct", "--output", formats.STUDY_MESH_FORMATS), ("reconstruct", "--points", formats.POINT_FORMATS),
             ("reconstruct", "--labels", formats.LABEL_FORMATS), ("segment", "--output", formats.POINT_FORMATS),
             ("surface", "--output", formats.MESH_FORMATS),
         ]:  # fmt: skip

@@ -39,10 +39,11 @@ OTHER: dict[str, Any] = {
 SOMETIMES = {*MATTERS, *(name for way in TABLE for name in way_of(way).reads)}
 """Parameters that are read on some ways alone, or beside some values of others alone."""
 ALWAYS = {
-    "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "level", "fill_chunks", "structure",
-    "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "keep", "slices", "way", "network",
-    "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow", "drain", "least_wall",
-    "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge",
+    "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "nifti_form", "level", "fill_chunks",
+    "structure", "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "fill_slices", "keep",
+    "slices", "way", "network", "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow",
+    "drain", "least_wall", "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge", "thickness",
+    "precision",
 }  # fmt: skip
 """Parameters that matter on every way, or that choose what is read, the way, or what becomes of the mesh."""
 STUDY: dict[str, dict[str, Any]] = {
@@ -201,6 +202,11 @@ class TestReport:
         told = reconstruct(ball(), lower=40.0, neurons=24, alpha=(0.3, 0.1), even=False).report["warnings"]
         assert told[0] == "--alpha has no effect with --training batch"
         assert not any("even" in one for one in told)
+
+    @pytest.mark.parametrize("way", ["voxels", "contours", "ring"])
+    def test_auto_written_out_asks_for_nothing(self, way: str) -> None:
+        told = reconstruct(ball(), lower=40.0, way=way, neurons="auto").report["warnings"]
+        assert not any("neurons" in one for one in told)
 
     def test_the_command_line_tells_options_but_no_settings_file(
         self, tmp_path: Path, capsys: CaptureFixture[str]

@@ -15,7 +15,7 @@ from tomomesh.cli import main
 from tomomesh.errors import FormatError, GeometryError, UnreadableError
 from tomomesh.io import read_volume
 from tomomesh.io.studies.folder import find_studies
-from tomomesh.io.volumes.nifti import UNPLACED
+from tomomesh.io.volumes.nifti_frame import UNPLACED
 from tomomesh.settings import ReadSettings
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from studies import AFFINES, SHEARED, TURNED, assert_in_place, sampled
-from tomomesh.errors import FormatError, GeometryError
+from tomomesh.errors import EmptyError, FormatError, GeometryError
 from tomomesh.io import read_volume
 from tomomesh.settings import ReadSettings
 from writers import assert_agrees, needed
@@ -100,6 +100,13 @@ class TestNrrd:
         assert_in_place(volume)
         assert "millimeters" in volume.notes[0]
 
+    def test_each_axis_of_the_space_has_its_own_unit(self, tmp_path: Path) -> None:
+        scaled = np.diag([1000, 1, 0.1, 1.0]) @ AFFINES["oblique"]
+        told = {"space units": ["um", "mm", "cm"]}
+        path = self.write(tmp_path / "s.nrrd", scaled, **told)
+        volume = read_volume(path)
+        np.testing.assert_allclose(volume.grid.affine, AFFINES["oblique"], atol=1e-9)
+
     def test_spacings_alone_are_taken_and_told(self, tmp_path: Path) -> None:
         path = self.write(
             tmp_path / "s.nrrd", AFFINES["axial"], space=None, **{
@@ -127,3 +134,112 @@ class TestNrrd:
         nrrd.write(str(tmp_path / "two.nrrd"), np.stack([stored.T] * 2), {**header, "kinds": ["list", *["domain"] * 3]})
         with pytest.raises(FormatError, match="several values"):
             read_volume(tmp_path / "two.nrrd")
+
+
+class TestHex:
+    @pytest.mark.parametrize("endian", ["little", "big"])
+    @pytest.mark.parametrize("line", [26, 64, 10**6])
+    def test_two_digits_a_byte(self, tmp_path: Path, endian: str, line: int) -> None:
+        affine = AFFINES["oblique"]
+        whole = TestNrrd().write(tmp_path / "s.nrrd", affine, encoding="raw", endian=endian).read_bytes()
+        head, _, data = whole.partition(b"\n\n")
+        digits = data.hex()
+        lines = "\n".join(digits[n : n + line] for n in range(0, len(digits), line))
+        (tmp_path / "h.nrrd").write_text(head.decode().replace("encoding: raw", "encoding: hex") + "\n\n" + lines)
+        volume = read_volume(tmp_path / "h.nrrd")
+        assert_in_place(volume)
+        judge, _ = needed("nrrd").read(str(tmp_path / "s.nrrd"))
+        np.testing.assert_array_equal(volume.grid.restore(volume.voxels), judge.T)
+
+    @pytest.mark.parametrize("digits", ["00" * 10, "0g" * 315 * 2, "0" * 630 * 2 + " 1"])
+    def test_too_few_and_no_digits_are_refused(self, tmp_path: Path, digits: str) -> None:
+        whole = TestNrrd().write(tmp_path / "s.nrrd", AFFINES["axial"], encoding="raw").read_bytes()
+        head = whole.partition(b"\n\n")[0].decode().replace("encoding: raw", "encoding: hex")
+        (tmp_path / "h.nrrd").write_text(head + "\n\n" + digits)
+        with pytest.raises(FormatError):
+            read_volume(tmp_path / "h.nrrd")
+
+
+BALL = np.linalg.norm(np.indices((12, 12, 12)) - 5.5, axis=0) < 5
+CORE = np.linalg.norm(np.indices((12, 12, 12)) - 5.5, axis=0) < 2.5
+SHELL = BALL & ~CORE
+
+
+def layered(path: Path, layers: list[NDArray[Any]], kind: str = "list", last: bool = False, **told: str) -> Path:
+    """Write layers of a segmentation as Slicer does, the layers fastest, or slowest."""
+    stored = np.stack(layers, axis=0 if last else -1).astype(np.uint8)
+    sizes, directions, kinds = ["12"] * 3, ["(1,0,0)", "(0,1,0)", "(0,0,1)"], ["domain"] * 3
+    for words, more in ((sizes, str(len(layers))), (directions, "none"), (kinds, kind)):
+        words.insert(3 if last else 0, more)
+    lines = [
+        "NRRD0004", "type: unsigned char", "dimension: 4", "space: left-posterior-superior",
+        f"sizes: {' '.join(sizes)}", f"space directions: {' '.join(directions)}", f"kinds: {' '.join(kinds)}",
+        "encoding: raw", "space origin: (0,0,0)", *(f"{key}:={value}" for key, value in told.items()),
+    ]  # fmt: skip
+    path.write_bytes("\n".join([*lines, "", ""]).encode() + stored.tobytes())
+    return path
+
+
+def segment(number: int, name: str, label: int | None = None, layer: int | None = None) -> dict[str, str]:
+    told = {"Name": name, "LabelValue": label, "Layer": layer, "Extent": "0 11 0 11 0 11"}
+    return {f"Segment{number}_{key}": str(value) for key, value in told.items() if value is not None}
+
+
+class TestSegments:
+    """Slicer's layers: each segment by its number, which is its label where that is its own."""
+
+    @pytest.mark.parametrize("last", [False, True])
+    @pytest.mark.parametrize(("labels", "numbers"), [((1, 1, 1), (1, 2, 3)), ((7, 3, 300 % 256), (7, 3, 44))])
+    def test_overlapping_ones_are_read_one_by_one(
+        self, tmp_path: Path, labels: tuple[int, ...], numbers: tuple[int, ...], last: bool
+    ) -> None:
+        masks, names = [BALL, CORE, SHELL], ["Ball", "Core: inner", "Shell"]
+        told = [segment(n, name, labels[n], n) for n, name in enumerate(names)]
+        layers = [mask * label for mask, label in zip(masks, labels, strict=True)]
+        path = layered(tmp_path / "s.seg.nrrd", layers, last=last, **told[0], **told[1], **told[2])
+        for mask, number in zip(masks, numbers, strict=True):
+            volume = read_volume(path, select=[number])
+            np.testing.assert_array_equal(volume.voxels == number, mask)
+            assert f"{numbers[1]} Core: inner" in volume.notes[-1]
+        both = read_volume(path, select=[numbers[0], numbers[1]]).voxels
+        np.testing.assert_array_equal(both > 0, BALL)
+        with pytest.raises(GeometryError, match=r"segments overlap.*Ball.*--select"):
+            read_volume(path)
+        with pytest.raises(EmptyError, match="no such segment"):
+            read_volume(path, select=[99])
+
+    def test_those_that_lie_apart_are_one_label_map(self, tmp_path: Path) -> None:
+        told = segment(0, "Core", 1, 0) | segment(1, "Shell", 1, 1)
+        volume = read_volume(layered(tmp_path / "s.seg.nrrd", [CORE, SHELL], **told))
+        np.testing.assert_array_equal(volume.voxels, CORE + 2 * SHELL)
+
+    def test_two_labels_in_one_of_two_layers(self, tmp_path: Path) -> None:
+        told = segment(0, "Core", 1, 0) | segment(1, "Shell", 2, 0) | segment(2, "Ball", 1, 1)
+        path = layered(tmp_path / "s.seg.nrrd", [CORE + 2 * SHELL, BALL], **told)
+        for number, mask in ((1, CORE), (2, SHELL), (3, BALL)):
+            np.testing.assert_array_equal(read_volume(path, select=[number]).voxels == number, mask)
+
+    def test_old_ones_have_a_layer_each_and_do_not_say_so(self, tmp_path: Path) -> None:
+        path = layered(tmp_path / "s.seg.nrrd", [BALL, CORE], kind="list", **segment(0, "B"), **segment(1, "C"))
+        np.testing.assert_array_equal(read_volume(path, select=[2]).voxels == 2, CORE)
+
+    def test_one_layer_keeps_its_labels_and_names_them(self, tmp_path: Path) -> None:
+        told = segment(0, "Core", 5, 0) | segment(1, "Shell", 9, 0)
+        volume = read_volume(layered(tmp_path / "s.seg.nrrd", [CORE * 5 + SHELL * 9], **told))
+        np.testing.assert_array_equal(volume.voxels, CORE * 5 + SHELL * 9)
+        assert volume.notes == ("segments: 5 Core, 9 Shell",)
+
+    @pytest.mark.parametrize("told", [segment(0, "a", 1, 5), {"Segment0_Layer": "x"}, {"Segment0_LabelValue": "-1"}])
+    def test_headers_that_lie_are_refused(self, tmp_path: Path, told: dict[str, str]) -> None:
+        with pytest.raises(FormatError):
+            read_volume(layered(tmp_path / "s.seg.nrrd", [BALL, CORE], **told))
+
+    @pytest.mark.parametrize("kind", ["list", "vector", "3-vector", "covariant-vector", "point"])
+    def test_three_bytes_of_another_kind_are_no_color(self, tmp_path: Path, kind: str) -> None:
+        with pytest.raises(FormatError, match=f"several values a voxel.*3 of kind {kind}"):
+            read_volume(layered(tmp_path / "s.nrrd", [BALL, CORE, SHELL], kind=kind))
+
+    @pytest.mark.parametrize("kind", ["RGB-color", "3-color", "none", "???"])
+    def test_three_bytes_of_a_color_or_of_no_kind_are(self, tmp_path: Path, kind: str) -> None:
+        volume = read_volume(layered(tmp_path / "s.nrrd", [BALL, CORE, SHELL], kind=kind))
+        np.testing.assert_array_equal(volume.voxels, np.stack([BALL, CORE, SHELL], axis=-1))

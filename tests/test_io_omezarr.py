@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
+import zipfile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,6 +48,21 @@ def multiscales(names: str = "zyx", unit: str | None = "millimeter", per_mm: flo
     return [{"axes": axes, "datasets": [{"path": "0", "coordinateTransformations": steps}], **more}]
 
 
+def directed(
+    z: str = "inferior-to-superior",
+    y: str = "posterior-to-anterior",
+    x: str = "left-to-right",
+    *,
+    bare: bool = False,
+    unit: str | None = "millimeter",
+) -> Any:
+    """Return the metadata of an image whose axes have directions, as objects or as ngff-zarr's bare words."""
+    images = multiscales(unit=unit)
+    for axis, value in zip(images[0]["axes"], (z, y, x), strict=True):
+        axis["orientation"] = value if bare else {"type": "anatomical", "value": value}
+    return images
+
+
 def write(folder: Path, stored: NDArray[Any] = STORED, images: Any = None, zarr_format: int = 3, **array: Any) -> Path:
     """Write an image by zarr-python; 0.4 is of format 2, 0.5 of format 3."""
     group = zarr.open_group(folder, mode="w", zarr_format=zarr_format)
@@ -83,17 +100,92 @@ class TestPlaces:
         np.testing.assert_allclose(volume.affine[:3, :3], 2 * AFFINE[:3, :3])
         np.testing.assert_allclose(volume.affine[:3, 3], 2 * AFFINE[:3, 3] + [3, 2, 1])
 
-    def test_directions_are_followed(self, tmp_path: Path) -> None:
-        images = multiscales()
-        said = ("inferior-to-superior", "posterior-to-anterior", "left-to-right")
-        for axis, value in zip(images[0]["axes"], said, strict=True):
-            axis["orientation"] = {"type": "anatomical", "value": value}
-        volume = read_volume(write(tmp_path / "s.zarr", images=images))
+    @pytest.mark.parametrize("bare", [False, True])
+    def test_directions_are_followed(self, tmp_path: Path, bare: bool) -> None:
+        volume = read_volume(write(tmp_path / "s.zarr", images=directed(bare=bare)))
         np.testing.assert_allclose(volume.grid.affine, np.diag([-1, -1, 1, 1]) @ AFFINE)
-        assert volume.notes == ()
-        images[0]["axes"][0]["orientation"]["value"] = "dorsal-to-ventral"
+        assert volume.notes == (
+            "the translation counts along the directions of the axes, as RFC 4 of the format has it",
+        )
         with pytest.raises(GeometryError, match="directions of the axes"):
-            read_volume(write(tmp_path / "s.zarr", images=images))
+            read_volume(write(tmp_path / "s.zarr", images=directed("dorsal-to-ventral", bare=bare)))
+
+    def test_axes_along_others_of_the_patient_carry_their_translation(self, tmp_path: Path) -> None:
+        images = directed("left-to-right", "inferior-to-superior", "anterior-to-posterior")
+        volume = read_volume(write(tmp_path / "s.zarr", images=images))
+        turned = np.array([[0, 0, -1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+        np.testing.assert_allclose(volume.grid.affine, turned @ AFFINE)
+
+    @pytest.mark.parametrize("spacing", [None, SCALE])
+    def test_a_missing_unit_leaves_directions_and_translation(
+        self, tmp_path: Path, spacing: tuple[float, ...] | None
+    ) -> None:
+        images = directed(unit=None)
+        volume = read_volume(write(tmp_path / "s.zarr", images=images), settings=ReadSettings(spacing=spacing))
+        np.testing.assert_allclose(volume.grid.affine, np.diag([-1, -1, 1, 1]) @ AFFINE)
+        assert ("--spacing" in volume.notes[-1]) == (spacing is not None)
+
+    def test_a_spacing_in_another_unit_carries_the_translation(self, tmp_path: Path) -> None:
+        images = directed(unit=None)
+        given_spacing = ReadSettings(spacing=tuple(10 * value for value in SCALE))
+        volume = read_volume(write(tmp_path / "s.zarr", images=images), settings=given_spacing)
+        np.testing.assert_allclose(volume.grid.affine[:3], (np.diag([-1, -1, 1, 1]) @ AFFINE)[:3] * 10)
+
+    @pytest.mark.parametrize(("bare", "world"), [(False, (1, 1, 1)), (True, (-1, -1, 1))])
+    @pytest.mark.parametrize("level", [0, 1])
+    def test_the_origin_of_an_image_that_ngff_zarr_wrote_is_known(
+        self, tmp_path: Path, bare: bool, world: tuple[int, ...], level: int
+    ) -> None:
+        images = directed(bare=bare)
+        images[0]["@type"] = "ngff:Image"
+        images[0]["datasets"] = [
+            {"path": f"scale{n}/image", "coordinateTransformations": [
+                {"type": "scale", "scale": [value * 2**n for value in SCALE[::-1]]},
+                {"type": "translation", "translation": [
+                    at + value * (2**n - 1) / 2 for at, value in zip(OFFSET[::-1], SCALE[::-1], strict=True)
+                ]},
+            ]}
+            for n in range(2)
+        ]  # fmt: skip
+        folder = write(tmp_path / "s.zarr", images=images)
+        for n in range(2):
+            (folder / f"scale{n}").mkdir()
+            shutil.copytree(folder / "0", folder / f"scale{n}" / "image")
+        volume = read_volume(folder, settings=ReadSettings(level=level))
+        finest = np.diag([-1, -1, 1, 1]) @ AFFINE
+        finest[:3, 3] = np.array(world) * OFFSET
+        expected = finest @ np.diag([2.0**level] * 3 + [1])
+        expected[:3, 3] = (finest @ [*[(2**level - 1) / 2] * 3, 1])[:3]
+        np.testing.assert_allclose(volume.grid.affine, expected)
+        assert bool(volume.notes) == (world == (1, 1, 1))
+
+    def test_0_6_is_read_by_its_coordinate_systems(self, tmp_path: Path) -> None:
+        (image,) = directed()
+        other = {"name": "atlas", "axes": [{"name": name, "type": "space", "unit": "meter"} for name in "zyx"]}
+        image["coordinateSystems"] = [other, {"name": "intrinsic", "axes": image.pop("axes")}]
+        steps = image["datasets"][0]["coordinateTransformations"]
+        one = {"type": "sequence", "transformations": steps, "input": {"path": "0"}, "output": {"name": "intrinsic"}}
+        image["datasets"][0]["coordinateTransformations"] = [one]
+        image["coordinateTransformations"] = [
+            {
+                "type": "affine",
+                "affine": [[9, 0, 0, 0]] * 3,
+                "input": {"name": "intrinsic"},
+                "output": {"name": "atlas"},
+            }
+        ]
+        volume = read_volume(write(tmp_path / "s.zarr", images=[image]))
+        np.testing.assert_allclose(volume.grid.affine, np.diag([-1, -1, 1, 1]) @ AFFINE)
+
+    @pytest.mark.parametrize("inside", ["", "s.ome.zarr/"])
+    def test_an_archive_of_one_store_is_read(self, tmp_path: Path, inside: str) -> None:
+        folder = write(tmp_path / "s.zarr", chunks=(2, 2, 2), shards=(4, 4, 4))
+        with zipfile.ZipFile(tmp_path / "s.ozx", "w") as archive:
+            for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+                archive.write(path, inside + path.relative_to(folder).as_posix())
+        np.testing.assert_array_equal(read_volume(tmp_path / "s.ozx").voxels, STORED)
+        shutil.rmtree(folder)
+        assert [study.path.name for study in find_studies(tmp_path)] == ["s.ozx"]
 
     @FORMATS
     def test_a_level_is_chosen(self, tmp_path: Path, zarr_format: int) -> None:
@@ -122,7 +214,7 @@ class TestPlaces:
         with pytest.raises(GeometryError, match=r"units of x, y, z: none.*--spacing x y z"):
             read_volume(folder)
         volume = read_volume(folder, settings=ReadSettings(spacing=SCALE))
-        np.testing.assert_array_equal(volume.affine, np.diag([*SCALE, 1.0]))
+        np.testing.assert_allclose(volume.affine, AFFINE)
 
     @FORMATS
     def test_a_plain_array_needs_a_spacing(self, tmp_path: Path, zarr_format: int) -> None:

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydicom import dcmread
 from pydicom.uid import DeflatedExplicitVRLittleEndian, RLELossless
 
 from conftest import law, seeds
 from faults import changed, fault_of
-from segmentations import by_highdicom, frames_of, segmentation, written
+from segmentations import by_highdicom, frames_of, palette, segmentation, written
 from studies import AFFINES, save
 from test_io_damage import damaged
 from tomomesh.errors import EmptyError, FormatError, GeometryError, TomomeshError
@@ -77,6 +78,24 @@ class TestEveryKindAndPlace:
         affine, truth = AFFINES[place], labels(1)
         volume = read_volume(written(shares_of(truth, kind), affine, tmp_path / "seg.dcm", kind=kind))
         np.testing.assert_array_equal(on_full_grid(volume, truth.shape, affine), truth)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_colors_of_labels_are_for_the_eye_alone(tmp_path: Path, packed: bool) -> None:
+    pytest.importorskip("highdicom", reason="highdicom, the writer, is not here")
+    path = tmp_path / "seg.dcm"
+    judge = by_highdicom(masks_of(labels()), AFFINE, path, "LABELMAP", palette_color_lut_transformation=palette())
+    assert judge.PhotometricInterpretation == "PALETTE COLOR"
+    if packed:
+        data = dcmread(path)
+        data.compress(RLELossless, encoding_plugin="pydicom")
+        save(data, path)
+    volume = read_volume(path)
+    theirs = judge.get_volume(combine_segments=True)
+    expected = Volume.from_stored(theirs.array, theirs.affine[:, [2, 1, 0, 3]])
+    np.testing.assert_array_equal(volume.voxels, expected.voxels)
+    np.testing.assert_allclose(volume.affine, expected.affine, atol=1e-4)
+    assert set(np.unique(volume.voxels)) == {0, 1, 2}
 
 
 @law(10)

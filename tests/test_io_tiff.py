@@ -11,6 +11,7 @@ from PIL import Image
 from studies import assert_in_place, sampled
 from tomomesh.errors import FormatError, GeometryError
 from tomomesh.io import read_volume
+from tomomesh.io.volumes.units import millimeters
 from tomomesh.settings import ReadSettings
 from writers import needed
 
@@ -94,3 +95,137 @@ class TestTiff:
         monkeypatch.setitem(__import__("sys").modules, "tifffile", None)
         with pytest.raises(FormatError, match=r"tomomesh\[tiff\]"):
             read_volume(tmp_path / "s.tif", settings=SPACING)
+
+
+class TestWhiteIsZero:
+    """Low numbers that are bright: one rule for stacks and folders, whatever the bits."""
+
+    LEVELS = (np.arange(4 * 9 * 13) % 200).reshape(4, 9, 13)
+
+    @pytest.mark.parametrize(("kind", "black"), [("u1", 255), ("u2", 65535), ("f4", None)])
+    def test_a_stack_and_a_folder_are_read_alike(self, tmp_path: Path, kind: str, black: int | None) -> None:
+        tifffile = needed("tifffile")
+        stored = self.LEVELS.astype(kind)
+        tifffile.imwrite(tmp_path / "s.tif", stored, photometric="miniswhite", metadata=None)
+        (tmp_path / "f").mkdir()
+        for k, pixels in enumerate(stored):
+            tifffile.imwrite(tmp_path / "f" / f"s{k}.tif", pixels, photometric="miniswhite", metadata=None)
+        expected = stored if black is None else black - stored
+        for path in (tmp_path / "s.tif", tmp_path / "f"):
+            volume = read_volume(path, settings=SPACING)
+            np.testing.assert_array_equal(volume.voxels, expected)
+            assert sum("WhiteIsZero" in note for note in volume.notes) == 1
+
+    def test_other_pages_are_not_turned_over(self, tmp_path: Path) -> None:
+        needed("tifffile").imwrite(tmp_path / "s.tif", self.LEVELS.astype("u1"), photometric="minisblack")
+        volume = read_volume(tmp_path / "s.tif", settings=SPACING)
+        np.testing.assert_array_equal(volume.voxels, self.LEVELS)
+        assert not any("WhiteIsZero" in note for note in volume.notes)
+
+
+class TestBits:
+    MASK = np.linalg.norm(np.indices((6, 9, 13)) - np.array([3, 4, 6]).reshape(3, 1, 1, 1), axis=0) < 3
+
+    @pytest.mark.parametrize("rows", [None, 2])
+    @pytest.mark.parametrize("photometric", ["minisblack", "miniswhite", None])
+    @pytest.mark.parametrize("compression", [None, "zlib"])
+    def test_a_stack_of_bits_is_a_mask(
+        self, tmp_path: Path, photometric: str | None, rows: int | None, compression: str | None
+    ) -> None:
+        told = {"photometric": photometric, "rowsperstrip": rows, "compression": compression}
+        needed("tifffile").imwrite(tmp_path / "s.tif", self.MASK, **told)
+        volume = read_volume(tmp_path / "s.tif", settings=SPACING)
+        np.testing.assert_array_equal(volume.voxels, self.MASK)
+        assert volume.voxels.dtype == np.uint8
+
+    @pytest.mark.parametrize("photometric", ["minisblack", "miniswhite"])
+    def test_a_folder_of_bits_has_the_same_inside(self, tmp_path: Path, photometric: str) -> None:
+        for k, pixels in enumerate(self.MASK):
+            needed("tifffile").imwrite(tmp_path / f"s{k}.tif", pixels, photometric=photometric)
+        np.testing.assert_array_equal(read_volume(tmp_path, settings=SPACING).voxels, self.MASK * 255)
+
+    @pytest.mark.parametrize("compression", [None, "group4"])
+    def test_pages_of_pillow_too(self, tmp_path: Path, compression: str | None) -> None:
+        needed("tifffile")
+        needed("imagecodecs")
+        pages = [Image.fromarray(pixels) for pixels in self.MASK]
+        pages[0].save(tmp_path / "s.tif", save_all=True, append_images=pages[1:], compression=compression)
+        np.testing.assert_array_equal(read_volume(tmp_path / "s.tif", settings=SPACING).voxels, self.MASK)
+
+    def test_one_that_is_cut_off_is_refused(self, tmp_path: Path) -> None:
+        needed("tifffile").imwrite(tmp_path / "s.tif", np.zeros((6, 64, 64), bool), photometric="minisblack")
+        whole = (tmp_path / "s.tif").read_bytes()
+        (tmp_path / "s.tif").write_bytes(whole[:-100])
+        with pytest.raises(FormatError):
+            read_volume(tmp_path / "s.tif", settings=SPACING)
+
+
+@pytest.mark.parametrize("told", [{"metadata": None}, {"metadata": {"axes": "ZSYX"}, "ome": True}])
+def test_planar_colors_are_colors(tmp_path: Path, told: Any) -> None:
+    colors = np.stack([TestTiff.STORED % n for n in (251, 7, 13)], axis=1).astype(np.uint8)
+    needed("tifffile").imwrite(tmp_path / "s.tif", colors, photometric="rgb", planarconfig="separate", **told)
+    volume = read_volume(tmp_path / "s.tif", settings=SPACING)
+    np.testing.assert_array_equal(volume.voxels, np.moveaxis(colors, 1, -1))
+
+
+class TestUnits:
+    """Of each axis, as ImageJ and OME spell them."""
+
+    def imagej(self, folder: Path, resolution: tuple[float, float], **told: Any) -> Path:
+        needed("tifffile").imwrite(
+            folder / "s.tif", TestTiff.STORED, imagej=True, resolution=resolution, metadata={"axes": "ZYX", **told}
+        )
+        return folder / "s.tif"
+
+    @pytest.mark.parametrize(
+        ("resolution", "told"),
+        [
+            ((1 / 20, 1 / 20), {"unit": "micron", "spacing": 20}),
+            ((1 / 20, 1 / 20), {"unit": r"\u00B5m", "spacing": 20}),
+            ((1 / 20, 1 / 20), {"unit": "um", "spacing": -20}),
+            ((50, 50), {"unit": "mm", "zunit": "micron", "spacing": 20}),
+            ((1 / 20, 1 / 20), {"unit": "micron", "zunit": "mm", "spacing": 0.02}),
+            ((1 / 20, 1 / 20), {"unit": "micron", "zunit": "nm", "spacing": 20000}),
+            ((1 / 20, 1 / 20000), {"unit": "micron", "yunit": "nm", "spacing": 20}),
+            ((1270, 1270), {"unit": "in", "spacing": 0.02 / 25.4}),
+            ((1270, 1270), {"unit": "inch", "zunit": "cm", "spacing": 0.002}),
+        ],
+    )
+    def test_imagej_names_one_for_each_axis(
+        self, tmp_path: Path, resolution: tuple[float, float], told: dict[str, Any]
+    ) -> None:
+        volume = read_volume(self.imagej(tmp_path, resolution, **told))
+        np.testing.assert_allclose(volume.spacing_mm, (0.02,) * 3, rtol=1e-6)
+
+    def test_imagej_leaves_out_a_distance_of_one(self, tmp_path: Path) -> None:
+        assert read_volume(self.imagej(tmp_path, (2.0, 2.0), unit="mm")).spacing_mm == (0.5, 0.5, 1.0)
+
+    def test_an_axis_of_another_kind_is_named(self, tmp_path: Path) -> None:
+        path = self.imagej(tmp_path, (1.0, 1.0), unit="micron", zunit="pixel", spacing=1)
+        with pytest.raises(GeometryError, match=r"micron, micron, pixel.*--spacing x y z"):
+            read_volume(path)
+        assert read_volume(path, settings=SPACING).spacing_mm == SPACING.spacing
+
+    @pytest.mark.parametrize(
+        ("unit", "mm"),
+        [("Å", 1e-7), ("\u212b", 1e-7), ("in", 25.4), ("thou", 0.0254), ("ft", 304.8), ("μm", 1e-3), ("pm", 1e-9)],
+    )
+    def test_ome_has_many(self, tmp_path: Path, unit: str, mm: float) -> None:
+        told: dict[str, Any] = {"axes": "ZYX"}
+        for axis, size in zip("XYZ", (0.5, 0.7, 2.0), strict=True):
+            told |= {f"PhysicalSize{axis}": size / mm, f"PhysicalSize{axis}Unit": unit}
+        needed("tifffile").imwrite(tmp_path / "s.ome.tif", TestTiff.STORED, metadata=told)
+        np.testing.assert_allclose(read_volume(tmp_path / "s.ome.tif").spacing_mm, (0.5, 0.7, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("unit", "expected"),
+    [
+        *[(unit, 1e-3) for unit in ("µm", "μm", "um", "micron", "Microns", "micrometre", r"\u00b5m", r"\u00B5m\0")],
+        *[(unit, 1.0) for unit in ("mm", "Millimeters", "millimetre", " mm ")],
+        *[(unit, 25.4) for unit in ("in", "inch", "Inches", '"')],
+        *[(unit, None) for unit in ("Mm", "ms", "pixel", "", "sec", r"\u00B5", "reference frame")],
+    ],
+)
+def test_units_as_writers_spell_them(unit: str, expected: float | None) -> None:
+    assert millimeters(unit.replace(r"\0", "\0")) == expected

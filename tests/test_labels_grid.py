@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import re
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from conftest import law, seeds
@@ -15,9 +16,10 @@ from segmentations import written
 from studies import AFFINES, affine_of, rotation, write_nifti, write_series
 from test_cli import fails
 from tomomesh.cli import main
-from tomomesh.errors import GeometryError
+from tomomesh.errors import GeometryError, UsageError
 from tomomesh.model.volume import Volume
 from tomomesh.segmentation.grid import onto_grid
+from tomomesh.segmentation.labels import labels_in, whole
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -77,10 +79,10 @@ def test_the_same_grid_is_left_as_it_is() -> None:
     ("affine", "said"),
     [
         (affine_of(np.eye(3), spacing=(0.5, 0.7, 4.0)), "do not fit"),
-        (affine_of(np.eye(3), spacing=(0.502, 0.7, 2.0)), "do not fit"),
-        (affine_of(rotation(0.01, 0, 0)), "do not fit"),
-        (affine_of(np.eye(3), origin=(-3.25, 11.0, 40.0)), "0.25 mm off"),
-        (affine_of(np.eye(3), origin=(-3.0, 11.0, 41.0)), "1 mm off"),
+        (affine_of(np.eye(3), spacing=(0.51, 0.7, 2.0)), "do not fit"),
+        (affine_of(rotation(0.03, 0, 0)), "do not fit"),
+        (affine_of(np.eye(3), origin=(-3.2, 11.0, 40.0)), "0.2 mm off its voxels, 0.4 of one"),
+        (affine_of(np.eye(3), origin=(-3.0, 11.0, 40.3)), "0.3 mm off its voxels, 0.15 of one"),
         (affine_of(np.eye(3), origin=(-3.0, 11.0, 60.0)), "outside"),
     ],
 )
@@ -88,6 +90,71 @@ def test_other_grids_are_refused(affine: NDArray[np.float64], said: str) -> None
     study = volume(np.zeros(STUDY, np.int64), AFFINES["axial"])
     with pytest.raises(GeometryError, match=said):
         onto_grid(volume(np.ones(STUDY, np.int64), affine), study)
+
+
+@law(60)
+@given(seeds, st.floats(-2, 2), st.sampled_from(sorted(AFFINES)))
+def test_grids_that_nearly_agree_are_taken_below_a_tenth_of_a_voxel(seed: int, power: float, place: str) -> None:
+    rng, size = np.random.default_rng(seed), 0.1 * 10**power
+    corners = np.array(list(np.ndindex(2, 2, 2))) * (np.array(STUDY[::-1]) - 1)
+    beside = rng.standard_normal((3, 4))
+    beside *= size / np.linalg.norm(corners @ beside[:, :3].T + beside[:, 3], axis=1).max()
+    assume(min(abs(size - 0.1), abs(size - 0.01)) > 1e-6)
+    study = volume(np.zeros(STUDY, np.int64), AFFINES[place])
+    found = rng.integers(0, 4, STUDY)
+    labels = volume(found, AFFINES[place] @ (np.eye(4) + np.vstack([beside, np.zeros(4)])))
+    assume(labels.grid.axes == study.grid.axes and labels.grid.flipped == study.grid.flipped)
+    fault = fault_of(onto_grid, labels, study)
+    if fault:
+        assert size > 0.1 / 2  # a corner may be nearer to another voxel, never farther than from its own
+        return
+    assert size < 0.1 or (np.abs(beside) > 0.4).any()
+    if size < 0.1:
+        laid = onto_grid(labels, study)
+        np.testing.assert_array_equal(study.grid.restore(laid.voxels), found)
+        assert (f"{size:.2g} voxels beside" in " ".join(laid.notes)) == (size > 0.01)
+
+
+@pytest.mark.parametrize("spacing", [0.9766, 0.97657, 0.977, 0.9766004])
+def test_a_difference_is_shown_in_the_digits_that_differ(spacing: float) -> None:
+    shape = (2, 2000, 2000)
+    study = volume(np.zeros(shape, np.uint8), affine_of(np.eye(3), spacing=(0.9765625, 0.9765625, 3.0)))
+    labels = volume(np.zeros(shape, np.uint8), affine_of(np.eye(3), spacing=(spacing, spacing, 3.0)))
+    fault = fault_of(onto_grid, labels, study)
+    if 1999 * (spacing - 0.9765625) / 0.9765625 * 2**0.5 < 0.1:
+        assert not fault
+        return
+    said = str(fault)
+    first, second = (re.search(rf"{word}: \[?[^.]*voxels of (\S+)", said) for word in ("Found", "Expected"))
+    assert first
+    assert second
+    assert first[1] != second[1]
+
+
+class TestWhole:
+    """Labels that are nearly whole, as other programs' interpolation leaves them."""
+
+    @pytest.mark.parametrize("kind", [np.float32, np.float64])
+    @pytest.mark.parametrize("off", [0.0, 0.0000458, -0.0009])
+    def test_below_a_thousandth_they_are_rounded(self, kind: Any, off: float) -> None:
+        found = np.arange(STUDY[0] * STUDY[1] * STUDY[2]).reshape(STUDY) % 4
+        labels = whole(volume((found + off * (found == 3)).astype(kind), AFFINES["oblique"]))
+        np.testing.assert_array_equal(labels.voxels, volume(found, AFFINES["oblique"]).voxels)
+        assert any("nearly whole" in note for note in labels.notes) == (off != 0)
+        assert labels_in(labels.voxels + off) == labels_in(labels.voxels)
+
+    @pytest.mark.parametrize(("label", "shown"), [(3.002, "3.002"), (2.5, "2.5"), (np.inf, "inf"), (np.nan, "nan")])
+    def test_others_are_shown(self, label: float, shown: str) -> None:
+        found = np.zeros(STUDY)
+        found[1, 2, 3] = label
+        with pytest.raises(UsageError, match=shown):
+            whole(volume(found, AFFINES["axial"]))
+
+    def test_the_command_line_tells(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
+        ball = np.linalg.norm(np.indices((16, 16, 16)) - 7.5, axis=0) < 5
+        write_nifti(tmp_path / "l.nii", (3.0000458 * ball).astype(np.float32), AFFINES["axial"])
+        assert main(["reconstruct", str(tmp_path / "l.nii"), "--select", "3", "-o", str(tmp_path / "m.ply")]) == 0
+        assert "nearly whole" in capsys.readouterr().out
 
 
 class TestCommandLine:

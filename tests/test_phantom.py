@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from conftest import law
 from tomomesh.errors import UsageError
 from tomomesh.head_phantom import NASAL_OPENING, Head, Phantom, phantom
+from tomomesh.measure.topology import topology
 
 
 @pytest.fixture(scope="module", params=["mr", "ct"])
@@ -59,6 +60,16 @@ class TestTruth:
         assert set(np.round(mesh.vertices[rim.ravel(), 2], 6)) == set(
             np.round([mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()], 6)
         )
+
+    def test_with_its_caps_is_a_solid_of_one_piece(self, made: Phantom) -> None:
+        solid = made.closed_truth
+        assert topology(solid).sound
+        assert topology(solid).genus == 0
+        np.testing.assert_array_equal(solid.vertices[:-2], made.truth.vertices)
+        rings = made.truth.vertices.reshape(144, -1, 3)
+        x, y = rings[..., 0], rings[..., 1]
+        areas = 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+        assert solid.face_volumes.sum() == pytest.approx(np.trapezoid(areas, rings[:, 0, 2]), rel=1e-3)
 
     def test_is_smooth_across_the_equator(self) -> None:
         head = Head()

@@ -147,6 +147,83 @@ class TestDrain:
         assert part_of(BOX, drain=3.0).faces.tobytes() == BOX.faces.tobytes()
 
 
+PLATE = mesh_of(trimesh.creation.box((20, 20, 0.3)).subdivide().subdivide().subdivide())
+"""A wall of .3 mm."""
+GRAIN = mesh_of(trimesh.creation.icosphere(2, 1.0).apply_translation([0, 0, 25]))
+
+
+def together(*meshes: TriMesh) -> TriMesh:
+    return mesh_of(trimesh.util.concatenate([trimesh.Trimesh(m.vertices, m.faces, process=False) for m in meshes]))
+
+
+def verdict_of(mesh: TriMesh, **options: Any) -> dict[str, Any]:
+    return make_part(mesh, Settings().replace(**options)).report
+
+
+class TestCures:
+    """Beside each reason stands an option; with it the reason is gone."""
+
+    @pytest.mark.parametrize(
+        ("mesh", "reason"),
+        [
+            (PLATE, "--thicken 0.8"),
+            (mesh_of(trimesh.creation.cone(5, 20, sections=64)), "--thicken 0.8"),
+            (mesh_of(trimesh.creation.torus(10.0, 0.2, major_sections=96, minor_sections=24)), "--thicken 0.8"),
+            (together(BALL, GRAIN), "--one-piece"),
+        ],
+        ids=["plate", "cone", "wire", "grain"],
+    )
+    def test_the_option_that_is_named_mends_it(self, mesh: TriMesh, reason: str) -> None:
+        told = verdict_of(mesh, print_check=True)
+        assert not told["printable"]
+        assert [f"({reason})" in why for why in told["reasons"]] == [True]
+        name, *value = reason.removeprefix("--").split()
+        mended = make_part(mesh, Settings().replace(**{name.replace("-", "_"): float(value[0]) if value else True}))
+        judged(mended.mesh)
+        assert mended.report["printable"], mended.report["reasons"]
+
+    def test_a_plate_grows_on_both_sides_alike(self) -> None:
+        low, high = (getattr(part_of(PLATE, thicken=0.8).vertices, end)(axis=0) for end in ("min", "max"))
+        np.testing.assert_allclose(low, -high, atol=0.1)
+        assert 0.8 <= high[2] - low[2] <= 1.4
+
+    def test_what_is_thick_stays_as_it_is(self) -> None:
+        np.testing.assert_array_equal(part_of(BALL, thicken=0.8).vertices, BALL.vertices)
+
+    def test_cavities_are_filled_with_what_floats_in_them(self) -> None:
+        nested = together(BALL, turned_over(scaled(BALL, 0.6)), scaled(BALL, 0.3), GRAIN)
+        filled = part_of(nested, fill_cavities=True)
+        assert topology(filled).components == 2
+        judged(filled)
+        one = part_of(nested, one_piece=True)
+        assert (topology(one, cavities=1).components, linings(one)) == (2, 1)
+
+    def test_the_deepest_place_is_told_of_a_wall_too_thick(self) -> None:
+        with pytest.raises(EmptyError, match=r"about (19(\.\d*)?|20) mm from a face"):
+            part_of(BALL, hollow=200.0)
+
+    @pytest.mark.parametrize(
+        ("options", "note"),
+        [
+            ({"drain": 2.0}, "no cavity to drain: --hollow makes one"),
+            ({"scale": 300.0}, "larger than printers are"),
+            ({"scale": 0.002}, "smaller than a printer resolves"),
+        ],
+    )
+    def test_what_is_likely_not_meant_is_noted_once(self, options: dict[str, Any], note: str) -> None:
+        notes = verdict_of(BALL, **options)["notes"]
+        assert sum(note in one for one in notes) == 1
+        assert not any(note in one for one in verdict_of(BALL, print_check=True)["notes"])
+
+
+def turned_over(mesh: TriMesh) -> TriMesh:
+    return TriMesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def scaled(mesh: TriMesh, factor: float) -> TriMesh:
+    return mesh.moved(factor * mesh.vertices)
+
+
 class TestVerdict:
     def test_a_thick_shell_on_a_flat_base_can_be_printed(self) -> None:
         told = make_part(BOX, Settings().replace(hollow=2.0, drain=6.0)).report
@@ -169,7 +246,7 @@ class TestVerdict:
         above.vertices[8:] += [20, 0, 2]
         told = make_part(above, Settings()).report
         assert (told["pieces"], told["floating_pieces"]) == (2, 1)
-        assert told["reasons"] == ["1 of 2 pieces float free of the plate"]
+        assert told["reasons"] == ["1 of 2 pieces float free of the plate (--one-piece)"]
 
     def test_overhang_is_what_faces_down_more_than_45_degrees(self) -> None:
         steep, blunt = (mesh_of(trimesh.creation.cone(radius, 20.0, sections=256)) for radius in (19.0, 21.0))

@@ -22,6 +22,7 @@ from tomomesh.measure.topology import check_promise, topology
 from tomomesh.measure.winding import linings
 from tomomesh.model.mesh import TriMesh
 from tomomesh.remeshing.remesh import faces_under, remesh
+from tomomesh.remeshing.specks import FEWEST
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -51,6 +52,23 @@ def box(count: int, sides: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> TriM
     while made.edges_unique_length.max() > 2**0.5 * max(sides) / cells.max() + 1e-9:
         made = made.subdivide()
     return TriMesh(made.vertices, made.faces)
+
+
+def ball(radius: float, center: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> TriMesh:
+    """Return an icosphere of 5,120 faces."""
+    made = trimesh.creation.icosphere(4, radius)
+    return TriMesh(made.vertices + np.array(center), made.faces)
+
+
+def turned_over(mesh: TriMesh) -> TriMesh:
+    return TriMesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def merged(*meshes: TriMesh) -> TriMesh:
+    """Return several meshes as one."""
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + n for mesh, n in zip(meshes, first[:-1], strict=True)]
+    return TriMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
 def smallest(mesh: TriMesh) -> NDArray[np.float64]:
@@ -174,11 +192,45 @@ class TestFewer:
         assert (judged.body_count, judged.euler_number) == (2, 2)
 
     def test_too_few_for_the_shape_are_refused(self, ring: TriMesh) -> None:
-        with pytest.raises(GeometryError, match=r"--target-faces = 4.*about \d+ or more") as caught:
+        with pytest.raises(GeometryError, match=r"--target-faces = 4.*\d+ or more.*Try: --target-faces") as caught:
             remesh(ring, most=4)
-        least = int(str(caught.value).split("about ")[1].split()[0])
+        least = int(str(caught.value).split("Expected: ")[1].split()[0])
         assert 4 < least < 150
-        assert topology(remesh(ring, most=2 * least).mesh).genus == 1
+        assert topology(remesh(ring, most=least).mesh).genus == 1
+
+    def test_the_number_that_is_named_keeps_the_shape(self, ring: TriMesh) -> None:
+        with pytest.raises(GeometryError, match="of the volume") as caught:
+            remesh(ring, most=30, like=1.02)
+        least = int(str(caught.value).split("Expected: ")[1].split()[0])
+        found = remesh(ring, most=least, like=1.02)
+        assert len(found.mesh.faces) <= least < len(ring.faces)
+        assert found.mesh.face_volumes.sum() == pytest.approx(found.before.face_volumes.sum(), rel=0.02)
+
+    def test_specks_and_small_linings_are_left_out(self) -> None:
+        """A ball with a wide cavity, in which a grain floats, and with a pore; and grains around it."""
+        grain, grains = ball(0.3), [ball(0.2, (14.0, y, 0.0)) for y in (-4.0, 0.0, 4.0)]
+        pore = ball(0.3, (8.0, 0.0, 0.0))
+        cavity = ball(5.0)
+        whole = merged(ball(10.0), turned_over(cavity), grain, turned_over(pore), *grains)
+        found = remesh(whole, most=1000)
+        assert (found.left_out.pieces, found.left_out.linings) == (5, 1)
+        assert topology(found.mesh, cavities=1).sound
+        assert topology(found.mesh, cavities=1).components == 2
+        assert found.mesh.face_volumes.sum() == pytest.approx(4 / 3 * np.pi * (1000 - 125), rel=0.03)
+        assert "5 components are too small" in found.warnings[0]
+        assert remesh(whole, most=len(whole.faces)).left_out.pieces == 0
+
+    def test_what_floats_in_a_cavity_goes_with_it(self) -> None:
+        """A rough grain of more area than the cavity around it is left out with that: faces enough, and no place."""
+        rough = ball(0.95)
+        rough = rough.moved(rough.vertices * np.random.default_rng(0).uniform(0.5, 1.0, (len(rough.vertices), 1)))
+        solid, cavity = ball(20.0), turned_over(ball(1.0))
+        areas = [float(part.face_areas.sum()) for part in (solid, rough, cavity)]
+        assert areas[1] > 1.2 * areas[2]
+        most = int(1.1 * FEWEST * (areas[0] + areas[1]) / areas[1])
+        found = remesh(merged(solid, cavity, rough), most=most)
+        assert (found.left_out.pieces, found.left_out.linings) == (2, 1)
+        assert topology(found.mesh).sound
 
     def test_the_lining_of_a_cavity_stays(self) -> None:
         nested = np.concatenate([sphere(4000), sphere(1500, 5.0)])

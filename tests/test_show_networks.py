@@ -287,7 +287,8 @@ class TestCommand:
         line = ["network", "triangle", "--network", network, "--neurons", "20", "--film", "--quiet"]
         assert main([*line, "-o", str(tmp_path / "n")]) == 0
         names = {path.name for path in (tmp_path / "n").iterdir()}
-        assert names == {"01-topologies.png", "02-network.png", "02-film.gif"} | ({"02-maps.png"} if maps else set())
+        drawn = {"01-topologies.png", "02-network.png", "02-learning.png", "02-film.gif"}
+        assert names == drawn | ({"02-maps.png"} if maps else set())
         assert main([*line, "-o", str(tmp_path / "again")]) == 0
         for name in names:
             assert (tmp_path / "n" / name).read_bytes() == (tmp_path / "again" / name).read_bytes()

@@ -66,6 +66,52 @@ class TestManners:
             som.set_params(nonsense=1)
         assert isinstance(som, Parametrized)
 
+    def test_two_numbers_are_a_shape(self) -> None:
+        inputs = blobs()
+        found, asked = SOM((3, 4), random_state=0).fit(inputs), SOM(shape=(3, 4), random_state=0).fit(inputs)
+        assert found.lattice_.shape == (3, 4)
+        np.testing.assert_array_equal(found.codebook_, asked.codebook_)
+        with pytest.raises(UsageError, match="two shapes"):
+            SOM((3, 4), shape=(3, 4)).fit(inputs)
+
+    @pytest.mark.parametrize(
+        ("params", "named"),
+        [
+            ({"n_neurons": 2}, "2 neurons"),
+            ({"n_neurons": 10.5}, "n_neurons = 10.5"),
+            ({"n_neurons": (2, 3, 4)}, "shape = (2, 3, 4)"),
+            ({"alpha": (2, 0.1)}, "alpha = 2 0.1"),
+            ({"alpha_power": -1}, "alpha_power = -1"),
+            ({"epochs": 0}, "epochs = 0"),
+            ({"topology": "pyramid"}, "topology = pyramid"),
+            ({"neighborhood": "box"}, "neighborhood = box"),
+            ({"training": "online", "least_move": -1.0}, "least_move = -1.0"),
+        ],
+    )
+    def test_faults_name_parameters_and_no_options(self, params: dict[str, Any], named: str) -> None:
+        with pytest.raises(UsageError) as fault:
+            SOM(**params).fit(blobs())
+        assert named in str(fault.value)
+        assert "--" not in str(fault.value)
+
+    @pytest.mark.parametrize("asked", [58, 37])
+    def test_says_that_a_grid_has_another_number(self, asked: int) -> None:
+        with pytest.warns(UserWarning, match=f"{asked} neurons make no grid"):
+            som = SOM(asked).fit(blobs())
+        assert max(som.lattice_.shape) <= 2 * min(som.lattice_.shape)
+
+    def test_warns_of_what_rises(self) -> None:
+        with pytest.warns(UserWarning, match="learning rate rises"):
+            SOM(9, training="online", alpha=(0.01, 0.5), epochs=2).fit(blobs())
+        with pytest.warns(UserWarning, match="radius rises"):
+            SOM(9, radius=(1, 4)).fit(blobs())
+
+    def test_prints_in_one_line(self) -> None:
+        som = SOM(9, topology="ring", start=blobs(9), epochs=3).fit(blobs())
+        for printed in (som, som.lattice_, som.history_):
+            assert "\n" not in repr(printed)
+            assert len(repr(printed)) < 120
+
     def test_without_scikit_learn_there_is_an_error_as_well(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delitem(__import__("sys").modules, "sklearn.exceptions", raising=False)
         assert isinstance(not_fitted("SOM"), NotFittedError)
@@ -177,7 +223,7 @@ class TestFiles:
         assert SOM.load(tmp_path / "map").fit(blobs()).codebook_.shape == (5, 3)
 
     def test_refuse_functions(self, tmp_path: Path) -> None:
-        som = SOM(5, alpha_fall=lambda t: 1 - t).fit(blobs())
+        som = SOM(4, alpha_fall=lambda t: 1 - t).fit(blobs())
         with pytest.raises(UsageError, match="alpha_fall"):
             som.save(tmp_path / "map.npz")
 

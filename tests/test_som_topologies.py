@@ -15,7 +15,7 @@ from conftest import law, seeds
 from tomomesh.errors import UsageError
 from tomomesh.measure.topology import topology
 from tomomesh.model.graph import lattice_of
-from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
+from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice, other_number
 from tomomesh.model.mesh import TriMesh
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class TestNamed:
 
     def test_has_about_as_many_neurons_as_asked(self, name: str, neurons: int) -> None:
         found = len(lattice(name, neurons))
-        if name in ("chain", "ring", "grid"):
+        if name in ("chain", "ring"):
             assert found == neurons
         elif name == "sphere":
             assert abs(found - neurons) == min(abs(10 * f**2 + 2 - neurons) for f in range(1, 9))
@@ -71,8 +71,20 @@ def inner_degrees(graph: Lattice) -> set[int]:
 
 
 class TestSheets:
-    def test_a_grid_is_as_square_as_it_can_be(self) -> None:
-        assert sorted(lattice("grid", 60).shape) == [6, 10]
+    @pytest.mark.parametrize(
+        ("asked", "sides"), [(60, (6, 10)), (100, (10, 10)), (58, (7, 8)), (37, (6, 6)), (3, (2, 2))]
+    )
+    def test_a_grid_is_nearly_square(self, asked: int, sides: tuple[int, int]) -> None:
+        graph = lattice("grid", asked)
+        assert graph.shape == sides
+        assert (other_number(graph, asked) is None) == (prod(sides) == asked)
+
+    @pytest.mark.parametrize("name", ["grid", "hexagonal", "cylinder", "torus", "ring", "sphere"])
+    def test_print_in_one_line(self, name: str) -> None:
+        told = repr(lattice(name, 42))
+        assert "\n" not in told
+        assert f"{name} of" in told
+        assert "42 neurons" in told
 
     @pytest.mark.parametrize(("name", "degree"), [("grid", 4), ("hexagonal", 6), ("cylinder", 4), ("torus", 4)])
     def test_have_their_neighbors(self, name: str, degree: int) -> None:

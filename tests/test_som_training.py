@@ -16,7 +16,7 @@ from tomomesh.model.graph import lattice_of
 from tomomesh.model.lattice import TOPOLOGIES, lattice
 from tomomesh.settings import FALLS, NetworkSettings
 from tomomesh.som.fit import fit, match, start_positions
-from tomomesh.som.schedules import falling, radius_power, schedule_warning
+from tomomesh.som.schedules import falling, radius_power, schedule_warnings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -76,11 +76,32 @@ class TestFall:
 
     def test_warns_where_the_learning_rate_falls_faster(self) -> None:
         calm = NetworkSettings(training="online")
-        assert schedule_warning(calm) is None
-        assert schedule_warning(NetworkSettings(alpha_power=9.0, radius_power=1.0)) is None
+        assert schedule_warnings(calm) == []
+        assert schedule_warnings(NetworkSettings(alpha_power=9.0, radius_power=1.0)) == []
         steep = NetworkSettings(training="online", alpha_fall="exponential", radius_fall="linear")
-        assert "faster" in str(schedule_warning(steep))
-        assert "faster" in str(schedule_warning(calm, alpha_fall=lambda t: 1.0 * (t == 0)))
+        for found in (schedule_warnings(steep), schedule_warnings(calm, alpha_fall=lambda t: 1.0 * (t == 0))):
+            assert len(found) == 1
+            assert "faster" in found[0]
+
+    @pytest.mark.parametrize(
+        ("settings", "rising"),
+        [
+            ({"training": "online", "alpha": (0.01, 0.5)}, ["learning rate rises from 0.01 to 0.5"]),
+            ({"training": "online", "alpha": (0.1, 0.5), "radius": (1, 9)}, ["learning rate rises", "radius rises"]),
+            ({"radius": (1, 9)}, ["radius rises from 1 to 9"]),
+            ({"alpha": (0.01, 0.5)}, []),  # in batch there is no learning rate
+            ({"training": "online", "alpha": (0.1, 0.1), "radius": (2, 2)}, []),
+            ({"training": "online", "alpha": (0.0, 0.5), "alpha_fall": "exponential"}, ["learning rate rises"]),
+        ],
+    )
+    def test_warns_of_what_rises(self, settings: dict[str, Any], rising: list[str]) -> None:
+        found = schedule_warnings(NetworkSettings(**settings))
+        assert len(found) == len(rising)
+        assert all(words in told for words, told in zip(rising, found, strict=True))
+
+    def test_warns_of_a_fall_that_rises(self) -> None:
+        (found,) = schedule_warnings(NetworkSettings(), radius_fall=lambda t: t)
+        assert "radius rises from 1 to 10" in found
 
     def test_the_power_follows_the_training(self) -> None:
         kinds = [NetworkSettings(), NetworkSettings(training="online"), NetworkSettings(radius_power=3.5)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -158,6 +159,30 @@ class TestIn:
         np.save(buffer, trimesh.creation.icosphere(3).vertices)
         feed(monkeypatch, buffer.getvalue())
         assert main(["surface", "-", "--input-format", "npy", "-o", str(tmp_path / "m.stl"), "--quiet"]) == 0
+
+    def test_a_file_of_another_suffix_is_read_as_the_format_says(
+        self, study: Path, tmp_path: Path, temporary: Path, capfdbinary: Any
+    ) -> None:
+        other = Path(shutil.copy(study, tmp_path / "a scan.dat"))
+        assert main(["reconstruct", str(study), *OPTIONS, "-o", str(tmp_path / "a.ply"), "--quiet"]) == 0
+        line = ["reconstruct", str(other), *OPTIONS, "--quiet", "-o", str(tmp_path / "b.ply")]
+        assert main(line) == 4
+        assert main([*line, "--input-format", "".join(study.suffixes)[1:]]) == 0
+        assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
+        assert main([*line, "--input-format", "nrrd"]) == 4
+        said = capfdbinary.readouterr().err
+        assert b"a scan.dat" in said.splitlines()[-1]
+        assert b"input.nrrd" not in said
+        assert list(temporary.iterdir()) == []
+
+    def test_a_folder_has_no_format(self, tmp_path: Path, capfdbinary: Any) -> None:
+        assert main(["inspect", str(tmp_path), "--input-format", "dcm"]) == 2
+        assert b"a format is that of one file" in capfdbinary.readouterr().err
+
+    def test_a_cloud_of_another_suffix_too(self, tmp_path: Path) -> None:
+        np.savetxt(tmp_path / "c.dat", trimesh.creation.icosphere(3).vertices)
+        line = ["surface", str(tmp_path / "c.dat"), "-o", str(tmp_path / "m.stl"), "--quiet"]
+        assert main([*line, "--input-format", "xyz"]) == 0
 
     @pytest.mark.parametrize("data", [b"", b"no numbers", b"1 2\n", b"1 2 nan\n"])
     def test_faults_are_one_line_that_names_no_temporary_file(

@@ -281,6 +281,24 @@ class TestPlace:
         rough = blurred + noise * np.random.default_rng(0).normal(size=blurred.shape)
         assert surface_of(replace(mask, voxels=rough))[0].crossings.stepped == stepped
 
+    @pytest.mark.parametrize("divide", [False, True])
+    @pytest.mark.parametrize("shape", ["slab", "sheet", "rod", "block"])
+    def test_a_mask_is_one_whatever_its_shape(self, shape: str, divide: bool) -> None:
+        """Its borders with the slab's end, or a wall one voxel thick, leave no four voxels in a line."""
+        mask = np.zeros((6, 24, 24), np.uint8)
+        places: dict[str, Any] = {"slab": np.s_[:, 4:20, 4:20], "sheet": np.s_[3, 2:22, 2:22], "rod": np.s_[2, 3, 2:22]}
+        mask[places.get(shape, np.s_[:, :, 6:9])] = 1
+        found = boundary(volume_of(mask, np.diag([1.0, 1, 2, 1])), mask > 0, lower=0.5, divide=divide)
+        assert found.crossings.stepped
+
+    def test_gray_levels_are_no_mask_though_most_of_the_border_is_the_volumes(self) -> None:
+        _, j, i = np.indices((4, 40, 40))
+        levels = 100 / (1 + np.exp(np.hypot(i - 20, j - 20) - 14))
+        found = boundary(volume_of(levels), levels > 50, lower=50.0)
+        beyond = found.crossings.kinds == BORDER
+        assert np.count_nonzero(beyond) > np.count_nonzero(~beyond)
+        assert not found.crossings.stepped
+
     @pytest.mark.parametrize("spacing", [(1.0, 1.0, 1.0), (1.0, 1.0, 4.0)])
     def test_marching_cubes_finds_the_same_surface(self, spacing: tuple[float, float, float]) -> None:
         volume = ball(16, spacing)

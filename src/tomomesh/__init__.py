@@ -15,6 +15,7 @@ _HOMES = {
     "TriMesh": "model.mesh",
     "Volume": "model.volume",
     "assess": "measure.report",
+    "compare_with_study": "agreement.study",
     "fill_mesh": "measure.fill",
     "phantom": "head_phantom",
     "read_mesh": "io",
@@ -36,6 +37,7 @@ __all__ = [
     "Volume",
     "__version__",
     "assess",
+    "compare_with_study",
     "fill_mesh",
     "phantom",
     "read_mesh",
@@ -49,6 +51,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
+    from .agreement.study import compare_with_study
     from .errors import TomomeshError
     from .head_phantom import phantom
     from .io import read_mesh, read_points, read_volume, write_mesh

@@ -11,7 +11,6 @@ import numpy as np
 from .dynamics.fairing import fair
 from .dynamics.low_pass import OneRing
 from .dynamics.untangle import untangle
-from .errors import GeometryError
 from .judgement import follow, require_one_wall
 from .measure.intersections import CrossingFaces
 from .measure.report import assess, compare
@@ -54,11 +53,15 @@ def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage
     InternalCheckError
         Where it is not what is promised.
     """
+    progress("checks", 0, 2)
     _check(made)
     walls = require_one_wall(made, settings)
-    smooth = _smooth(made, settings)
+    progress("checks", 2, 2)
+    smooth = _smooth(made, settings, progress)
     even = _even(smooth.value, settings, progress)
+    progress("judgement", 0, 1)
     judged = Stage(None, warnings=walls) if walls else _judged(even.value, settings)
+    progress("judgement", 1, 1)
     part = _print(even.value, settings, progress)
     surface = part.value
     later: list[Later] = [partial(_measure, surface, settings, progress)]
@@ -92,13 +95,14 @@ def _even(made: Surface, settings: Settings, progress: Progress) -> Stage[Surfac
 def _remesh(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:
     run = settings.run
     low, near = (np.zeros(3), made.mesh) if made.borders else _from_corner(made.mesh)
+    limited = (run.edge or run.target_faces) and not (made.borders or run.allow_far)
     found = remesh(
-        near, edge=run.edge, most=run.target_faces, crossing=made.crossing, threads=run.threads, progress=progress
-    )
+        near, edge=run.edge, most=run.target_faces, like=LIKE if limited else np.inf, crossing=made.crossing,
+        threads=run.threads, progress=progress,
+    )  # fmt: skip
     mesh, stats = found.mesh.moved(found.mesh.vertices + low), {"remesh": found.report}
-    if (run.edge or run.target_faces) and not (made.borders or run.allow_far):
-        _require_likeness(mesh, made.mesh)
-    even = replace(made, mesh=mesh, nearest=np.empty(0, np.int32), crossing=found.crossing)
+    lined = made.cavities - found.left_out.linings
+    even = replace(made, mesh=mesh, nearest=np.empty(0, np.int32), crossing=found.crossing, cavities=lined)
     _check(even)
     if made.filled is None:
         return Stage(even, stats, found.warnings)
@@ -117,25 +121,14 @@ def _from_corner(mesh: TriMesh) -> tuple[NDArray[np.float64], TriMesh]:
     return low, mesh.moved(np.round((mesh.vertices - low) / step) * step)
 
 
-def _require_likeness(mesh: TriMesh, before: TriMesh) -> None:
-    """Refuse triangles so large that they do not show the shape.
-
-    Raises
-    ------
-    GeometryError
-    """
-    share = float(mesh.face_volumes.sum()) / float(before.face_volumes.sum())
-    if not 1 / LIKE <= share <= LIKE:
-        raise GeometryError(
-            "the shape is lost with so few or so large faces",
-            found=f"{share:.0%} of the volume, {len(mesh.faces)} faces", expected=f"{1 / LIKE:.0%} to {LIKE:.0%}",
-            hint="more --target-faces, a shorter --edge, or --allow-far",
-        )  # fmt: skip
-
-
-def _smooth(made: Surface, settings: Settings) -> Stage[Surface]:
+def _smooth(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:
     """Take away the detail that is shorter than what was asked for."""
-    return _faired(made, settings) if settings.run.smooth > 0 else Stage(made)
+    if settings.run.smooth <= 0:
+        return Stage(made)
+    progress("smooth", 0, 1)
+    smooth = _faired(made, settings)
+    progress("smooth", 1, 1)
+    return smooth
 
 
 @timed("smooth")
@@ -159,6 +152,9 @@ def _faired(made: Surface, settings: Settings) -> Stage[Surface]:
         "left": found.left,
     }
     left = f"{found.left} of {found.pieces} pieces are thinner than --smooth, and were left as they are"
+    if found.left == found.pieces:
+        largest = float(np.ptp(before.vertices, axis=0).max())
+        left = f"--smooth {settings.run.smooth:g} changes nothing: all is thinner than that, {largest:.3g} long at most"
     return Stage(smooth, {"smooth": told}, (left,) if found.left else ())
 
 

@@ -79,6 +79,11 @@ class Phantom:
     lower: float
     upper: float
 
+    @property
+    def closed_truth(self) -> TriMesh:
+        """The truth with a flat cap over each end, for programs that want a solid."""
+        return _capped(self.truth)
+
 
 @dataclass(frozen=True)
 class Head:
@@ -252,6 +257,19 @@ def _tube(around: int, along: int) -> NDArray[np.int64]:
     beside = np.roll(low, -1, axis=1)
     corners = [low, beside, beside + around, low, beside + around, low + around]
     return np.stack(corners, axis=-1).reshape(-1, 3).astype(np.int64)
+
+
+def _capped(tube: TriMesh) -> TriMesh:
+    """Close a stack of rings, the lowest first, by fans of triangles around the middles of both ends."""
+    heights = tube.vertices[:, 2]
+    around, n = int((heights == heights[0]).sum()), len(tube.vertices)
+    low, high = np.arange(around), np.arange(n - around, n)
+    fans = [
+        np.stack([ring, np.roll(ring, turn), np.full(around, middle)], axis=1)
+        for ring, turn, middle in ((low, 1, n), (high, -1, n + 1))
+    ]
+    middles = [tube.vertices[ring].mean(axis=0) for ring in (low, high)]
+    return TriMesh(np.concatenate([tube.vertices, middles]), np.concatenate([tube.faces, *fans]))
 
 
 def _check(shape: tuple[int, int, int], spacing_mm: Triple, contrast: str, noise: float | None) -> None:

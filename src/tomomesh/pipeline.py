@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from .finish import compare_with, finish
 from .model.points import PointSet
-from .printing.part import require_printing
+from .printing.part import require_printing, turned
 from .progress import Progress, silent
 from .segmentation.study import select_study
 from .settings import Settings
@@ -138,9 +138,8 @@ def reconstruct_points(
     """
     settings = _settled(settings, changes)
     cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)
-    if cloud.frame == "LPS":
-        settings = settings.replace(units="mm")
     taken = take_points(cloud, settings)
+    settings = replace(settings, printing=turned(settings.printing, cloud.frame))
     begun = _begin(settings, changes, input=taken.value.input)
     made = begun.value.surface(taken.value, settings, progress)
     done, later = finish(replace(made.value, place=taken.value.place), settings, progress)
@@ -169,8 +168,11 @@ def _segmented(
     volume: Volume, labels: Volume | None, settings: Settings, given: Collection[str], progress: Progress
 ) -> tuple[Segmentation[Any], Way, Settings]:
     """Run stage one; return also the way that it takes, and the settings with nothing about that left open."""
+    progress("window", 0, 2)
     kept = select_study(volume, labels, settings)
+    progress("window", 1, 2)
     taken = take_way(kept.value, settings)
+    progress("window", 2, 2)
     begun = _begin(taken.value, given, input=_input_of(volume))
     way = begun.value
     assert way.segment is not None

@@ -44,7 +44,7 @@ class Segmentation(Reported, Generic[S]):
         Of the slices: axial, coronal or sagittal.
     mask : (K, J, I) bool array
         The window.
-    labels : (K, J, I) uint16 array
+    labels : (K, J, I) uint8 or uint16 array
         Every window pixel's winner: 0 background, neuron + 1 within its slice.
     points : PointSet
         The neurons, bridged gaps and caps in patient millimeters.
@@ -58,7 +58,7 @@ class Segmentation(Reported, Generic[S]):
     volume: Volume
     plane: str
     mask: NDArray[np.bool_]
-    labels: NDArray[np.uint16]
+    labels: NDArray[np.unsignedinteger[Any]]
     points: PointSet
     sampling: Sampling
     source: S

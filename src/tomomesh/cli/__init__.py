@@ -7,12 +7,14 @@ import os
 import signal
 import sys
 import threading
+import time
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from . import shell
 from .faults import as_error, is_full
-from .options import TOLD, build_parser, joined
+from .options import TOLD, build_parser
+from .parameter_options import joined
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -52,7 +54,9 @@ def _told(arguments: Sequence[str]) -> int:
 
 def _run(arguments: Sequence[str]) -> int:
     try:
+        begun = time.perf_counter()
         chosen = build_parser().parse_args(joined(arguments))
+        chosen.begun = begun
         if chosen.command in TOLD:
             shell.tell(chosen)
             return 0

@@ -76,8 +76,8 @@ def _checked(chosen: Namespace, settings: Settings) -> Path:
     single = [f"--{name.replace('_', '-')}" for name in SINGLE if getattr(chosen, name)]
     if single:
         raise UsageError("this option is for one study", found=f"{single[0]} with --each", hint="no --each")
-    if not chosen.study:
-        raise UsageError("there is no folder of studies", expected="STUDY")
+    if not isinstance(chosen.study, str):
+        raise UsageError("there is no folder of studies", expected="one STUDY, with --each")
     if chosen.output == "-" or os.path.realpath(chosen.output) == os.path.realpath(chosen.study):
         raise UsageError("--each writes into a folder of its own", file=chosen.output, hint="another folder")
     if Path(chosen.output).is_file():

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
+import time
 from argparse import Namespace
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import io
 from ..errors import UnreadableError, UsageError, printable
-from ..settings import Settings, parameters
+from ..settings import Settings, option_of, parameters
 from . import summary
+from .against import compared
 from .bars import Bars
 from .batch import reconstruct_each
+from .faults import require_kind
 from .outputs import (
+    OF_STUDIES,
+    check_archive,
     check_files,
     check_folder,
     check_frame,
@@ -27,8 +32,8 @@ from .outputs import (
     write_stage_one,
     write_surface,
 )
-from .parts import frame_of_mesh, frame_of_part, turned
-from .sources import read_study, sources_of
+from .parts import frame_of_mesh, frame_of_part
+from .sources import gathered, numbered, read_study, sources_of
 from .streams import streamed
 
 if TYPE_CHECKING:
@@ -40,8 +45,9 @@ if TYPE_CHECKING:
 
 def run(chosen: Namespace) -> None:
     """Run the command that was parsed."""
-    with streamed(chosen) as named:
-        _COMMANDS[named.command](named)
+    with streamed(gathered(chosen)) as named:
+        require_kind(named)
+        _COMMANDS[named.command](numbered(named))
 
 
 def settings_of(chosen: Namespace) -> Settings:
@@ -74,7 +80,7 @@ def _demo(chosen: Namespace) -> None:
         settings = settings.replace(lower=head.lower, upper=head.upper)
         surface = reconstruct(head.volume, settings, truth=head.truth, progress=progress)
         make_folder(folder)
-        io.write_mesh(head.truth, folder / "truth.ply")
+        io.write_mesh(head.closed_truth, folder / "truth.ply", precision=settings.run.precision)
         outputs = Namespace(
             output=folder / "mesh.stl", points=folder / "points.ply", labels=folder / "labels.nii.gz",
             report=folder / "report.json", save_settings=folder / "settings.toml", figures=folder / "figures",
@@ -95,12 +101,13 @@ def _reconstruct(chosen: Namespace) -> None:
 
 
 def _reconstruct_one(chosen: Namespace, settings: Settings) -> Surface:
-    check_outputs(chosen, io.MESH_WRITERS, *sources_of(chosen, settings))
+    check_outputs(chosen, OF_STUDIES, *sources_of(chosen, settings))
     check_frame(chosen.output, settings)
     from ..pipeline import reconstruct
 
     with Bars(quiet=chosen.quiet) as progress:
         volume, labels = read_study(chosen, settings, progress)
+        check_archive(chosen, volume)
         surface = reconstruct(volume, settings, labels=labels, progress=progress, **given_of(chosen))
         return write_surface(chosen, surface, settings, progress)
 
@@ -200,15 +207,23 @@ def _check(chosen: Namespace) -> None:
     from ..measure.report import assess
     from ..measure.winding import linings
 
-    other = io.read_mesh(chosen.against) if chosen.against else None
+    settings = settings_of(chosen)
+    of_study = given_of(chosen).keys() - {entry.name for entry in fields(settings.printing)}
+    if of_study and not chosen.against:
+        asked_for = ", ".join(map(option_of, sorted(of_study)))
+        raise UsageError("there is no study to choose voxels of", found=asked_for, expected="--against STUDY")
     mesh = io.read_mesh(chosen.mesh)
-    report = assess(mesh, against=other, cavities=linings(mesh))
+    report = assess(mesh, cavities=linings(mesh))
+    if chosen.against:
+        found = compared(chosen, mesh, settings)
+        report |= {key: found.pop(key) for key in [*found] if key == "dice" or key.endswith("_mm")}
+        report["against"] = found
     if chosen.print_check:
-        from ..printing.part import MM, resized
+        from ..printing.part import MM, resized, turned
         from ..printing.verdict import verdict
 
         named = frame_of_mesh(chosen.mesh)
-        asked = turned(settings_of(chosen).printing, named["frame"])
+        asked = turned(settings.printing, named["frame"])
         report["print"] = verdict(resized(mesh, MM[named["unit"]]), asked)
     if chosen.report:
         io.write_document(report, chosen.report)
@@ -218,7 +233,7 @@ def _check(chosen: Namespace) -> None:
 def _print(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     check_outputs(chosen, io.MESH_WRITERS, chosen.mesh)
-    from ..printing.part import make_part
+    from ..printing.part import make_part, turned
 
     with Bars(quiet=chosen.quiet) as progress:
         mesh = io.read_mesh(chosen.mesh)
@@ -226,7 +241,10 @@ def _print(chosen: Namespace) -> None:
         asked = replace(settings, printing=turned(settings.printing, named["frame"]))
         part = make_part(mesh, asked, unit=named["unit"], progress=progress)
         written = frame_of_part(named, settings.printing.scale)
-        io.write_mesh(part.mesh, chosen.output, unit=written["unit"], frame=written["frame"])
+        io.write_mesh(
+            part.mesh, chosen.output, unit=written["unit"], frame=written["frame"], z_up=True,
+            precision=settings.run.precision,
+        )  # fmt: skip
     report = {"print": part.report, "written": written, "settings": settings.to_dict()}
     if chosen.report:
         io.write_document(report, chosen.report)
@@ -252,7 +270,8 @@ def _shown(chosen: Namespace) -> str:
 
 def _tell(chosen: Namespace, report: dict[str, Any], lines: list[str]) -> None:
     if chosen.json or not chosen.quiet:
-        _say(report, None if chosen.json else lines)
+        spent = f", computed in {time.perf_counter() - chosen.begun:.2f} s, reading and writing included"
+        _say(report, None if chosen.json else [line + spent * line.startswith("written ") for line in lines])
 
 
 def _say(report: dict[str, Any], lines: list[str] | None) -> None:

@@ -7,12 +7,17 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-MESH_FORMATS = ("stl", "ply", "obj", "off", "glb", "vtp", "3mf", "gii")
+MESH_FORMATS = ("stl", "ply", "obj", "off", "glb", "vtp", "3mf", "gii", "surf.gii")
+STUDY_MESH_FORMATS = (*MESH_FORMATS, "dcm")
+"""Meshes of a study: DICOM Encapsulated STL too."""
 POINT_FORMATS = ("ply", "xyz", "csv", "npy", "vtp")
 LABEL_FORMATS = ("nii", "nii.gz")
-CHECKED_FORMATS = ("stl", "ply", "obj", "off")
-CLOUD_FORMATS = ("ply", "xyz", "txt", "csv", "npy", "npz", "pcd", "las", "laz", "e57", "obj", "off", "stl")
-STUDY_FORMATS = ("nii", "nii.gz", "nrrd", "mha", "mgh", "mgz", "npy", "tif", "tiff", "dcm", "ima", "zip")
+CHECKED_FORMATS = ("stl", "ply", "obj", "off", "vtp", "3mf", "glb", "gii", "dcm")
+CLOUD_FORMATS = (
+    "ply", "xyz", "txt", "csv", "npy", "npz", "pcd", "las", "laz", "e57", "obj", "off", "stl", "3mf", "glb", "gii",
+    "vtp", "asc", "pts", "ptx",
+)  # fmt: skip
+STUDY_FORMATS = ("nii", "nii.gz", "nrrd", "mha", "mgh", "mgz", "npy", "tif", "tiff", "dcm", "ima", "zip", "ozx")
 """Single files that hold a whole study."""
 HEADER_FORMATS = ("nhdr", "mhd", "hdr", "hdr.gz", "img", "img.gz")
 """Studies whose header and voxels lie in two files."""
@@ -26,7 +31,9 @@ def either(formats: Sequence[str]) -> str:
     return f"{', '.join(others)} or {last}" if others else last
 
 
-MESH, POINT, LABEL, CHECKED = map(either, (MESH_FORMATS, POINT_FORMATS, LABEL_FORMATS, CHECKED_FORMATS))
+MESH, STUDY_MESH, POINT, LABEL, CHECKED = map(
+    either, (MESH_FORMATS, STUDY_MESH_FORMATS, POINT_FORMATS, LABEL_FORMATS, CHECKED_FORMATS)
+)
 STUDY = (
     f"a file ({either(STUDY_FORMATS + HEADER_FORMATS)}), a folder of DICOM slices or of OME-Zarr, "
     "or a folder of PNG, TIFF or JPEG slices (with --spacing)"

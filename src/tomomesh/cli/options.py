@@ -11,6 +11,7 @@ from .. import __version__
 from ..errors import UsageError
 from ..settings import Settings, option_of, parameters
 from ..ways import WAYS
+from .faults import likely_command, likely_option
 from .formats import (
     CHECKED,
     CLOUD,
@@ -22,8 +23,10 @@ from .formats import (
     POINT_FORMATS,
     STUDY,
     STUDY_FORMATS,
+    STUDY_MESH,
+    STUDY_MESH_FORMATS,
 )
-from .parameter_options import LISTED, SEVERAL, add_parameter
+from .parameter_options import add_parameter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,7 +38,7 @@ TOLD = ("completion", "man")
 SHELLS = ("bash", "zsh", "fish", "tcsh")
 
 
-CUTS = ("scale", "flat_base", "hollow", "drain")
+CUTS = ("scale", "flat_base", "one_piece", "fill_cavities", "thicken", "hollow", "drain")
 """Parameters that change a part."""
 MESH_ONLY = ("local_origin", "smooth", "allow_far", "remesh", "edge", "target_faces")
 """Parameters of the run that matter to meshes alone."""
@@ -52,10 +55,31 @@ class _Parser(argparse.ArgumentParser):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(allow_abbrev=False, **kwargs)
+        self.commands: dict[str, argparse.ArgumentParser] = {}
 
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing a page and leaving."""
         raise UsageError(message, hint=f"`{self.prog} --help`")
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse; of an option or a command that there is not, say which was likely meant."""
+        words = list(args or ())
+        commands = [*self.commands]
+        if words and not words[0].startswith("-") and words[0] not in commands:
+            meant = likely_command(words[0], commands)
+            raise UsageError(
+                "there is no such command", found=words[0], expected=" | ".join(commands),
+                hint=meant or f"`{self.prog} --help`",
+            )  # fmt: skip
+        found, unknown = self.parse_known_args(words, namespace)
+        if unknown:
+            own = self.commands[found.command]
+            meant = likely_option(unknown[0], own._option_string_actions) if unknown[0].startswith("-") else ""
+            given = unknown[0].partition("=")
+            value = f"={given[2]}" if given[1] else "".join(f" {word}" for word in unknown[1:2])
+            said = f"unrecognized arguments: {' '.join(unknown)}"
+            raise UsageError(said, hint=f"{meant}{value}" if meant else f"`{own.prog} --help`")
+        return found
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -79,11 +103,13 @@ def build_parser() -> argparse.ArgumentParser:
     main = _command(commands, "reconstruct", "a study of slices in, a closed surface out", epilog=_ways("study"))
     _add_study(main)
     main.add_argument(
-        "-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format; with --each, a folder"
+        "-o", "--output", required=True, metavar="MESH", help=f"{STUDY_MESH}, or - with --format; with --each, a folder"
     )
-    _add_streams(main, STUDY_FORMATS, MESH_FORMATS)
+    _add_streams(main, STUDY_FORMATS, STUDY_MESH_FORMATS)
     _add_each(main)
-    _add_outputs(main, "points", "labels", "mask_out", "figures")
+    _add_outputs(main, "points", "labels", "mask_out", "figures").add_argument(
+        "--patient", action="store_true", help="copy the patient's fields of a DICOM study into MESH.dcm"
+    )
     _add_settings(main, (*STAGE_ONE, *STAGE_TWO, "run"))
 
     stage_one = _command(commands, "segment", "stage one alone: the neurons of all slices as points")
@@ -107,24 +133,39 @@ def build_parser() -> argparse.ArgumentParser:
     network.add_argument("--film", action="store_true", help="write the training as an animated GIF too")
     _add_outputs(network)
     _add_settings(
-        network,
-        ("window", "network", "run"),
-        without=("slices", "way", "signal", "contours", "space", "select", "keep", "units", *MESH_ONLY, *STUDY_ONLY),
-    )
+        network, ("window", "network", "run"),
+        without=(
+            "slices", "way", "signal", "contours", "space", "select", "keep", "units", "precision", *MESH_ONLY,
+            *STUDY_ONLY,
+        ),
+    )  # fmt: skip
 
     inspect = _command(commands, "inspect", "what is in a study: size, spacing, frame, gray levels, windows")
-    inspect.add_argument("study", metavar="STUDY", help=f"{STUDY}, or - with --input-format")
+    inspect.add_argument(
+        "study", metavar="STUDY", nargs="+", help=f"{STUDY}, or its slices one by one, or - with --input-format"
+    )
     _add_streams(inspect, STUDY_FORMATS)
     inspect.add_argument("--json", action="store_true", help="print the findings as JSON")
     _add_settings(inspect, ("read", "crop"), paper=False)
 
     check = _command(commands, "check", "the quality report of any mesh")
     check.add_argument("mesh", metavar="MESH", help=CHECKED)
-    check.add_argument("--against", metavar="MESH", help="a mesh that it should equal: distances both ways")
+    check.add_argument(
+        "--against", metavar="MESH|STUDY",
+        help="what it should equal: a mesh, or the voxels of a window or of labels (--select) of a study; Dice's "
+        "coefficient, and distances both ways",
+    )  # fmt: skip
+    check.add_argument(
+        "--mesh-frame", choices=("lps", "ras", "voxel"),
+        help="what the coordinates of MESH are in, where a study is beside it (default: as its file states, else lps)",
+    )  # fmt: skip
     check.add_argument("--report", metavar="FILE.json", help="write the report")
     check.add_argument("--json", action="store_true", help="print the report as JSON")
     check.add_argument("--print", dest="print_check", action="store_true", help="tell whether it can be printed, too")
-    _add_settings(check, ("printing",), without=(*CUTS, "print_check"), paper=False)
+    _add_settings(
+        check, ("read", "crop", "window", "printing"), without=(*CUTS, "print_check"),
+        paper=False,
+    )  # fmt: skip
 
     part = _command(commands, "print", "a closed mesh in, a part to print out: scaled, cut flat, hollowed")
     part.add_argument("mesh", metavar="MESH", help=CHECKED)
@@ -140,29 +181,8 @@ def build_parser() -> argparse.ArgumentParser:
     completion = _command(commands, "completion", "the script that completes commands and options in a shell")
     completion.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
     _command(commands, "man", "the manual page, for man and groff")
+    parser.commands = dict(commands.choices)
     return parser
-
-
-def joined(arguments: Sequence[str]) -> list[str]:
-    """Join the numbers after an option that takes several into one word, so that a file may follow them."""
-    words: list[str] = []
-    for word in arguments:
-        option, _, values = words[-1].partition("=") if words else ("", "", "")
-        if option in SEVERAL and values.count(",") < 2 and _is_number(word):
-            words[-1] = f"{option}={values},{word}" if values else f"{option}={word}"
-        elif option in LISTED and not values and all(map(_is_number, word.split(","))):
-            words[-1] = f"{option}={word}"  # a list that begins with a minus would look like an option
-        else:
-            words.append(word)
-    return words
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _command(commands: Any, name: str, text: str, *, epilog: str | None = None) -> argparse.ArgumentParser:
@@ -184,8 +204,8 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "study",
         metavar="STUDY",
-        nargs="?",
-        help=f"{STUDY}, or - with --input-format; --labels-in may stand in its place",
+        nargs="*",
+        help=f"{STUDY}, or its slices one by one, or - with --input-format; --labels-in may stand in its place",
     )
     parser.add_argument(
         "--labels-in",
@@ -201,8 +221,9 @@ def _add_streams(
     """Add the options that name formats where no suffix does."""
     group = parser.add_argument_group("Streams")
     group.add_argument(
-        "--input-format", choices=read, default=usual, help="what is read from standard input (default %(default)s)"
-    )
+        "--input-format", choices=read,
+        help=f"what is read from standard input (default {usual}), or from a file whose suffix does not tell",
+    )  # fmt: skip
     if written:
         group.add_argument("--format", choices=written, help="what is written to standard output (-o -)")
 
@@ -219,7 +240,7 @@ def _add_each(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--force", action="store_true", help="reconstruct again what is finished")
 
 
-def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
+def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> Any:
     """Add the options that name further files; what is shown goes with `_add_settings`."""
     kinds = {
         "points": ("FILE", f"write the points: {POINT}"),
@@ -233,6 +254,7 @@ def _add_outputs(parser: argparse.ArgumentParser, *files: str) -> None:
         group.add_argument(option_of(name), metavar=metavar, help=text)
     group.add_argument("--report", metavar="FILE.json", help="write the report")
     group.add_argument("--save-settings", metavar="FILE.toml", help="write the settings of this run, to repeat it")
+    return group
 
 
 def _add_settings(

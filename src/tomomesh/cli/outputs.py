@@ -23,12 +23,15 @@ if TYPE_CHECKING:
 
     from ..model.mesh import TriMesh
     from ..model.points import PointSet
+    from ..model.volume import Volume
     from ..results import Place, Segmentation, Surface
     from ..settings import Settings
     from .bars import Bars
 
 RAS_ALONE, LENGTHS = (".gii",), (".gii", ".3mf")
 """Suffixes of meshes that are in RAS whatever is asked, and of those whose coordinates are lengths."""
+OF_STUDIES = (*io.MESH_WRITERS, *io.ARCHIVED)
+"""Suffixes of meshes of a study."""
 
 
 def check_folder(path: str | Path) -> Path:
@@ -76,6 +79,8 @@ def check_frame(output: str | Path, settings: Settings) -> None:
     """Refuse voxel indices of a part to print and in a format of lengths, before any work is done."""
     if settings.run.frame == "voxel" and settings.printing.asked:
         raise UsageError("a part to print has no voxels", found="--frame = voxel", expected="--frame lps or ras")
+    if settings.printing.asked and suffix_of(output) in io.ARCHIVED:
+        raise UsageError("a part to print lies in no patient", file=str(output), expected="a mesh, or another format")
     if settings.run.frame == "voxel" and suffix_of(output) in LENGTHS:
         raise UsageError(
             "3MF and GIFTI hold lengths, not voxel indices", found=f"--frame = voxel, --output = {output}",
@@ -83,13 +88,28 @@ def check_frame(output: str | Path, settings: Settings) -> None:
         )  # fmt: skip
 
 
+def check_archive(chosen: Namespace, volume: Volume) -> None:
+    """Refuse a mesh for the archive of what is no DICOM study, and personal fields in any other file."""
+    archived = suffix_of(chosen.output) in io.ARCHIVED
+    if chosen.patient and not archived:
+        raise UsageError("only a mesh for the archive names its patient", found="--patient", expected="-o MESH.dcm")
+    if archived:
+        io.check_archived(volume.dicom, file=str(chosen.output))
+
+
 def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> Surface:
     """Write the mesh, and whatever else was asked for; return the surface, whose report tells of it."""
     stage_one = surface.segmentation
     at_vertices, on_faces = _fields(surface, chosen.output)
     mesh, frame = _placed(surface, chosen.output, settings)
-    io.write_mesh(mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces)
-    told: dict[str, dict[str, Any]] = {"written": frame}
+    if stage_one is not None and suffix_of(chosen.output) in io.ARCHIVED:
+        io.write_encapsulated(mesh, chosen.output, stage_one.volume.dicom, patient=chosen.patient)
+    else:
+        io.write_mesh(
+            mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces,
+            z_up=surface.part is not None, precision=settings.run.precision,
+        )  # fmt: skip
+    told: dict[str, dict[str, Any]] = {"written": _as_written(frame, chosen.output)}
     if getattr(chosen, "points", None):
         write_points(surface.points, stage_one, chosen.points, settings, surface.place)
     if stage_one is not None:
@@ -102,17 +122,23 @@ def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progr
     return surface
 
 
+def _as_written(frame: dict[str, str], output: str | Path) -> dict[str, str]:
+    """Name the unit of the numbers in a file: of formats of lengths millimeters, where the unit is known."""
+    return frame | {"unit": "mm"} if suffix_of(output) in LENGTHS and frame["unit"] != "unknown" else frame
+
+
 def _placed(surface: Surface, output: str | Path, settings: Settings) -> tuple[TriMesh, dict[str, str]]:
     """Return the mesh, or its part to print, in the frame that was asked for, with its unit and name.
 
-    GIFTI has a frame of its own.
+    GIFTI and DICOM have frames of their own.
     """
     stage_one, part = surface.segmentation, surface.part
     mesh = surface.mesh if part is None else part.mesh
     if stage_one is None:
         of_cloud = _frame_of_cloud(surface.place)
         return mesh, of_cloud if part is None else frame_of_part(of_cloud, settings.printing.scale)
-    asked = "ras" if suffix_of(output) in RAS_ALONE else settings.run.frame
+    own = "ras" if suffix_of(output) in RAS_ALONE else "lps" if suffix_of(output) in io.ARCHIVED else ""
+    asked = own or settings.run.frame
     frame = io.frame_of_study(asked, stage_one.volume.grid)
     named = {"unit": frame.unit, "frame": frame.name}
     return frame.mesh(mesh), named if part is None else frame_of_part(named, settings.printing.scale)
@@ -128,7 +154,7 @@ def write_points(
     else:
         frame = io.frame_of_study(settings.run.frame, stage_one.volume.grid)
         points, named = frame.points(points), {"unit": frame.unit, "frame": frame.name}
-    io.write_points(points, path, **named)
+    io.write_points(points, path, **named, precision=settings.run.precision)
     return named
 
 
@@ -166,7 +192,7 @@ def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any
     filled = surface.filled
     if surface.segmentation is not None:
         filled = surface.cap_faces if filled is None else surface.cap_faces | filled
-    return at_vertices, {} if filled is None else {"filled": filled}
+    return at_vertices, {} if filled is None or not filled.any() else {"filled": filled}
 
 
 def write_stage_one(chosen: Namespace, found: Segmentation[Any]) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..settings import LAYERS, MANY, asked_by, limits_of, option_of, parameters
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from dataclasses import Field
 
 ALIASES = {"cell_mm": "--cell"}
@@ -23,8 +24,61 @@ SEVERAL = tuple(
     option for _, entry in parameters() if entry.metadata["length"] == (1, 3) for option in spellings(entry.name)
 )
 """Options that take one number or three."""
+FIXED = {
+    option_of(entry.name): entry.metadata["length"][0]
+    for _, entry in parameters()
+    if len(entry.metadata["length"]) == 1
+}
+"""Options that take several numbers, and how many."""
 LISTED = tuple(option_of(entry.name) for _, entry in parameters() if entry.metadata["length"] == LAYERS)
 """Options that take one number, or several with commas between."""
+
+
+def joined(arguments: Sequence[str]) -> list[str]:
+    """Take the numbers after an option with spaces or with commas between them.
+
+    Those of an option that takes one number or several become one word, so that a file may follow them; those of an
+    option that takes a fixed count become as many.
+    """
+    words: list[str] = []
+    for word in arguments:
+        option, _, values = words[-1].partition("=") if words else ("", "", "")
+        own, _, listed = word.partition("=")
+        if option in SEVERAL and values.count(",") < 2 and _is_number(word):
+            words[-1] = f"{option}={values},{word}" if values else f"{option}={word}"
+        elif option in LISTED and not values and _are_numbers(word):
+            words[-1] = f"{option}={word}"  # a list that begins with a minus would look like an option
+        elif own in FIXED and _are_numbers(listed):
+            words += [own, *_listed(listed)]
+        elif "," in word and _are_numbers(word) and _takes_more(words):
+            words += _listed(word)
+        else:
+            words.append(word)
+    return words
+
+
+def _takes_more(words: Sequence[str]) -> bool:
+    """Tell whether the last option takes more numbers than it has."""
+    numbers = 0
+    while numbers < len(words) and _is_number(words[-1 - numbers]):
+        numbers += 1
+    return numbers < len(words) and numbers < FIXED.get(words[-1 - numbers], 0)
+
+
+def _listed(word: str) -> list[str]:
+    return [part for part in word.split(",") if part.strip()]
+
+
+def _are_numbers(word: str) -> bool:
+    return bool(_listed(word)) and all(map(_is_number, _listed(word)))
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
@@ -41,7 +95,7 @@ def add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
     group.add_argument(
         *options,
         dest=name,
-        type=_numbers if one_or_three or listed else _whole_numbers if many else _kind(meta),
+        type=_numbers if one_or_three or listed else _labels if many else _kind(meta),
         nargs=several,
         choices=meta["choices"] or None,
         metavar=None if meta["choices"] else _metavar(name, meta),
@@ -64,7 +118,7 @@ def _kind(meta: Any) -> Any:
 
 def _metavar(name: str, meta: Any) -> Any:
     if meta["length"] in (MANY, LAYERS):
-        return "N[,N...]" if meta["length"] == MANY else "X[,X...]"
+        return "N|NAME[,...]" if meta["length"] == MANY else "X[,X...]"
     if meta["length"] in ((), (1, 3)):
         return "X [Y Z]" if meta["length"] else {int: "N", float: "X", str: "NAME"}[meta["kind"]]
     if meta["metavar"]:
@@ -85,14 +139,14 @@ def _help(entry: Field[Any]) -> str:
     return (f"{meta['help']} ({told})" if told else str(meta["help"])).replace("%", "%%")
 
 
-def _whole_numbers(text: str) -> tuple[int, ...]:
-    return tuple(int(part) for part in text.split(","))
+def _labels(text: str) -> tuple[int | str, ...]:
+    """Take whole numbers, and names, which the label map is asked for."""
+    return tuple(int(part) if part.strip().lstrip("+-").isdecimal() else part.strip() for part in text.split(","))
 
 
 def _numbers(text: str) -> tuple[float, ...]:
     return tuple(float(part) for part in text.split(","))
 
 
-# argparse names them where they fail: "invalid whole numbers, joined by commas, value"
-_whole_numbers.__name__ = "whole numbers, joined by commas,"
+# argparse names it where it fails: "invalid numbers, joined by commas, value"
 _numbers.__name__ = "numbers, joined by commas,"

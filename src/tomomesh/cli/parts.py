@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
-
 from .. import io
 from ..errors import GeometryError
 
-if TYPE_CHECKING:
-    from ..settings.printing import PrintSettings
-
 PATIENT = ("LPS", "RAS")
 """Frames in which front and back, left and right are the patient's."""
-MIRRORED = {"anterior": "posterior", "posterior": "anterior", "left": "right", "right": "left"}
-"""Where a side of LPS lies in RAS."""
 
 
 def frame_of_mesh(path: str, unit: str | None = None) -> dict[str, str]:
@@ -34,11 +26,6 @@ def frame_of_mesh(path: str, unit: str | None = None) -> dict[str, str]:
             expected=" | ".join(MM), hint="--frame lps where the mesh is made",
         )  # fmt: skip
     return named
-
-
-def turned(asked: PrintSettings, frame: str) -> PrintSettings:
-    """Return the settings for a frame: the way down is that of LPS, against which RAS is turned by half a turn."""
-    return replace(asked, down=MIRRORED.get(asked.down, asked.down)) if frame == "RAS" else asked
 
 
 def frame_of_part(frame: dict[str, str], scale: float) -> dict[str, str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..show import draw_all
 from ..show.film import film
+from ..show.fit import draw_learning
 from ..show.maps import SHEETS, draw_maps
 from ..show.plane import Plane
 from ..show.render import View
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from ..results import Segmentation, Surface
     from ..settings import Settings
@@ -40,14 +42,14 @@ def pictures(
             "smoothed": surface.smoothed,
             "mesh": surface.mesh,
             "trace": surface.trace,
-            "view": _view(stage_one, settings),
+            "view": _view(surface),
         }
     if surface is not None and len(surface.cuberille.quads):
         stages |= {"cuberille": surface.cuberille, "triangulated": surface.cuberille.triangulated()}
     if stage_one is not None:
         volume, way = stage_one.volume, way_of(stage_one.way)
         stages |= {
-            "images": volume.voxels,
+            "images": _shown(stage_one, settings),
             "mask": stage_one.mask,
             "points": stage_one.points,
             "plane": Plane(spacing_mm=volume.spacing_mm[:2], upward=stage_one.plane != "axial"),
@@ -64,6 +66,7 @@ def pictures_of_network(trained: TrainedNetwork, title: str, axes: slice) -> Ite
     start = trained.start[:, axes]
     yield "01-topologies", draw_update_regions()
     yield "02-network", draw_adapted(inputs[:, axes], codebook[:, axes], graph, start=start, title=title)
+    yield "02-learning", draw_learning(trained.history)
     if graph.name in SHEETS:
         winners, _ = match(np.ascontiguousarray(codebook.T), np.ascontiguousarray(inputs.T))
         yield "02-maps", draw_maps(codebook, graph, winners)
@@ -83,6 +86,17 @@ def film_of_network(trained: TrainedNetwork, settings: Settings, pixel_area: flo
     return film(trained.inputs[:, axes], places, trained.lattice, notes=notes, title=title)
 
 
-def _view(stage_one: Segmentation[Any] | None, settings: Settings) -> View:
+def _shown(stage_one: Segmentation[Any], settings: Settings) -> NDArray[Any]:
+    """Return the levels of the slices; of a label map by itself what is chosen, over other labels, over background.
+
+    The number of a label is no gray level.
+    """
+    voxels, select = stage_one.volume.voxels, settings.window.select
+    if select is None or not np.isin(voxels[stage_one.mask], select).mean() > 0.5:
+        return voxels
+    return np.where(stage_one.mask, 2, voxels > 0).astype(np.uint8)
+
+
+def _view(surface: Surface) -> View:
     """Name the axes of the patient where there is one, and plainly where there is a cloud."""
-    return View() if stage_one is not None else View(unit=settings.run.units, axes=("x", "y", "z"))
+    return View() if surface.place is None else View(unit=surface.place.unit, axes=("x", "y", "z"))

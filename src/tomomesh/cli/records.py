@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 COLUMNS = (
-    "name", "exit_code", "error", "seconds", "vertices", "faces", "components", "genus", "sound", "self_intersections",
-    "area_mm2", "volume_mm3", "points_to_surface_mean_mm", "points_to_surface_p95_mm", "points_to_surface_max_mm",
-    "warnings",
+    "name", "exit_code", "error", "seconds", "vertices", "faces", "components", "cavities", "genus", "sound",
+    "self_intersections", "area_mm2", "volume_mm3", "points_to_surface_mean_mm", "points_to_surface_p95_mm",
+    "points_to_surface_max_mm", "warnings",
 )  # fmt: skip
 """Columns of the table of all studies; from `vertices` to the distances they are those of the report's quality."""
 

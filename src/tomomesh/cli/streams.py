@@ -1,9 +1,10 @@
-"""Standard input and output in place of files: ``-``."""
+"""Standard input and output in place of files, ``-``, and files whose format is named and not told by their suffix."""
 
 from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import sys
 from argparse import Namespace
@@ -11,16 +12,17 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import OutputError, TomomeshError, UsageError
+from ..errors import OutputError, TomomeshError, UsageError, printable
 from ..io.files.private import private_folder
+from ..io.files.source import existing_file, suffix_of
 from .formats import TEXTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 STREAM = "-"
-SOURCES = ("study", "cloud")
-"""Arguments that standard input may take the place of."""
+SOURCES = {"study": "nii", "cloud": "xyz"}
+"""Arguments that standard input may take the place of, and its format where none is named."""
 
 
 @contextmanager
@@ -37,19 +39,23 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
         For a format that is not named, and where a terminal would get bytes that are no text.
     """
     inside = next((name for name in SOURCES if getattr(chosen, name, None) == STREAM), "")
+    source = inside or _of_named_format(chosen)
     each = getattr(chosen, "each", False)
     outside = getattr(chosen, "output", None) == STREAM and not each
     if getattr(chosen, "format", None) and not (outside or each):
         raise UsageError("a file's suffix tells its format", found=f"--format {chosen.format}", expected="-o -")
     suffix = _suffix(chosen) if outside else ""
-    if not inside and not outside:
+    if not source and not outside:
         yield chosen
         return
-    with private_folder() as folder, _named_as_typed(folder):
+    typed = getattr(chosen, source) if source else STREAM
+    with private_folder() as folder, _named_as_typed(folder, typed):
         files = {}
-        if inside:
-            files[inside] = _received(Path(folder, f"input.{chosen.input_format}"))
-            files["typed"] = f"{STREAM} --input-format {chosen.input_format}"
+        if source:
+            suffix_in = chosen.input_format or SOURCES[source]
+            place = Path(folder, f"input.{suffix_in}")
+            files[source] = _received(place) if inside else _linked(place, typed)
+            files["typed"] = f"{shlex.quote(typed)} --input-format {suffix_in}"
         if not outside:
             yield Namespace(**vars(chosen) | files)
             return
@@ -58,6 +64,28 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
             yield Namespace(**vars(chosen) | files)
         with Path(files["output"]).open("rb") as file:
             shutil.copyfileobj(file, sys.stdout.buffer)
+
+
+def _of_named_format(chosen: Namespace) -> str:
+    """Return which argument is a file whose format is named; empty where none is, or its suffix says the same."""
+    named = getattr(chosen, "input_format", None)
+    source = next((name for name in SOURCES if getattr(chosen, name, None)), "")
+    if not named or not source:
+        return ""
+    path = getattr(chosen, source)
+    if not isinstance(path, str) or Path(path).is_dir():
+        raise UsageError("a format is that of one file", found=f"--input-format {named}", expected="a file, or -")
+    return "" if suffix_of(path) == f".{named}" else source
+
+
+def _linked(place: Path, typed: str) -> str:
+    """Give a file another name; a copy where the system has no links."""
+    path = existing_file(typed)
+    try:
+        place.symlink_to(path.resolve())
+    except OSError:
+        shutil.copyfile(path, place)
+    return str(place)
 
 
 def _suffix(chosen: Namespace) -> str:
@@ -86,11 +114,12 @@ def _received(path: Path) -> str:
 
 
 @contextmanager
-def _named_as_typed(folder: Path) -> Iterator[None]:
-    """Name streams in errors as they were typed, not the temporary files in their place."""
+def _named_as_typed(folder: Path, typed: str) -> Iterator[None]:
+    """Name what is read and written in errors as it was typed, not the temporary files in its place."""
     try:
         yield
     except TomomeshError as fault:
         inside = re.escape(f"{folder}{os.sep}")
-        fault.args = (re.sub(rf"{inside}(input|output)(\.\w+)+", STREAM, str(fault)),)
+        words = re.sub(rf"({inside})?\binput(\.\w+)+", lambda _: printable(typed), str(fault))
+        fault.args = (re.sub(rf"{inside}output(\.\w+)+", STREAM, words),)
         raise

@@ -8,6 +8,7 @@ from ..measure.topology import FAULTS
 from ..ways import way_of
 from ..ways.samples import points_in_words
 from ..ways.sections import unit_in_words
+from .against import of_agreement
 
 WIDTHS = ("thinnest_wall_mm", "thinnest_gap_mm")
 """Keys of the widths that are told of a part."""
@@ -21,7 +22,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
     """Say what was reconstructed, and how good it is."""
     quality = report["quality"]
     unit = unit_in_words(report)
-    shape = "closed and manifold" if quality["sound"] and quality["sound_after_welding"] else "NOT closed and manifold"
+    shape = "closed and manifold" if quality["sound"] else "NOT closed and manifold"
     shape = shape if quality["closed"] else "a manifold sheet"
     lines = [
         *_of_far(report),
@@ -33,7 +34,7 @@ def of_surface(report: dict[str, Any], output: str) -> list[str]:
         *_of_even(report),
         f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}, "
         f"{quality['self_intersections'] or 'no'} face(s) pass through others",
-        f"          {quality['components']} component(s), genus {quality['genus']}, "
+        f"          {pieces_in_words(quality)}, genus {quality['genus']}, "
         f"area {quality['area_mm2']:.6g} {unit}^2{_of_volume(quality, unit)}{_of_rings(quality)}",
         f"distance  points to surface: mean {quality['points_to_surface_mean_mm']:.3g}, "
         f"95 % {quality['points_to_surface_p95_mm']:.3g}, largest {quality['points_to_surface_max_mm']:.3g} {unit}",
@@ -77,7 +78,7 @@ def of_row(place: str, row: dict[str, Any]) -> str:
     if row.get("passed"):
         return f"{place}: finished before"
     shape = "sound" if row["sound"] else "NOT sound"
-    return f"{place}: {row['faces']} faces, {row['components']} component(s), {shape}, {row['seconds']:.1f} s"
+    return f"{place}: {row['faces']} faces, {pieces_in_words(row)}, {shape}, {row['seconds']:.1f} s"
 
 
 def of_batch(rows: list[dict[str, Any]], output: str) -> str:
@@ -95,7 +96,7 @@ def of_check(report: dict[str, Any]) -> list[str]:
     lines = [
         f"mesh      {report['vertices']} vertices, {report['faces']} faces",
         f"topology  {shape}; {same} after welding at 32 bits",
-        f"          {report['components']} component(s), Euler number {report['euler_number']}"
+        f"          {pieces_in_words(report)}, Euler number {report['euler_number']}"
         + (f", genus {report['genus']}" if report["sound"] else "")
         + loops,
         f"crossing  {report['self_intersections'] or 'no'} face(s) pass through others",
@@ -107,14 +108,7 @@ def of_check(report: dict[str, Any]) -> list[str]:
         *_parts(report),
         *_of_print(report),
     ]
-    if "mean_mm" in report:
-        lines += [
-            f"distance  to the other: mean {report['mean_mm']:.4g}, 95 % {report['p95_mm']:.4g}, "
-            f"largest {report['max_mm']:.4g}",
-            f"          from the other: mean {report['back_mean_mm']:.4g}, 95 % {report['back_p95_mm']:.4g}, "
-            f"largest {report['back_max_mm']:.4g}",
-        ]
-    return lines
+    return lines + of_agreement(report)
 
 
 def of_part(told: dict[str, Any], output: str) -> list[str]:
@@ -217,6 +211,14 @@ def _of_fit(report: dict[str, Any]) -> str:
     return f"{fit['iterations']} steps, {'at rest' if fit['converged'] else 'NOT at rest'}"
 
 
+def pieces_in_words(quality: dict[str, Any]) -> str:
+    """Count the pieces of a mesh, and the cavities in them, whose linings are components too."""
+    lined = quality["cavities"] or 0
+    if not lined:
+        return f"{quality['components']} component(s)"
+    return f"{quality['components'] - lined} piece(s) with {lined} cavity(ies)"
+
+
 def limit_in_words(limit: float | list[float | None] | None) -> str:
     """Name a limit, or one a layer."""
     each = limit if isinstance(limit, list) else [limit]
@@ -229,9 +231,10 @@ def _of_points(report: dict[str, Any]) -> str:
         return points_in_words(report)
     made = ""
     if points.get("on_bridges") or points.get("on_caps"):
-        bridges = "bridged gaps" if "networks" in report else "added voxels"
-        made = f", {points['on_bridges']} on {points['bridged_gaps']} {bridges}, {points['on_caps']} on caps"
-    return f"{points['count']}{made}, r = {points['spacing_mm']:.4g} {unit}"
+        bridges = "bridged gaps" if "networks" in report else "voxels added where two touch"
+        made = f", {points['on_bridges']} on {points['bridged_gaps']} {bridges}, "
+        made += f"{points['on_caps']} where the study ends" if points["on_caps"] else "none where the study ends"
+    return f"{points['count']}{made}; up to {points['spacing_mm']:.4g} {unit} apart"
 
 
 def _of_smooth(report: dict[str, Any]) -> list[str]:
@@ -281,4 +284,4 @@ def _ending(report: dict[str, Any], output: str) -> list[str]:
     warnings = [f"warning   {warning}" for warning in report["warnings"] if warning != _far(report)]
     notes = report.get("study", report["points"]).get("notes", [])
     told = [f"note      {'; '.join(notes)}"] if notes else []
-    return [*told, *warnings[:SHOWN], f"written   {output}, computed in {report['timings']['total_s']:.2f} s"]
+    return [*told, *warnings[:SHOWN], f"written   {output}"]

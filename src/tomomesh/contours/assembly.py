@@ -42,12 +42,15 @@ class Stack:
         Edge of the voxels.
     least : float
         Distance of slices where no part goes on as another.
+    thickness : float or None
+        Of a part that goes on as no other; a slice distance where it is None.
     """
 
     parts: Sequence[Part]
     links: Sequence[Link]
     edge: float
     least: float
+    thickness: float | None = None
 
     @cached_property
     def body(self) -> NDArray[np.int64]:
@@ -114,7 +117,7 @@ class Stack:
     def step_of(self, key: Key) -> float:
         """Return the median gap of the body of some parts."""
         gaps = self.gaps.get(int(self.body[key[0]]))
-        return self.step if gaps is None else float(np.median(gaps))
+        return self.thickness or self.step if gaps is None else float(np.median(gaps))
 
     def ending(self, key: Key, upward: bool) -> tuple[Ending, Floats]:
         """Return how parts end, and the way that they go sideways until then, (2,)."""
@@ -139,13 +142,23 @@ class Stack:
 
     @cached_property
     def frusta(self) -> Floats:
-        """Volume (b,) of each body's truncated cones between the areas of its parts, and of its ends."""
+        """Volume (b,) of each body between the areas of its parts, and of its ends.
+
+        Truncated cones, but beside an end the parabola by which it ends.
+        """
         found = np.zeros(int(self.body.max()) + 1)
         for low, high in self.before_and_after:
-            found[self.body[low[0]]] += frustum(self.area(low), self.area(high), self.gap(low, high))
+            found[self.body[low[0]]] += self._between(low, high)
         for key, upward in self.ends:
             found[self.body[key[0]]] += self.ending(key, upward)[0].volume * self.area(key)
         return found
+
+    def _between(self, low: Key, high: Key) -> float:
+        gap = self.gap(low, high)
+        last = [(low, False)] * (low not in self.before) + [(high, True)] * (high not in self.after)
+        ends = [(self.area(key), self.ending(key, upward)[0]) for key, upward in last]
+        curved = [area * end.inward(gap) for area, end in ends if end.fall > 0]
+        return float(np.mean(curved)) if curved else frustum(self.area(low), self.area(high), gap)
 
     @property
     def ends(self) -> list[tuple[Key, bool]]:

@@ -38,8 +38,7 @@ def rough_normal(local: Floats) -> tuple[Floats, float] | None:
     local : (n, 3) float array
         Points about their middle; their order changes nothing.
     """
-    some = local[_lots(local) < SAMPLE / len(local)]
-    some = some[np.lexsort(some.T)]
+    some = some_of(local)
     places = _places(some)
     wanted = min(max(PATCH * len(some) // len(local), 4), len(some))
     radius = np.asarray(cKDTree(some).query(places, k=[wanted])[0])[:, 0]
@@ -53,6 +52,12 @@ def rough_normal(local: Floats) -> tuple[Floats, float] | None:
     if values[0] >= TILT:
         return None
     return vectors[:, 0] * np.sign(vectors[np.argmax(np.abs(vectors[:, 0])), 0]), float(np.sqrt(np.median(squared)))
+
+
+def some_of(local: Floats) -> Floats:
+    """Return some `SAMPLE` points of a cloud, all where it has no more; which ones follows from their positions."""
+    some = local[_lots(local) < SAMPLE / len(local)]
+    return np.asarray(some[np.lexsort(some.T)])
 
 
 def _lots(local: Floats) -> Floats:

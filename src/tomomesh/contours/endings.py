@@ -66,6 +66,11 @@ class Ending:
         """Return what it encloses, per area of its last contour."""
         return self.reach * (1 - self.fall / 2 - self.bend / 3 - self.rest / (self.power + 1))
 
+    def inward(self, gap: float) -> float:
+        """Return what its parabola encloses before it, over a gap, per area of its last contour."""
+        t = gap / self.reach
+        return gap * (1 + self.fall * t / 2 - self.bend * t * t / 3)
+
     def left(self, t: float) -> float:
         """Return the share of the squared thickness that is left at a share t of the reach; beyond, but for the end."""
         u = min(t, 1.0)

@@ -12,7 +12,7 @@ from ..model.points import NEURON, RING, SIDE, STRUCTURE
 from .direction import FEWEST, axes_across, common_normal
 from .levels import typical_gap
 from .rings import holes
-from .slices import PARTED, Slices
+from .slices import LAYERS, PARTED, Slices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-def known_slices(points: PointSet) -> Slices | None:
+def known_slices(points: PointSet, thickness: float | None = None) -> Slices | None:
     """Take the slices and rings of points that know them, as the neurons of ring networks do.
 
     Parameters
@@ -30,6 +30,8 @@ def known_slices(points: PointSet) -> Slices | None:
     points : PointSet
         Of several rings in a slice, the attributes `RING` and `SIDE` tell which each point is on, and whether the
         ring is around the inside or around a hole; without `SIDE`, rings within an odd number of others are holes.
+    thickness : float, optional
+        How thick contours on one slice are; without, these are no slices.
 
     Returns
     -------
@@ -42,7 +44,7 @@ def known_slices(points: PointSet) -> Slices | None:
     order = order[neuron[order]]
     numbers = np.unique(points.slices[neuron])
     grouped = _grouped(order, points.slices, ring)
-    if len(numbers) < 2 or min(map(len, grouped)) < FEWEST:
+    if len(numbers) < (2 if thickness is None else 1) or min(map(len, grouped)) < FEWEST:
         return None
     rings = [points.positions[one] for one in grouped]
     origin = np.mean([corner for one in rings for corner in (one.min(axis=0), one.max(axis=0))], axis=0)
@@ -58,7 +60,7 @@ def known_slices(points: PointSet) -> Slices | None:
     rank = np.lexsort((levels, groups))
     labels = np.where(neuron, np.argsort(rank)[labels], -1)
     heights, groups = levels[rank], groups[rank]
-    gap = max(typical_gap(heights[groups == one]) for one in np.unique(groups))
+    gap = max(typical_gap(heights[groups == one]) for one in np.unique(groups)) or (thickness or 0.0) / LAYERS
     if max(float(np.ptp(height[one])) for one in grouped) > 2 * PARTED * gap or gap <= 0:
         return None
     sides = np.concatenate([side_lengths(one) for one in rings])

@@ -38,7 +38,9 @@ class Shape:
     depth: float
 
 
-def filled_between(stack: Stack, *, threads: int = 0, progress: Progress = silent) -> Values:
+def filled_between(
+    stack: Stack, heights: Floats | None = None, *, threads: int = 0, progress: Progress = silent
+) -> Values:
     """Interpolate the inside of slices to voxels.
 
     Along each link the distances f of both slices follow, at each pixel, a cubic over the height whose slopes are
@@ -50,6 +52,8 @@ def filled_between(stack: Stack, *, threads: int = 0, progress: Progress = silen
     Parameters
     ----------
     stack : Stack
+    heights : (K,) float array, optional
+        Of the layers of voxels, rising; those of `stack`'s own voxels where not given.
     threads : int
     progress : callable
 
@@ -59,8 +63,8 @@ def filled_between(stack: Stack, *, threads: int = 0, progress: Progress = silen
         Negative inside; in voxels.
     """
     shapes = _shapes(stack, threads)
-    volume = np.full(stack.shape, FAR, np.float32)
-    height = stack.low[2] + stack.edge * np.arange(len(volume))
+    height = stack.low[2] + stack.edge * np.arange(stack.shape[0]) if heights is None else heights
+    volume = np.full((len(height), *stack.shape[1:]), FAR, np.float32)
     spans = [_Span(stack, shapes, link, height) for link in stack.links]
     filled = 0
     for units in _rounds(spans):
@@ -147,6 +151,12 @@ class _Span:
         change, way = (g - f) / step, (other.center - one.center) / step
         before, after = self.stack.before.get(self.link.below), self.stack.after.get(self.link.above)
         slopes, ways = [change, change], [way, way]
+        if not before:
+            fall = self._toward_end(self.link.below, one, upward=False)
+            slopes[0] = parabolic(np.full_like(change, -fall), change, step, step)
+        if not after:
+            fall = self._toward_end(self.link.above, other, upward=True)
+            slopes[1] = parabolic(change, np.full_like(change, fall), step, step)
         if before:
             last = self.shapes[before]
             step_before = one.height - last.height
@@ -164,6 +174,11 @@ class _Span:
             values = cubic(t, step, f, g, *slopes)
             center = cubic(t, step, one.center, other.center, *ways)
             self._lay(volume[layer], values, low, center)
+
+    def _toward_end(self, key: Key, shape: Shape, *, upward: bool) -> np.float32:
+        """Return how fast the outline of a part closes where its end begins, in voxels."""
+        end = self.stack.ending(key, upward)[0]
+        return np.float32(shape.depth * end.fall * self.stack.edge / (2 * end.reach))
 
     def _fill_end(self, volume: Values) -> None:
         shape, reach = self.shapes[self.link.below or self.link.above], self.end.reach / self.stack.edge

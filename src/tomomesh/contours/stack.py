@@ -98,6 +98,7 @@ def contour_surface(
     slices: Slices,
     *,
     edge: float | None = None,
+    thickness: float | None = None,
     allow_leaks: bool = False,
     fit: FitSettings | None = None,
     threads: int = 0,
@@ -112,6 +113,8 @@ def contour_surface(
         As `find_slices` finds them.
     edge : float, optional
         Edge of the voxels; the sampling distance within the slices where not given.
+    thickness : float, optional
+        How thick a part is that goes on in no other slice; a slice distance where not given.
     allow_leaks : bool
         Close open contours by their chord.
     fit : FitSettings, optional
@@ -132,9 +135,8 @@ def contour_surface(
     drawn, found = _drawn(points, slices, allow_leaks, threads, progress)
     _refuse_open(found, slices, allow_leaks)
     asked = edge or slices.spacing
-    stack = _stack(drawn, found, slices, asked)
-    levels = filled_between(stack, threads=threads, progress=progress)
-    np.negative(levels, out=levels)
+    stack = _stack(drawn, found, slices, asked, thickness)
+    levels = _levels(stack, threads, progress)
     volume = _volume(levels, stack, slices)
     inside = levels > 0
     _require_any(inside, stack.edge)
@@ -149,6 +151,41 @@ def contour_surface(
         edges, rest, np.isinf(away), stack, slices_at(slices.heights), sum(len(outlined.rings) for outlined in found),
         sum(len(outlined.open) for outlined in found), max(outlined.reach for outlined in found), asked, levels.size,
     )  # fmt: skip
+
+
+def solid_between(
+    slices: Slices, heights: Floats, *, threads: int = 0, progress: Progress = silent
+) -> tuple[NDArray[np.float32], Floats, float]:
+    """Interpolate the inside of rings that are known to layers of pixels.
+
+    Parameters
+    ----------
+    slices : Slices
+        With `rings`; the pixels are as wide as its `spacing`, or wider where there would be too many.
+    heights : (K,) float array
+        Of the layers, rising.
+    threads : int
+    progress : callable
+
+    Returns
+    -------
+    (K, J, I) float32 array, (2,) float array, float
+        Depths in pixels, over 0 inside; the middle of the first pixel, in the frame of the slices; its edge.
+
+    Raises
+    ------
+    EmptyError
+        Where fewer than two slices enclose anything.
+    """
+    drawn, found = _drawn(np.empty((0, 3)), slices, False, threads, progress)
+    stack = _stack(drawn, found, slices, slices.spacing, None)
+    return _levels(stack, threads, progress, heights), stack.low[:2], stack.edge
+
+
+def _levels(stack: Stack, threads: int, progress: Progress, heights: Floats | None = None) -> NDArray[np.float32]:
+    """Return depths inside of the parts and between them."""
+    levels = filled_between(stack, heights, threads=threads, progress=progress)
+    return np.negative(levels, out=levels)
 
 
 def _drawn(
@@ -221,17 +258,17 @@ def _refuse_open(found: list[Outline], slices: Slices, allow_leaks: bool) -> Non
         )
 
 
-def _stack(drawn: list[Floats], found: list[Outline], slices: Slices, edge: float) -> Stack:
+def _stack(drawn: list[Floats], found: list[Outline], slices: Slices, edge: float, thickness: float | None) -> Stack:
     """Link the parts of all slices."""
     parts = [
         part
         for k, (points, outlined) in enumerate(zip(drawn, found, strict=True))
         for part in _parts(points, outlined, DENSE * edge, k)
     ]
-    if len({part.plane for part in parts}) < 2:
+    if len({part.plane for part in parts}) < (2 if thickness is None else 1):
         raise EmptyError("the contours enclose nothing", expected="at least two slices with closed contours")
     links = link_parts(parts, slices.groups, edge, complete=slices.complete)
-    stack = Stack(parts, links, edge, float(typical_gap(slices.heights)))
+    stack = Stack(parts, links, edge, typical_gap(slices.heights) or thickness or 0.0, thickness)
     while np.prod(stack.shape) > MOST_VOXELS:
         stack = replace(stack, edge=COARSER * stack.edge)
     return stack

@@ -11,17 +11,20 @@ from .clouds.write import POINT_WRITERS, write_points
 from .dicom import Listing, Series
 from .documents import read_settings, write_document, write_settings, write_table
 from .files.atomic import check_output, replacing
-from .frames import Frame, frame_of_study
+from .frames import Frame, frame_of_study, in_lps
+from .meshes.encapsulated import ARCHIVED, check_archived, write_encapsulated
 from .meshes.frame import frame_of_file
 from .meshes.read import MESH_READERS, read_mesh
 from .meshes.write import MESH_WRITERS, keeps, write_mesh
 from .studies.folder import Study, find_studies
+from .studies.label_names import label_names
 from .studies.listing import list_series
 from .studies.read import VOLUME_READERS, read_volume
 from .volumes.images import read_picture
 from .volumes.labels import LABEL_WRITERS, write_labels
 
 __all__ = [
+    "ARCHIVED",
     "LABEL_WRITERS",
     "MESH_READERS",
     "MESH_WRITERS",
@@ -32,11 +35,14 @@ __all__ = [
     "Listing",
     "Series",
     "Study",
+    "check_archived",
     "check_output",
     "find_studies",
     "frame_of_file",
     "frame_of_study",
+    "in_lps",
     "keeps",
+    "label_names",
     "list_series",
     "read_mesh",
     "read_picture",
@@ -45,6 +51,7 @@ __all__ = [
     "read_volume",
     "replacing",
     "write_document",
+    "write_encapsulated",
     "write_labels",
     "write_mesh",
     "write_points",

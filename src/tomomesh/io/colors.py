@@ -53,6 +53,13 @@ def _bytes(values: NDArray[Any]) -> NDArray[np.uint8] | None:
     return np.rint(values * scale).astype(np.uint8)
 
 
+def linear(colors: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return the shares of light, 0 to 1, that 8-bit sRGB colors stand for (IEC 61966-2-1)."""
+    shares = np.arange(256) / 255
+    light = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    return np.asarray(light.astype(np.float32)[colors])
+
+
 def packed_colors(packed: NDArray[np.uint32], *, alpha: bool = False) -> dict[str, NDArray[np.uint8]]:
     """Take apart 0xAARRGGBB, one number a point."""
     shifts = dict(zip((*COLORS, "alpha"), (16, 8, 0, 24), strict=True))

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..model.mesh import TriMesh
-from .volumes.nifti import FLIP
+from .meshes.attributes import MM
+from .volumes.nifti_frame import FLIP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,6 +46,36 @@ class Frame:
     def points(self, points: PointSet) -> PointSet:
         """Carry a cloud."""
         return replace(points, positions=self.place(points.positions))
+
+
+def in_lps(mesh: TriMesh, *, unit: str, frame: str, grid: Grid | None = None) -> TriMesh:
+    """Carry a mesh that was read to patient millimeters, LPS.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+    unit, frame : str
+        As files name them; counted from a corner, ``local:x,y,z``, it is brought back. Another frame than these, RAS
+        and voxel, and a unit that is unknown, are taken for LPS and mm.
+    grid : Grid, optional
+        How the study keeps its voxels, for a mesh of voxel indices.
+    """
+    affine = np.diag([*3 * [MM.get(unit, 1.0)], 1.0])
+    affine[:3, 3] = affine[0, 0] * _corner(frame)
+    if frame == "RAS":
+        affine = FLIP @ affine
+    elif frame == "voxel" and grid is not None:
+        affine = grid.affine
+    return Frame("mm", "LPS", affine).mesh(mesh)
+
+
+def _corner(frame: str) -> NDArray[np.float64]:
+    """Return the corner that a frame's coordinates are counted from, (3,)."""
+    try:
+        corner = np.array(frame.removeprefix("local:").split(","), np.float64)
+    except ValueError:
+        corner = np.zeros(0)
+    return corner if corner.shape == (3,) and np.isfinite(corner).all() else np.zeros(3)
 
 
 def frame_of_study(name: str, grid: Grid) -> Frame:

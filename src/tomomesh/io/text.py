@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+DECIMAL_COMMA = re.compile(r"[+-]?\d+(,\d+)?(e[+-]?\d+)?", re.IGNORECASE)
+"""A number as much of Europe writes it."""
 
 
 def read_lines(path: Path) -> list[str]:
@@ -60,6 +64,7 @@ def parse_rows(
         For ragged rows, and for text, NaN and infinite numbers in the required columns; it names the row.
     """
     delimiter = delimiter_of(lines)
+    lines = [line.replace(",", ".") for line in lines] if delimiter != "," and _has_commas(lines) else lines
     least = max(width, *(column + 1 for column in required), 1)
     if not any(map(_content, lines)):
         return np.empty((0, least))
@@ -73,9 +78,16 @@ def parse_rows(
 
 
 def delimiter_of(lines: Sequence[str]) -> str | None:
-    """Return what parts the columns, None for white space."""
+    """Return what parts the columns, None for white space; commas within all of its words are decimal ones."""
     content = next(filter(None, map(_content, lines)), "")
-    return next((mark for mark in ";," if mark in content), None)
+    words = content.split()
+    if ";" in content or (len(words) > 2 and all(map(DECIMAL_COMMA.fullmatch, words))):
+        return ";" if ";" in content else None
+    return "," if "," in content else None
+
+
+def _has_commas(lines: Sequence[str]) -> bool:
+    return any("," in line for line in lines)
 
 
 def first_row(lines: Sequence[str]) -> list[str]:

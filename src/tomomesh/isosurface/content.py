@@ -25,7 +25,7 @@ turns 7 % more."""
 OF_MASK = 2.0
 """Sharpness of what comes from a mask, which tells nothing of it. Chosen: half changes the distance by +11 %, twice by
 -0.8 % with 5 % more turns."""
-OF_LEVELS = 12.0
+OF_LEVELS = 10.0
 """How stiff a net is against bends around thin voxels, over the stiffness that is set. Chosen where faces turn as much
 as after a windowed sinc filter: half changes the distance by -1 % and the turns by +7 %, twice by +3 and -5 %. Where
 there are two levels, it is as stiff as around a mask, whose steps it shall not follow either."""
@@ -112,7 +112,8 @@ def content_of(levels: Levels, mask: Mask, turned: Mask, axis: int, threads: int
     sharpness = min(1 + max(high - RAMP, 0) / max(2 * (1 - high), 1e-9), SHARPEST)
     two = _two_levels(levels, least, most)
     held = Content(whole, levels, sharpness, *((OF_LEVELS,) if two is None else (EVENED, *two)))
-    if len(shares) and np.median(shares) > STEPPED and not held.is_mixed(turned):
+    steps = len(shares) > 0 and np.median(shares) > STEPPED
+    if (steps and not held.is_mixed(turned)) or _are_two(levels, mask):
         half = Levels(voxels, 0.5, np.inf)
         return Content(averages_of(turned, threads), half, OF_MASK, EVENED, 1.0, 0.0, of_mask=True)
     return held
@@ -165,3 +166,10 @@ def _faces_across(mask: Mask, axis: int) -> tuple[Index, Index]:
     step[:, 0] = np.where(inward, -1, 1)
     order = np.argsort([axis, *(other for other in range(3) if other != axis)])
     return low[:, order[::-1]], step[:, order[::-1]]
+
+
+def _are_two(levels: Levels, mask: Mask) -> bool:
+    """Tell whether the levels on both sides of the border are those of a mask, however thin what it holds is."""
+    faces = [_faces_across(mask, axis) for axis in range(3)]
+    inner, steps = (np.concatenate(each) for each in zip(*faces, strict=True))
+    return levels.are_two(inner, inner + steps)

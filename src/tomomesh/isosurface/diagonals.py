@@ -9,7 +9,7 @@ import numpy as np
 from ..kernels.isosurface.diagonals import NEITHER, OPEN, allow_diagonals, choose_diagonals
 from ..kernels.threads import in_blocks
 from ..model.mesh import TriMesh
-from .surface_nets import BLOCK
+from .means import BLOCK
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

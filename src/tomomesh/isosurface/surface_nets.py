@@ -10,28 +10,26 @@ import numpy as np
 from ..cuberille.neighbors import DIRECTIONS
 from ..dynamics.iterate import iterate
 from ..kernels.cuberille.cells import find_neighbors
-from ..kernels.isosurface.surface_nets import mean_of, move_in_cells
+from ..kernels.isosurface.surface_nets import move_in_cells
 from ..kernels.isosurface.voxels import list_faces, list_fans
 from ..kernels.threads import in_blocks
 from ..model.cubes import key_step, keys_of
 from ..model.trace import Motion
 from ..progress import Progress, silent
+from .means import BLOCK, means
+from .thin import AFTER, given_back
 from .well_composed import CORNERS, cells_where
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from ..model.trace import Trace
     from ..settings import FitSettings
     from .crossings import LevelCrossings
+    from .means import Finish
 
     Floats = NDArray[np.float64]
-    Finish = Callable[[Floats, slice], None]
 
-BLOCK = 40_000
-"""Vertices or faces handled in one call: far below 100 ms."""
 MARGIN = 1e-3
 """Share of a cell that a vertex keeps from its faces, so that two vertices, each in a cell of its own, never meet.
 Chosen: half and twice of it change the distance by 0.0 %."""
@@ -163,7 +161,7 @@ def settle(
     -------
     NetFit
     """
-    start = _means(crossings.positions, net.fans, threads)
+    start = means(crossings.positions, net.fans, threads)
     steps = _NetSteps(net, crossings, start, settings, threads)
     state, trace = iterate(steps, settings.max_steps, progress)
     return NetFit(start, state.position, trace)
@@ -171,10 +169,11 @@ def settle(
 
 @dataclass(frozen=True)
 class _NetState:
-    """Where the vertices are, (n, 3), and how far each moved last, (n, 3)."""
+    """Where the vertices are and how far each moved last, (n, 3), and where the squares are drawn to, (q, 3)."""
 
     position: Floats
     moves: Floats
+    pulls: Floats
 
 
 @dataclass(frozen=True)
@@ -189,11 +188,11 @@ class _NetSteps:
 
     def init(self) -> _NetState:
         """Return the net where it starts."""
-        return _NetState(self.start, np.zeros_like(self.start))
+        return _NetState(self.start, np.zeros_like(self.start), self.crossings.positions)
 
     def rested(self, motion: Motion, count: int) -> bool:
         """Tell whether all moves, and their changes from step to step, have fallen below the tolerance."""
-        return motion.rests(self.settings.tolerance)
+        return motion.rests(self.settings.tolerance) and not (count < AFTER[-1] and self.crossings.thin.any())
 
     def step(self, state: _NetState, count: int) -> tuple[_NetState, Motion]:
         """Move every vertex by the forces on it; how far each moved last is changed in place."""
@@ -203,11 +202,20 @@ class _NetSteps:
             low, moves = self.net.low[at], state.moves[at]
             move_in_cells(steps, state.position[at], low, MARGIN, moves, sums[at.start // BLOCK], 0, len(steps))
 
-        position = self._drawn(state.position, move)
+        pulls = self._pulls(state) if count in AFTER else state.pulls
+        position = self._drawn(state.position, pulls, move)
         speed, change = sums[:, :2].max(axis=0)
-        return _NetState(position, state.moves), Motion(speed, change, sums[:, 2].sum())
+        return _NetState(position, state.moves, pulls), Motion(speed, change, sums[:, 2].sum())
 
-    def _drawn(self, position: Floats, move: Finish) -> Floats:
+    def _pulls(self, state: _NetState) -> Floats:
+        """Draw squares out where the mask is thin."""
+        thin, places = self.crossings.thin, self.crossings.positions
+        if not thin.any():
+            return state.pulls
+        middles = means(state.position, self.net.quads, self.threads)
+        return given_back(self.net, thin, places, state.pulls, middles, self.threads)
+
+    def _drawn(self, position: Floats, pulls: Floats, move: Finish) -> Floats:
         """Move every vertex by the pull of its crossings and by what the springs resist.
 
         Both together are at most 1 + r times a vertex' distance from rest, r from the springs, and no step up to twice
@@ -215,7 +223,7 @@ class _NetSteps:
         """
 
         def pull(middle: Floats, at: slice) -> None:
-            np.subtract(self.crossings.positions[at], middle, out=middle)
+            np.subtract(pulls[at], middle, out=middle)
 
         def add(pulled: Floats, at: slice) -> None:
             pulled += resisted[at]
@@ -224,7 +232,7 @@ class _NetSteps:
 
         resisted, most = self._resisted(position)
         share = min(1.0, SAFE * 2 / (1 + most))
-        return _means(_means(position, self.net.quads, self.threads, pull), self.net.fans, self.threads, add)
+        return means(means(position, self.net.quads, self.threads, pull), self.net.fans, self.threads, add)
 
     def _resisted(self, position: Floats) -> tuple[Floats, float]:
         """Return the force of the springs on every vertex, and the most it is over the vertex' distance from rest.
@@ -245,22 +253,10 @@ class _NetSteps:
         def less(around: Floats, at: slice) -> None:
             np.subtract(tension[at], around, out=around)
 
-        return _means(tension, self.net.links, self.threads, less)
+        return means(tension, self.net.links, self.threads, less)
 
     def _tension(self, position: Floats) -> Floats:
         def less(around: Floats, at: slice) -> None:
             around -= position[at]
 
-        return _means(position, self.net.links, self.threads, less)
-
-
-def _means(values: Floats, members: NDArray[np.int32], threads: int, finish: Finish = lambda found, at: None) -> Floats:
-    """Average rows of an array over lists of them (m, s), and let each block be finished in place: (m, 3)."""
-    found = np.empty((len(members), 3))
-
-    def work(start: int, stop: int) -> None:
-        mean_of(values, members, found, start, stop)
-        finish(found[start:stop], slice(start, stop))
-
-    in_blocks(work, len(members), block=BLOCK, threads=threads)
-    return found
+        return means(position, self.net.links, self.threads, less)

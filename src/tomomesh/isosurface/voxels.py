@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from .crossings import LevelCrossings, Levels, crossings
 from .diagonals import placed, right_handed, triangulated
 from .surface_nets import Net, NetFit, net_around, settle
 from .thick_slices import thinned
+from .thin import thin_squares
 from .well_composed import without_contacts
 
 if TYPE_CHECKING:
@@ -127,6 +128,8 @@ def boundary(
     net = net_around(_filled(joined) if surface == "outer" else joined, threads)
     x, y, z = (net.inner + 1).T
     found = crossings(levels, net.inner, net.steps, ~padded[z, y, x], thin)
+    if found.bending:
+        found = replace(found, thin=thin_squares(joined, net))
     added = int(np.count_nonzero(joined) - np.count_nonzero(padded))
     return Boundary(affine, net, found, added, 1 if thin is None else thin.parts)
 

@@ -16,6 +16,7 @@ from .links import Links
 from .shape import areas_and_volumes, lengths_and_turns, shapes_of_edges, shapes_of_faces
 from .topology import Topology, distinct_positions, topology, topology_of, welded
 from .tree import Tree
+from .winding import places_in_cavities, winding_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,6 +87,7 @@ def assess(
         distances, nearest, back = _distances(mesh, tree, points, threads, progress)
         found |= spread_of(distances, "points_to_surface_") | spread_of(back, "vertices_to_points_")
         table.add_distances(distances, nearest)
+    found["cavity_places_mm"] = _in_cavities(mesh, tree, cavities, threads).tolist() if found["closed"] else []
     found["per_component"] = table.rows()
     found["components_not_listed"] = found["components"] - len(found["per_component"])
     if against is not None:
@@ -116,10 +118,20 @@ def _counted(mesh: TriMesh, counts: Topology, cavities: int) -> dict[str, Any]:
     again = counts if apart else topology(welded(mesh), cavities=cavities)
     found: dict[str, Any] = {"vertices": len(mesh.vertices), "faces": len(mesh.faces), **asdict(counts)}
     return found | {
+        "pieces": counts.components - cavities,
+        "cavities": cavities,
         "closed": counts.boundary_edges == 0,
         "sound": counts.sound,
         "sound_after_welding": again.sound,
     }
+
+
+def _in_cavities(mesh: TriMesh, tree: Tree, cavities: int, threads: int) -> Floats:
+    """Return a place in each of so many cavities, (c, 3); pieces that face inward around nothing are none."""
+    places = places_in_cavities(mesh, tree=tree, threads=threads) if cavities else np.empty((0, 3))
+    if len(places) == cavities:
+        return places
+    return places[[abs(winding_number(mesh, place)) < 0.5 for place in places]]
 
 
 def _distances(

@@ -1,4 +1,4 @@
-"""How often a surface goes around a place."""
+"""How often a surface goes around a place; which of its pieces line cavities, and a place in each."""
 
 from __future__ import annotations
 
@@ -9,9 +9,19 @@ import numpy as np
 from ..model.mesh import TriMesh
 from .links import Links
 from .shape import areas_and_volumes
+from .tree import Tree
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+TRIES = 16
+"""Faces of a lining, its largest, before which a place in the cavity is looked for: one before which there is room is
+enough, and the farthest is taken. Chosen: half and twice of it find a place as well, a nearer or a farther one."""
+HALVINGS = 40
+"""Times that a distance is halved where there is no room: 1e-12 of the cavity's size, below which no face is."""
+TOUCHES = 1 - 1e-6
+"""Share of a ball's radius within which the face that it touches may be the nearest: what 64 bits leave of it where the
+coordinates are a billion times as large."""
 
 
 def winding_number(mesh: TriMesh, place: NDArray[np.float64]) -> float:
@@ -20,7 +30,7 @@ def winding_number(mesh: TriMesh, place: NDArray[np.float64]) -> float:
     The sum of the solid angles of all faces over 4 pi (Jacobson, Kavan & Sorkine-Hornung 2013), each by the formula
     of van Oosterom & Strackee (1983). The place lies on no face.
     """
-    a, b, c = (mesh.corners[:, n] - place for n in range(3))
+    a, b, c = (mesh.vertices[mesh.faces[:, n]] - place for n in range(3))
     x, y, z = (np.sqrt((corner**2).sum(axis=1)) for corner in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=1)
     below = x * y * z + (a * b).sum(axis=1) * z + (b * c).sum(axis=1) * x + (c * a).sum(axis=1) * y
@@ -43,3 +53,50 @@ def linings(mesh: TriMesh) -> int:
         place = mesh.vertices[mesh.faces[np.argmax(piece == inward), 0]]
         count += winding_number(others, place) > 0.5
     return int(count)
+
+
+def places_in_cavities(mesh: TriMesh, *, tree: Tree | None = None, threads: int = 0) -> NDArray[np.float64]:
+    """Return a place in each cavity of a mesh, as programs that fill a mesh with finite elements ask for.
+
+    Before faces of its lining balls are laid that touch them, and halved until no other face reaches into them. So each
+    ball is empty, and its middle is on the same side as the face that it touches, whatever else lies in the cavity.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        Closed; its pieces of negative volume line cavities.
+    tree : Tree, optional
+        That of its faces.
+    threads : int
+        0 is one a core.
+
+    Returns
+    -------
+    (c, 3) float array
+        In the order of the lowest vertex of each lining; none for one without room for a ball.
+    """
+    piece, volumes = pieces_of(mesh)
+    tree = Tree.of_faces(mesh, threads=threads) if tree is None else tree
+    faces = _largest_faces(piece, mesh.face_areas, volumes < 0)
+    middles, normals = mesh.corners[faces].mean(axis=1), mesh.face_vectors[faces]
+    normals /= 2 * mesh.face_areas[faces, None]
+    radii, free = np.cbrt(np.abs(volumes[piece[faces]])), np.zeros(len(faces), np.bool_)
+    for _ in range(HALVINGS):
+        left = np.flatnonzero(~free)
+        if not len(left):
+            break
+        reach, _ = tree.nearest(middles[left] + radii[left, None] * normals[left], threads=threads)
+        free[left] = reach >= TOUCHES * radii[left]
+        radii[left] /= np.where(free[left], 1, 2)
+    order = np.lexsort((-radii, ~free, piece[faces]))
+    _, first = np.unique(piece[faces][order], return_index=True)
+    taken = order[first][free[order[first]]]
+    return np.asarray(middles[taken] + radii[taken, None] * normals[taken])
+
+
+def _largest_faces(piece: NDArray[np.int32], areas: NDArray[np.float64], some: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the largest faces, `TRIES` at most and none without area, of each of some pieces (c,)."""
+    asked = np.flatnonzero(some[piece] & (areas > 0))
+    order = asked[np.lexsort((-areas[asked], piece[asked]))]
+    first = np.searchsorted(piece[order], piece[order], side="left")
+    return order[np.arange(len(order)) - first < TRIES]

@@ -45,6 +45,12 @@ class Lattice:
     def __len__(self) -> int:
         return len(self.hops)
 
+    def __repr__(self) -> str:
+        """Return one line: the tables would fill pages."""
+        sides = f"{' x '.join(map(str, self.shape))} = " if len(self.shape) > 1 else ""
+        faces = f", {len(self.faces)} faces" if len(self.faces) else ""
+        return f"<Lattice: {self.name} of {sides}{len(self)} neurons, {len(self.edges)} edges{faces}>"
+
     @cached_property
     def nearest_first(self) -> NDArray[np.int32]:
         """All neurons in the order of their hops from each, (u, u)."""

@@ -34,8 +34,8 @@ def lattice(name: str, neurons: int, *, shape: tuple[int, int] | None = None) ->
         A grid has 4 neighbors a neuron, a hexagonal grid 6; a cylinder and a torus are a grid with one and with
         both pairs of sides joined; a sphere is an icosahedron divided f-fold.
     neurons : int
-        At least 3. A grid takes the two factors that are nearest to each other as its sides. A hexagonal grid, a
-        cylinder and a torus take the sides a <= b <= 2a, and a sphere the 10 f^2 + 2, that come nearest to it.
+        At least 3. A grid, a hexagonal grid, a cylinder and a torus take the sides a <= b <= 2a, and a sphere the
+        10 f^2 + 2, that come nearest to it.
     shape : (rows, columns), optional
         Sides of a grid, hexagonal grid, cylinder (length, girth) or torus (tube, ring), in place of `neurons`.
 
@@ -50,7 +50,7 @@ def lattice(name: str, neurons: int, *, shape: tuple[int, int] | None = None) ->
         raise UsageError("a network has more neurons", found=f"{neurons} neurons", expected=f"at least {LEAST}")
     if name in _SHEETS:
         build, least = _SHEETS[name]
-        sides = shape or (_factors(neurons) if name == "grid" else _sides(neurons, max(least)))
+        sides = shape or _sides(neurons, max(least))
         if len(sides) != 2 or min(sides) < min(least) or sides[0] < least[0] or sides[1] < least[1]:
             raise UsageError("the network cannot have these sides", found=f"shape = {sides}", expected=f">= {least}")
         return build(*sides)
@@ -59,9 +59,18 @@ def lattice(name: str, neurons: int, *, shape: tuple[int, int] | None = None) ->
     return _LINES[name](neurons) if name in _LINES else _sphere(neurons)
 
 
-def _factors(neurons: int) -> tuple[int, int]:
-    rows = next(n for n in range(int(neurons**0.5), 0, -1) if neurons % n == 0)
-    return rows, neurons // rows
+def other_number(graph: Lattice, asked: int | None) -> str | None:
+    """Say so where a sheet has another number of neurons than was asked for: 58 and 37 make none of even sides.
+
+    Examples
+    --------
+    >>> other_number(lattice("grid", 37), 37)
+    '37 neurons make no grid of about equal sides: it has 6 x 6 = 36'
+    """
+    if asked is None or graph.name not in _SHEETS or len(graph) == asked:
+        return None
+    rows, columns = graph.shape
+    return f"{asked} neurons make no {graph.name} of about equal sides: it has {rows} x {columns} = {len(graph)}"
 
 
 def _sides(neurons: int, least: int) -> tuple[int, int]:

@@ -47,15 +47,15 @@ class TriMesh:
         """Return the same faces over other positions."""
         return replace(self, vertices=vertices)
 
-    @cached_property
+    @property
     def corners(self) -> NDArray[np.float64]:
-        """Positions of the three corners of every face, (m, 3, 3)."""
+        """Positions of the three corners of every face, (m, 3, 3); not kept, for they are four times the mesh."""
         return self.vertices[self.faces]
 
     @cached_property
     def face_vectors(self) -> NDArray[np.float64]:
         """Outward normals whose length is twice the face's area, (m, 3)."""
-        a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
+        a, b, c = (self.vertices[corner] for corner in self.faces.T)
         return np.cross(b - a, c - a)
 
     @cached_property
@@ -67,11 +67,11 @@ class TriMesh:
     def face_volumes(self) -> NDArray[np.float64]:
         """Signed volume under each face, (m,); their sum is the volume of a closed mesh."""
         center = self.vertices.mean(axis=0) if len(self.vertices) else np.zeros(3)
-        return np.asarray(((self.corners[:, 0] - center) * self.face_vectors).sum(axis=1) / 6)
+        return np.asarray(((self.vertices[self.faces[:, 0]] - center) * self.face_vectors).sum(axis=1) / 6)
 
-    @cached_property
+    @property
     def half_edges(self) -> NDArray[np.int64]:
-        """Directed edges, three a face, (3m, 2)."""
+        """Directed edges, three a face, (3m, 2); not kept, for they are twice the faces."""
         return self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
     @cached_property

@@ -54,9 +54,11 @@ class PointSet:
     attributes : mapping of str to (n,) or (n, c) array
         What else is known of each point, by name: `COLORS`, ``intensity`` and the like.
     frame : str
-        ``"LPS"`` where the file of a cloud says that it is in patient millimeters; else ``"unknown"``.
+        As the file of a cloud names it, ``"LPS"`` or ``"RAS"`` where it is a patient's; else ``"unknown"``.
     notes : tuple of str
         What the reader decided or dropped, one line each, without patient data.
+    unit : str or None
+        Unit of the positions as the file of a cloud states it; None where it states none.
 
     Examples
     --------
@@ -74,6 +76,7 @@ class PointSet:
     attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     frame: str = "unknown"
     notes: tuple[str, ...] = ()
+    unit: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "positions", for_kernels(self.positions, np.float64))
@@ -121,4 +124,5 @@ class PointSet:
             both,
             self.frame,
             self.notes,
+            self.unit,
         )

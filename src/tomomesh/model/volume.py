@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
 AXES = ("sagittal", "coronal", "axial")
@@ -75,6 +77,11 @@ class Volume:
         What the reader decided or dropped, one line each, without patient data.
     padding : (lowest, highest) or None
         Gray levels that stand for nothing measured, where the file names them.
+    other_frame : str
+        The option that takes the file's other frame, where it holds two that disagree.
+    dicom : mapping of str
+        Fields of a DICOM study's header that say whose it is and where it belongs: never shown and never reported, only
+        written where the user asks for them.
 
     Examples
     --------
@@ -94,6 +101,8 @@ class Volume:
     unit: str = "stored"
     notes: tuple[str, ...] = ()
     padding: tuple[float, float] | None = None
+    other_frame: str = ""
+    dicom: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         k, j, i = self.shape

@@ -7,12 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import EmptyError
-from ..isosurface.voxels import boundary, voxel_surface
 from ..isosurface.well_composed import without_contacts
 from ..model.mesh import TriMesh
-from ..model.volume import Volume
-from ..settings import FitSettings
-from .depth import deep_inside, depth_near
+from .depth import deep_inside, deepest, depth_near, level_surface
 from .solids import mesh_of, solid_of
 
 if TYPE_CHECKING:
@@ -21,8 +18,6 @@ if TYPE_CHECKING:
     from ..progress import Progress
     from .depth import Depth
 
-FIT = FitSettings()
-"""At the default stiffness the inner side is even; with less of it, its vertices swing about the distance asked for."""
 SIMPLER = 0.005
 """Distance over the thickness of the wall by which the inner side may move where it is made coarser. Chosen: half of it
 changes the distance by -0.5 %, twice by +0.1 %."""
@@ -59,12 +54,12 @@ def hollowed(mesh: TriMesh, wall: float, *, threads: int, progress: Progress) ->
     depth = depth_near(mesh, wall, threads=threads, progress=progress)
     deep = deep_inside(depth, mesh, wall, wall**3)
     if not deep.any():
-        deepest = float(depth.values.max())
         raise EmptyError(
             "there is no room for a cavity",
             found=f"--hollow = {wall:g}",
             expected="a wall thinner than half of the part where that is thickest",
-            hint=f"a thinner wall, or a larger --scale; the farthest place looked at is {deepest:.3g} mm from a face",
+            hint="a thinner wall, or a larger --scale; "
+            f"the deepest place is about {deepest(mesh, threads):.3g} mm from a face",
         )
     inner = _coarser(_inner_side(depth, deep, wall, threads), wall)
     progress("hollow", 1, 1)
@@ -74,20 +69,12 @@ def hollowed(mesh: TriMesh, wall: float, *, threads: int, progress: Progress) ->
 
 def _inner_side(depth: Depth, deep: NDArray[np.bool_], wall: float, threads: int) -> TriMesh:
     """Return the surface around the deep nodes, outward from them."""
-    affine = np.diag([depth.step, depth.step, depth.step, 1.0])
-    affine[:3, 3] = depth.low
-    mask = np.ascontiguousarray(deep.transpose(2, 1, 0))
-    values = np.ascontiguousarray(depth.values.transpose(2, 1, 0))
 
-    def beyond(voxels: NDArray[np.int32]) -> NDArray[np.float64]:
-        x, y, z = voxels.T
-        return np.asarray(values[z, y, x], np.float64)
+    def beyond(nodes: NDArray[np.int32]) -> NDArray[np.float64]:
+        return np.asarray(depth.values[tuple(nodes.T[::-1])], np.float64)
 
     # contacts are closed by the wall and not by the cavity, or the wall would be thinner there
-    mask = ~without_contacts(~mask, beyond, threads)
-    volume = Volume.from_stored(values, affine)
-    found = boundary(volume, mask, lower=wall, threads=threads)
-    return voxel_surface(found, FIT, threads=threads).mesh
+    return level_surface(depth, ~without_contacts(~deep, beyond, threads), wall, threads)
 
 
 def _coarser(inner: TriMesh, wall: float) -> TriMesh:

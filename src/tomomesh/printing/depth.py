@@ -9,9 +9,13 @@ import numpy as np
 from scipy import ndimage
 
 from ..errors import ResourceError
+from ..isosurface.voxels import boundary, voxel_surface
+from ..measure.fill import fill_mesh
 from ..measure.tree import Tree
 from ..measure.winding import winding_number
 from ..model.columns import box
+from ..model.volume import Volume
+from ..settings import FitSettings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,6 +30,10 @@ STEPS = 3
 -0.9 %, with eight times the nodes."""
 COARSEST = 16
 """Nodes along the blocks that are looked at first; they are halved four times. Only speed depends on it."""
+LOOKED_AT = 48
+"""Nodes along the longest side of a part among which the deepest is sought: known to half their distance."""
+FIT = FitSettings()
+"""At the default stiffness an inner side is even; with less of it, its vertices swing about the distance asked for."""
 MOST_NODES = 100_000_000
 """Nodes over which a grid is refused: it would take some two gigabytes."""
 
@@ -49,11 +57,15 @@ class Depth:
     values: NDArray[np.float32]
 
 
-def depth_near(mesh: TriMesh, wall: float, *, threads: int, progress: Progress) -> Depth:
+def depth_near(
+    mesh: TriMesh, wall: float, *, threads: int, progress: Progress, stage: str = "hollow", around: float = 0.0,
+    steps: float = STEPS,
+) -> Depth:  # fmt: skip
     """Measure the distance to a mesh on a grid, exactly where it is near the thickness of a wall.
 
     Blocks of nodes are halved where the distance of their middle does not tell that all lie on one side. So the work
-    follows the area of the surface that is looked for, not the volume.
+    follows the area of the surface that is looked for, not the volume. The grid reaches `around` beyond the mesh, with
+    `steps` nodes along the wall.
 
     Raises
     ------
@@ -61,14 +73,14 @@ def depth_near(mesh: TriMesh, wall: float, *, threads: int, progress: Progress) 
         Where the grid would be too large; names the thinnest wall that fits.
     """
     lowest, highest = box(mesh.vertices)
-    step = wall / STEPS
-    low = lowest - step
-    shape = np.ceil((highest - lowest) / step / COARSEST + 0.5).astype(np.int64)
+    step = wall / steps
+    low = lowest - step - around
+    shape = np.ceil((highest - lowest + 2 * around) / step / COARSEST + 0.5).astype(np.int64)
     nodes = float(np.prod(shape.astype(np.float64))) * COARSEST**3
     if nodes > MOST_NODES:
         raise ResourceError(
             "so thin a wall takes too fine a grid",
-            found=f"--hollow = {wall:g}",
+            found=f"--{stage} = {wall:g}",
             expected=f"about {wall * (nodes / MOST_NODES) ** (1 / 3):.3g} or more",
         )
     tree = Tree.of_faces(mesh, threads=threads)
@@ -80,7 +92,7 @@ def depth_near(mesh: TriMesh, wall: float, *, threads: int, progress: Progress) 
         found, _ = tree.nearest(middles, threads=threads)
         values[tuple(kept.T)] = found
         level += 1
-        progress("hollow", level, levels + 1)
+        progress(stage, level, levels + 1)
         if side == 1:
             return Depth(low, step, values)
         reach = step * (np.sqrt(3) / 2 * (side - 1) + 1)
@@ -105,3 +117,24 @@ def deep_inside(depth: Depth, mesh: TriMesh, wall: float, least: float) -> NDArr
         deepest = np.unravel_index(int(np.argmax(own)), own.shape) + np.array([part.start for part in where])
         taken[piece] = winding_number(mesh, depth.low + depth.step * deepest) > 0.5
     return taken[pieces]
+
+
+def level_surface(depth: Depth, within: NDArray[np.bool_], level: float, threads: int) -> TriMesh:
+    """Return the surface around nodes that lie beyond a level, outward from them, between the nodes by their values."""
+    affine = np.diag([depth.step, depth.step, depth.step, 1.0])
+    affine[:3, 3] = depth.low
+    mask, values = (np.ascontiguousarray(each.transpose(2, 1, 0)) for each in (within, depth.values))
+    found = boundary(Volume.from_stored(values, affine), mask, lower=level, threads=threads)
+    return voxel_surface(found, FIT, threads=threads).mesh
+
+
+def deepest(mesh: TriMesh, threads: int) -> float:
+    """Return about how far the place deepest inside of a mesh is from its faces, among `LOOKED_AT` a side."""
+    lowest, highest = box(mesh.vertices)
+    step = float((highest - lowest).max()) / LOOKED_AT
+    affine = np.diag([step, step, step, 1.0])
+    affine[:3, 3] = lowest + 0.5 * step
+    shape = np.maximum(np.ceil((highest - lowest) / step), 1).astype(np.int64)
+    grid = Volume.from_stored(np.zeros(tuple(shape), np.uint8), affine)
+    inside = grid.to_mm(np.argwhere(fill_mesh(mesh, grid))[:, ::-1].astype(np.float64))
+    return float(Tree.of_faces(mesh, threads=threads).nearest(inside, threads=threads)[0].max(initial=0.0))

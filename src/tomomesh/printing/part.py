@@ -1,8 +1,8 @@
-"""The part to print, one arrow a line: mesh -> scaled -> cut flat -> hollowed -> drained."""
+"""The part to print, one arrow a line: mesh -> scaled -> mended -> cut flat -> hollowed -> drained."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,15 +13,24 @@ from ..progress import Progress, silent
 from .cavity import hollowed
 from .drains import drained
 from .flat_base import stood
+from .pieces import largest_piece, without_cavities
 from .solids import require_solids
+from .thicken import thickened
 from .verdict import verdict
 
 if TYPE_CHECKING:
     from ..model.mesh import TriMesh
     from ..settings import Settings
+    from ..settings.printing import PrintSettings
 
-MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "unknown": 1.0}
-"""Millimeters in the unit of a cloud."""
+MM = {
+    "um": 0.001, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8, "unknown": 1.0,
+}  # fmt: skip
+"""Millimeters in the unit of a cloud or a mesh; one that is unknown is taken for them."""
+
+
+MIRRORED = {"anterior": "posterior", "posterior": "anterior", "left": "right", "right": "left"}
+"""Where a side of LPS lies in RAS."""
 
 
 @dataclass(frozen=True)
@@ -35,21 +44,30 @@ class Part:
     per_unit : float
         Printed millimeters in a unit of the object's coordinates.
     settings : Settings
+    notes : tuple of str
+        What was asked for and changed nothing.
     """
 
     mesh: TriMesh
     per_unit: float
     settings: Settings
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def report(self) -> dict[str, Any]:
         """Whether it can be printed, key by key in docs/printing.md; measured on first use."""
-        return verdict(self.mesh, self.settings.printing, threads=self.settings.run.threads)
+        told = verdict(self.mesh, self.settings.printing, threads=self.settings.run.threads)
+        return told | {"notes": [*self.notes, *told["notes"]]}
 
 
 def resized(mesh: TriMesh, factor: float) -> TriMesh:
     """Return a mesh with every coordinate times a factor."""
     return mesh if factor == 1 else mesh.moved(factor * mesh.vertices)
+
+
+def turned(asked: PrintSettings, frame: str) -> PrintSettings:
+    """Return the settings for a frame: the way down is that of LPS, against which RAS is turned by half a turn."""
+    return replace(asked, down=MIRRORED.get(asked.down, asked.down)) if frame == "RAS" else asked
 
 
 def require_printing(settings: Settings) -> None:
@@ -65,14 +83,14 @@ def require_printing(settings: Settings) -> None:
 
 
 def make_part(mesh: TriMesh, settings: Settings, *, unit: str = "mm", progress: Progress = silent) -> Part:
-    """Make a part to print of a closed mesh: scale it, cut it flat, hollow it, drain it, as far as asked for.
+    """Make a part to print of a closed mesh: scale, mend, cut, hollow and drain it, as far as asked for.
 
     Parameters
     ----------
     mesh : TriMesh
     settings : Settings
-    unit : {"mm", "cm", "m", "unknown"}
-        Of the mesh's coordinates; those of the part are millimeters.
+    unit : str
+        A key of `MM`, of the mesh's coordinates; those of the part are millimeters.
     progress : callable
 
     Returns
@@ -95,13 +113,26 @@ def make_part(mesh: TriMesh, settings: Settings, *, unit: str = "mm", progress: 
             "the mesh encloses no solid", found=faults, expected="a closed, outward 2-manifold", hint="`tomomesh check`"
         )
     asked, threads = settings.printing, settings.run.threads
+    if unit not in MM:
+        raise GeometryError(
+            "the unit of what is to be printed has no known length", found=f"unit = {unit}",
+            expected=" | ".join(MM), hint="--units",
+        )  # fmt: skip
     per_unit = asked.scale * MM[unit]
     made = resized(mesh, per_unit)
+    if asked.one_piece:
+        made = largest_piece(made)
+    if asked.fill_cavities:
+        made = without_cavities(made)
+    if asked.thicken is not None:
+        made = thickened(made, asked.thicken, threads=threads, progress=progress)
     if asked.flat_base is not None:
         made = stood(made, asked.flat_base, asked.down)
     if asked.hollow is not None:
         made = hollowed(made, asked.hollow, threads=threads, progress=progress)
+    notes: tuple[str, ...] = ()
     if asked.drain is not None:
+        notes = () if linings(made) else ("there is no cavity to drain: --hollow makes one",)
         made = drained(made, asked.drain, asked.down)
     check_promise(made, cavities=linings(made))
-    return Part(made, per_unit, settings)
+    return Part(made, per_unit, settings, notes)

@@ -29,7 +29,7 @@ def require_solids(settings: PrintSettings) -> None:
     if settings.cuts and find_spec(PACKAGE) is None:
         raise UsageError(
             "a part is cut and hollowed by a package that is not installed",
-            found="--flat-base, --hollow or --drain",
+            found="--flat-base, --thicken, --hollow or --drain",
             expected=PACKAGE,
             hint='pip install "tomomesh[print]"',
         )

@@ -24,6 +24,9 @@ supports (Thomas 2009)."""
 NEAR = 10
 """Widest gap that is looked for, over the thinnest wall that the printer makes. Chosen: wider ones are left out of the
 report, and none of them keeps a part from being printed."""
+SMALLEST, LARGEST = 5.0, 1000.0
+"""Thinnest walls that a part is long at least, and millimeters at most, for a note alone. Chosen: what is smaller has
+no inside, and build volumes of usual printers end below a meter."""
 ON_PLATE = 1e-6
 """Height over the size of the part up to which it lies on the plate. What 32-bit coordinates keep, 6e-8, with room for
 one turn."""
@@ -63,7 +66,7 @@ def verdict(mesh: TriMesh, settings: PrintSettings, *, threads: int = 0, progres
     narrow = [width for width in (told["thinnest_wall_mm"], told["thinnest_gap_mm"]) if width is not None]
     told["smallest_feature_mm"] = min(narrow, default=None)
     told["reasons"] = _reasons(told, walls, settings.least_wall)
-    told["notes"] = _notes(told)
+    told["notes"] = _notes(told, settings.least_wall)
     told["printable"] = not told["reasons"]
     return told
 
@@ -111,19 +114,24 @@ def _reasons(told: dict[str, Any], walls: Thickness, least: float) -> list[str]:
     """Say what keeps a part from being printed; thin spots smaller than the printer's own wall do not."""
     reasons = []
     if told["floating_pieces"]:
-        reasons.append(f"{told['floating_pieces']} of {told['pieces']} pieces float free of the plate")
+        reasons.append(f"{told['floating_pieces']} of {told['pieces']} pieces float free of the plate (--one-piece)")
     if walls.area_below(least) > least**2:
         share = 100 * told["thin_wall_share"]
         thinnest = f"thinnest wall {told['thinnest_wall_mm']:.3g} mm at {_at(told['thinnest_wall_at_mm'])}"
-        reasons.append(f"{thinnest}, {share:.3g} % of the surface under {least:g} mm")
+        reasons.append(f"{thinnest}, {share:.3g} % of the surface under {least:g} mm (--thicken {least:g})")
     return reasons
 
 
-def _notes(told: dict[str, Any]) -> list[str]:
+def _notes(told: dict[str, Any], least: float) -> list[str]:
     """Say what a printer should know."""
-    notes = []
+    notes, longest = [], max(told["size_mm"])
+    if not SMALLEST * least <= longest <= LARGEST:
+        size = "smaller than a printer resolves" if longest < LARGEST else "larger than printers are"
+        notes.append(f"{longest:.3g} mm long, it is {size}: --scale, or --units where they are not mm")
     if told["sealed_cavities"]:
-        notes.append(f"{told['sealed_cavities']} sealed cavity(ies): resin or powder stays inside (--drain)")
+        notes.append(
+            f"{told['sealed_cavities']} sealed cavity(ies): resin or powder stays inside (--drain, --fill-cavities)"
+        )
     if told["thin_gap_share"] > 0:
         notes.append(f"narrowest gap {told['thinnest_gap_mm']:.3g} mm at {_at(told['thinnest_gap_at_mm'])} may close")
     if told["self_intersections"]:

@@ -49,9 +49,9 @@ def find_creases(
         What the length of a crease is compared with.
     """
     starts, ends = mesh.half_edges.T
-    half = np.arange(len(twins))
-    turn = np.einsum("ij,ij->i", normals[half // 3], normals[np.maximum(twins, 0) // 3])
-    found = np.flatnonzero((turn < SHARP) & (half < twins))
+    once = np.flatnonzero(np.arange(len(twins)) < twins)
+    turn = sum(normals[once // 3, axis] * normals[twins[once] // 3, axis] for axis in range(3))
+    found = once[turn < SHARP]
     kinds = np.full(len(mesh.vertices), FREE, np.uint8)
     found = found[~_doubled(mesh, starts[found], ends[found], BESIDE * edge)]
     for _ in range(ROUNDS):

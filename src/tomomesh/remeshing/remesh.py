@@ -14,6 +14,7 @@ from ..model.columns import any_of
 from ..progress import Progress, silent
 from .ground import EVEN, Ground, even_edge
 from .making import Making
+from .specks import NOTHING, LeftOut, without_specks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,6 +45,9 @@ AIM = 0.97
 """Share of the most faces that is aimed at, for the number that a length of edges leads to varies by some percent."""
 MOST_FACES = 40_000_000
 """Faces over which edges are refused as too short: they would take some 16 gigabytes."""
+MORE = 1.3
+"""Factor between the numbers of faces that are tried where fewer were asked for than can be: how much too large the one
+may be that is named."""
 COARSER = 12
 """Most rounds in which edges become longer until there are no more faces than asked for."""
 
@@ -62,7 +66,9 @@ class Remeshed:
     kept : int
         Vertices of the mesh before that are kept, as even triangles would pass through others there.
     before : TriMesh
-        The mesh before.
+        The mesh before, without what was left out.
+    left_out : LeftOut
+        Components too small for as few faces as were asked for.
     """
 
     mesh: TriMesh
@@ -70,18 +76,26 @@ class Remeshed:
     edge: float
     kept: int
     before: TriMesh
+    left_out: LeftOut = NOTHING
 
     @property
     def report(self) -> dict[str, Any]:
         """What is told of it."""
-        moved = self.mesh is not self.before
-        return {"done": moved, "edge_mm": self.edge, "faces_before": len(self.before.faces), "kept_vertices": self.kept}
+        return {
+            "done": self.mesh is not self.before,
+            "edge_mm": self.edge,
+            "faces_before": len(self.before.faces),
+            "kept_vertices": self.kept,
+            "left_out_components": self.left_out.pieces,
+            "left_out_share": self.left_out.share,
+        }
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What must be known of it."""
         said = "the triangles are not even: even ones would pass through each other where sheets nearly touch"
-        return (said,) if self.mesh is self.before else ()
+        left = (self.left_out.told,) if self.left_out.pieces else ()
+        return (*((said,) if self.mesh is self.before else ()), *left)
 
 
 def remesh(
@@ -89,6 +103,7 @@ def remesh(
     *,
     edge: float | None = None,
     most: int | None = None,
+    like: float = np.inf,
     crossing: Marks | None = None,
     threads: int = 0,
     progress: Progress = silent,
@@ -106,7 +121,9 @@ def remesh(
     edge : float, optional
         Length of edges. Where it is not given, as many faces as there are now suffice.
     most : int, optional
-        Most faces.
+        Most faces. Where there are more, components that are too small for so few are left out (`specks`).
+    like : float
+        Factor by which the volume may change at most.
     crossing : (m,) bool array, optional
         Faces that pass through others before, where that is known.
     threads : int
@@ -116,37 +133,78 @@ def remesh(
     Returns
     -------
     Remeshed
-        Of as many components and handles, and no more faces that pass through others.
+        Of as many components and handles, and, where no number of faces is asked for, no more faces that pass through
+        others.
 
     Raises
     ------
     GeometryError
-        Where the shape cannot be kept with so few faces; names how many it takes.
+        Where the shape cannot be kept with so few or so large faces; names a number that is enough.
     """
     _require_room(mesh, edge)
+    whole, left_out = mesh, NOTHING
+    if most is not None and most < len(mesh.faces):
+        mesh, left_out = without_specks(mesh, most)
+        crossing = None if left_out.pieces else crossing
     ground, best = _ground(mesh, edge, most), None
     found = np.zeros(len(mesh.vertices), np.bool_)
     for _ in range(TRIES):
         making = _made(ground, found, most or np.inf, threads, progress)
         made, under = making.mesh()
+        if most is not None and len(made.faces) > most:
+            break  # what is kept takes more faces still
         crosses = self_intersections(made, threads=threads)
-        if (best is None or crosses.sum() < best.crossing.sum()) and len(made.faces) <= (most or np.inf):
-            best = Remeshed(made, crosses, even_edge(made, len(made.faces)), int(found.sum()), mesh)
+        if best is None or crosses.sum() < best.crossing.sum():
+            best = Remeshed(made, crosses, even_edge(made, len(made.faces)), int(found.sum()), mesh, left_out)
         if not crosses.any():
             break
         found = found | _under(ground, made, under, crosses)
-    if best is None:
-        raise GeometryError(
-            "the mesh cannot be kept closed and manifold with so few faces",
-            found=f"--target-faces = {most}",
-            expected=f"about {len(made.faces)} or more",
-            hint="more faces, or --smooth, which takes small detail away first",
-        )
+    progress("remesh", ROUNDS, ROUNDS)
+    if best is None or not _is_like(best.mesh, mesh, like):
+        if most is None:
+            raise _too_long(edge, share_of(made, mesh))
+        raise _too_few(whole, most, made, like, threads, progress)
     if best.crossing.any() and (most is None or len(mesh.faces) <= most):
         crosses = self_intersections(mesh, threads=threads) if crossing is None else crossing
         if crosses.sum() < best.crossing.sum():
-            return Remeshed(mesh, crosses, even_edge(mesh, len(mesh.faces)), len(mesh.vertices), mesh)
+            return Remeshed(mesh, crosses, even_edge(mesh, len(mesh.faces)), len(mesh.vertices), mesh, left_out)
     return best
+
+
+def share_of(made: TriMesh, before: TriMesh) -> float:
+    """Return the volume of a mesh over that of the mesh before; 1 where that has none."""
+    volume = float(before.face_volumes.sum())
+    return float(made.face_volumes.sum()) / volume if volume > 0 else 1.0
+
+
+def _is_like(made: TriMesh, before: TriMesh, like: float) -> bool:
+    return bool(1 / like <= share_of(made, before) <= like) if np.isfinite(like) else True
+
+
+def _too_few(mesh: TriMesh, most: int, made: TriMesh, like: float, threads: int, progress: Progress) -> GeometryError:
+    """Return the refusal of so few faces, naming a number that was tried and is enough."""
+    share, enough = share_of(made, mesh), max(len(made.faces), int(MORE * most))
+    while enough < len(mesh.faces):
+        kept, _ = without_specks(mesh, enough)
+        making = _made(_ground(kept, None, enough), np.zeros(len(kept.vertices), np.bool_), enough, threads, progress)
+        found, _ = making.mesh()
+        if len(found.faces) <= enough and _is_like(found, kept, like):
+            break
+        enough = max(len(found.faces), int(MORE * enough))
+    return GeometryError(
+        "so few faces do not keep the shape, closed and with its handles",
+        found=f"--target-faces = {most}, {len(made.faces)} faces with {share:.0%} of the volume",
+        expected=f"{enough} or more",
+        hint=f"--target-faces {enough}" + (", or --allow-far" if len(made.faces) <= most else ""),
+    )  # fmt: skip
+
+
+def _too_long(edge: float | None, share: float) -> GeometryError:
+    """Return the refusal of edges so long that they lose the shape."""
+    return GeometryError(
+        "edges so long do not keep the shape", found=f"--edge = {edge}, {share:.0%} of the volume",
+        hint="a shorter --edge, or --allow-far",
+    )  # fmt: skip
 
 
 def _require_room(mesh: TriMesh, edge: float | None) -> None:
@@ -185,14 +243,14 @@ def _made(ground: Ground, kept: Marks, most: float, threads: int, progress: Prog
     """Go round after round, and on with longer edges while there are too many faces."""
     making = Making(ground, kept, threads)
     for count in range(ROUNDS):
-        progress("remesh", count, ROUNDS)
+        progress("remesh", count, ROUNDS + 1)
         if _round(making) < FEW:
             break
-    progress("remesh", ROUNDS, ROUNDS)
     _move(making, LAST)
-    for _ in range(COARSER):
+    for count in range(COARSER):
         if len(making.faces) <= most:
             break
+        progress("remesh", ROUNDS + count, ROUNDS + COARSER)
         ground = ground.scaled((len(making.faces) / (AIM * most)) ** 0.5)
         making.rescaled(ground)
         _round(making)

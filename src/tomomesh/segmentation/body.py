@@ -151,15 +151,19 @@ def without_specks(mask: NDArray[np.bool_]) -> Cleaned:
     labels, sizes = _components(mask[box])
     limit = min(float(SPECK), SMALL * float(sizes.max()))
     small = (sizes > 0) & (sizes < limit)
-    holes, _ = ndimage.label(~np.pad(mask[box], 1))
-    room = np.bincount(holes.ravel())
+    specks = _taken(small, labels) if small.any() else None
+    del labels  # four times the mask
+    holes, _ = ndimage.label(np.pad(~mask[box], 1, constant_values=True))
+    room = _counted(holes)
     room[[0, holes[0, 0, 0]]] = 0
     pores = (room > 0) & (room < limit)
-    if not small.any() and not pores.any():
+    if specks is None and not pores.any():
         return Cleaned(mask)
     cleaned = mask.copy()
-    inner = tuple(slice(1, -1) for _ in range(3))
-    cleaned[box] = (mask[box] & ~small[labels]) | pores[holes[inner]]
+    if specks is not None:
+        cleaned[box] &= ~specks
+    if pores.any():
+        cleaned[box] |= _taken(pores, holes[tuple(slice(1, -1) for _ in range(3))])
     counts = (small.sum(), sizes[small].sum(), sizes[small].max(initial=0), pores.sum(), room[pores].sum())
     return Cleaned(cleaned, *map(int, counts))
 
@@ -204,15 +208,29 @@ def is_dense(mask: NDArray[np.bool_], volume: Volume) -> bool:
 def _components(mask: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[np.int64]]:
     """Return the numbers of components that touch along faces, edges or at corners, and their sizes, 0 for the rest."""
     labels, _ = ndimage.label(mask, np.ones((3, 3, 3), np.bool_))
-    sizes = np.bincount(labels.ravel())
+    sizes = _counted(labels)
     sizes[0] = 0
-    return labels, np.asarray(sizes)
+    return labels, sizes
+
+
+def _counted(labels: NDArray[Any]) -> NDArray[np.int64]:
+    """Count the voxels of each number, slice by slice: NumPy makes 64 bits of what it counts."""
+    count = int(labels.max(initial=0)) + 1
+    return sum((np.bincount(plane.ravel(), minlength=count) for plane in labels), np.zeros(count, np.int64))
+
+
+def _taken(kept: NDArray[np.bool_], labels: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return ``kept[labels]``, slice by slice: NumPy makes 64 bits of what it takes by."""
+    taken = np.empty(labels.shape, np.bool_)
+    for plane, out in zip(labels, taken, strict=True):
+        np.take(kept, plane, out=out)
+    return taken
 
 
 def _kept(labels: NDArray[Any], kept: NDArray[np.bool_], mask: NDArray[np.bool_]) -> Components:
     kept[0], found = False, len(kept) - 1
     left = int(np.count_nonzero(kept))
-    return Components(mask if left == found else kept[labels], found, found - left)
+    return Components(mask if left == found else _taken(kept, labels), found, found - left)
 
 
 def _body(volume: Volume) -> NDArray[np.bool_]:

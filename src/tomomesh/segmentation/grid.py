@@ -14,9 +14,14 @@ if TYPE_CHECKING:
 
     from ..model.volume import Volume
 
-NEAR = 0.01
-"""Share of a voxel by which labels may lie off the study's voxels. Affines in files have 32 bits, 6e-8, times some
-1,000 voxels from the first to the last: a hundred times that."""
+NEAR = 0.1
+"""Voxels by which labels may lie off the study's, at any corner. Spacings and directions of four or five digits, as
+programs write them, come to .01 to .06 voxels over 256 of them; half a voxel would be another one."""
+SAME = 0.01
+"""Voxels from which on that is told. Affines in files have 32 bits, 6e-8, times some 1,000 voxels from the first to the
+last: a hundred times that."""
+MOST_DIGITS = 17
+"""Digits that tell any two floats apart."""
 HINT = "labels on the study's own grid, or the labels alone as the study"
 
 
@@ -41,7 +46,10 @@ def onto_grid(labels: Volume, study: Volume) -> Volume:
     GeometryError
         Where the voxels differ, lie between those of the study, or outside of it altogether.
     """
-    steps, offset = _whole_steps(labels, study)
+    steps, offset, off = _whole_steps(labels, study)
+    if off > SAME:
+        told = f"the labels lie up to {off:.2g} voxels beside those of the study: taken for the same"
+        labels = replace(labels, notes=(*labels.notes, told))
     if labels.shape == study.shape and np.array_equal(steps, np.eye(3)) and not offset.any():
         return labels
     turned, low = _turned(labels.voxels, steps[::-1, ::-1], offset[::-1])
@@ -60,26 +68,48 @@ def onto_grid(labels: Volume, study: Volume) -> Volume:
     return replace(study, voxels=voxels, unit=labels.unit, notes=notes + beyond)
 
 
-def _whole_steps(labels: Volume, study: Volume) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the axes (3, 3) and the first voxel (3,) of labels in whole voxels (i, j, k) of a study."""
+def _whole_steps(labels: Volume, study: Volume) -> tuple[NDArray[np.int64], NDArray[np.int64], float]:
+    """Return the axes (3, 3) and the first voxel (3,) of labels in whole voxels (i, j, k) of a study.
+
+    The third is how many voxels of the study the farthest corner of the labels lies off.
+    """
     ways = np.linalg.solve(study.affine, labels.affine)
     steps, offset = np.rint(ways[:3, :3]), np.rint(ways[:3, 3])
     one_each = all((np.abs(steps).sum(axis=axis) == 1).all() for axis in (0, 1))
     corners = np.array(list(np.ndindex(2, 2, 2))) * (np.array(labels.shape[::-1]) - 1.0)
-    away = labels.to_mm(corners) - study.to_mm(corners @ steps.T + offset)
-    apart = float(np.sqrt((away**2).sum(axis=1)).max())
-    allowed = NEAR * min(study.spacing_mm)
-    if not one_each or np.ptp(away, axis=0).max() > allowed:
+    away = corners @ (ways[:3, :3] - steps).T + (ways[:3, 3] - offset)
+    off = float(np.linalg.norm(away, axis=1).max())
+    if not one_each or np.linalg.norm(np.ptp(away, axis=0)) > NEAR:
+        told = f", {off:.2g} voxels off at the farthest corner" if one_each else ""
+        found, expected = _told_apart(labels, study)
         raise GeometryError(
-            "the labels do not fit the study", found=f"{_sizes(labels)}, axes {_directions(labels)}",
-            expected=f"{_sizes(study)}, axes {_directions(study)}, as the study, or a part of it", hint=HINT,
+            "the labels do not fit the study", found=found + told,
+            expected=f"{expected}, as the study, or a part of it", hint=HINT,
         )  # fmt: skip
-    if apart > allowed:
+    if off > NEAR:
+        apart = float(np.linalg.norm(study.affine[:3, :3] @ away.T, axis=0).max())
         raise GeometryError(
-            "the labels lie elsewhere than the study", found=f"{apart:.4g} mm off its voxels",
+            "the labels lie elsewhere than the study", found=f"{apart:.4g} mm off its voxels, {off:.2g} of one",
             expected="whole voxels of the study's own grid", hint=HINT,
         )  # fmt: skip
-    return steps.astype(np.int64), offset.astype(np.int64)
+    return steps.astype(np.int64), offset.astype(np.int64), off
+
+
+def _told_apart(labels: Volume, study: Volume) -> tuple[str, str]:
+    """Put two grids into words, with as many digits as tell them apart."""
+    for digits in range(3, MOST_DIGITS + 1):
+        found, expected = (_described(volume, digits) for volume in (labels, study))
+        if found.split(" voxels of ")[1] != expected.split(" voxels of ")[1]:
+            break
+    return found, expected
+
+
+def _described(volume: Volume, digits: int) -> str:
+    sizes = " x ".join(map(str, volume.shape[::-1]))
+    spacing = " x ".join(f"{length:.{digits + 2}g}" for length in volume.spacing_mm)
+    columns = np.round(volume.affine[:3, :3] / np.array(volume.spacing_mm), digits) + 0.0
+    axes = " ".join(f"({', '.join(f'{cosine:.{digits}g}' for cosine in column)})" for column in columns.T)
+    return f"{sizes} voxels of {spacing} mm, axes {axes}"
 
 
 def _turned(
@@ -95,17 +125,6 @@ def _turned(
 
 def _slices(start: NDArray[np.int64], stop: NDArray[np.int64]) -> tuple[slice, ...]:
     return tuple(slice(a, b) for a, b in zip(start.tolist(), stop.tolist(), strict=True))
-
-
-def _sizes(volume: Volume) -> str:
-    voxels, spacing = (" x ".join(f"{n:.5g}" for n in part) for part in (volume.shape[::-1], volume.spacing_mm))
-    return f"{voxels} voxels of {spacing} mm"
-
-
-def _directions(volume: Volume) -> str:
-    """Put the directions of the axes into words."""
-    columns = volume.affine[:3, :3] / np.array(volume.spacing_mm)
-    return " ".join(f"({', '.join(f'{cosine:.3g}' for cosine in column + 0.0)})" for column in columns.T)
 
 
 def _box(volume: Volume) -> str:

@@ -64,6 +64,12 @@ def named_padding(volume: Volume) -> NDArray[np.bool_] | None:
     return held if held.any() and not held.all() else None
 
 
+def all_padding(volume: Volume, *, guessed: bool = True) -> NDArray[np.bool_] | None:
+    """Return the voxels that are padding by the file's header and, where asked, by their looks; None where none are."""
+    named, found = named_padding(volume), padding(volume.voxels) if guessed else None
+    return found if named is None else named if found is None else named | found
+
+
 def _standing_out(level: float, held: NDArray[np.bool_], rest: NDArray[Any]) -> NDArray[np.bool_] | None:
     """Return what of a level is padding by its distance from the rest, its place, and what the rest is without it."""
     low, high = bulk(rest)

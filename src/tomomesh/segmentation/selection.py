@@ -9,8 +9,9 @@ import numpy as np
 
 from ..errors import EmptyError, UsageError
 from .body import Cleaned, components_of_body, is_dense, largest_component, solid, thick_components, without_specks
+from .contours.labelled import filled_slices, gaps_in
 from .labels import select
-from .padding import named_padding, padding
+from .padding import all_padding, named_padding
 from .window import PRESETS_HU, choose_window, window
 
 if TYPE_CHECKING:
@@ -68,6 +69,8 @@ class Chosen:
     counts : Counts
     cleaned : Cleaned
         Specks and pores.
+    told : str
+        What is to be said of slices without labels.
     """
 
     volume: Volume
@@ -76,6 +79,7 @@ class Chosen:
     upper: Limit
     counts: Counts = field(default_factory=Counts)
     cleaned: Cleaned | None = None
+    told: str = ""
 
     def counted(self, mask: NDArray[np.bool_], **counts: int) -> Chosen:
         """Return the same with another mask and some counts."""
@@ -111,26 +115,31 @@ def choose(stack: Volume, labels: Volume | None, settings: Settings, inside: NDA
 
 def _of_labels(stack: Volume, labels: Volume | None, asked: WindowSettings) -> Chosen:
     mask = select(stack if labels is None else labels, asked.select or ())
-    return Chosen(replace(stack, voxels=mask.view(np.uint8)), mask, 0.5, np.inf)
+    if asked.fill_slices:
+        volume, told = filled_slices(mask, stack)
+        return Chosen(volume, volume.voxels > 0, 0.0, np.inf, told=told)
+    gaps = gaps_in(mask)
+    told = f"{gaps.told}: --fill-slices interpolates them" if gaps else ""
+    return Chosen(replace(stack, voxels=mask.view(np.uint8)), mask, 0.5, np.inf, told=told)
 
 
 def _of_levels(stack: Volume, asked: WindowSettings) -> Chosen:
     """Window a study whose padding is background: what its header names, and what is found where no window is given."""
     given = asked.lower is not None or asked.upper is not None
-    found = None if given else padding(stack.voxels)
-    stack, named = _as_background(stack, named_padding(stack))
-    stack, guessed = _as_background(stack, found)
-    lower, upper = choose_window(stack, asked, found)
+    padded, named = all_padding(stack, guessed=not given), named_padding(stack)
+    stack, changed = _as_background(stack, padded)
+    lower, upper = choose_window(stack, asked, padded)
     mask = window(stack, lower=lower, upper=upper, layers=asked.layers)
-    return Chosen(stack, mask, lower, upper, Counts(padding=named + guessed, named_padding=named))
+    counts = [0 if one is None else int(np.count_nonzero(changed & one)) for one in (padded, named)]
+    return Chosen(stack, mask, lower, upper, Counts(padding=counts[0], named_padding=counts[1]))
 
 
-def _as_background(stack: Volume, padded: NDArray[np.bool_] | None) -> tuple[Volume, int]:
-    """Give padding the lowest of the other levels; return also how many voxels had another."""
+def _as_background(stack: Volume, padded: NDArray[np.bool_] | None) -> tuple[Volume, NDArray[np.bool_] | np.bool_]:
+    """Give padding the lowest of the other levels; return also which voxels had another."""
     if padded is None:
-        return stack, 0
+        return stack, np.False_
     lowest = stack.voxels.min(where=~padded, initial=stack.voxels.max())
-    changed = int(np.count_nonzero(stack.voxels[padded] != lowest))
+    changed = padded & (stack.voxels != lowest)
     return replace(stack, voxels=np.where(padded, lowest, stack.voxels)), changed
 
 

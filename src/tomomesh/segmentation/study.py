@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import GeometryError, UsageError
 from ..model.volume import AXES, Volume, order_along
 from ..stage import Stage, folded, timed
 from .body import Cleaned
 from .crop import crop, inside_roi
 from .grid import onto_grid
-from .labels import doubted, labels_in
+from .labels import doubted, labels_in, whole
 from .selection import Chosen, choose
 
 if TYPE_CHECKING:
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from .selection import Counts
     from .window import Limit
 
+CUT_OFF = 0.25
+"""Pixels of an end slice over those of the fullest from which a window is told to go on beyond the study. Only a note
+depends on it: a ball that ends within a slice has less there."""
 APART = 4
 """One slice in so many is looked at for labels. Only a warning depends on it; labels fill many slices."""
 
@@ -72,6 +75,10 @@ def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> S
             found=type(volume).__name__,
             expected="read_volume(path) or Volume.from_stored(array, affine)",
         )
+    if settings.window.fill_slices and settings.window.select is None:
+        raise UsageError("slices are filled between labels", found="--fill-slices", hint="--select with the labels")
+    if settings.window.select is not None and labels is None:
+        volume = whole(volume)
     axis = _slice_axis(volume, settings.network.slices)
     part, box = crop(volume, settings.crop, axis)
     study = part.along(axis)
@@ -81,7 +88,12 @@ def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> S
         notes += labels.notes
     chosen = _choose(study, labels, settings)
     kept = tuple(box[n] for n in order_along(axis))
-    section = _section(study, AXES[axis], _cropped(kept, volume.along(axis).shape), notes + _dropped(chosen, settings))
+    section = _section(
+        study,
+        AXES[axis],
+        _cropped(kept, volume.along(axis).shape),
+        notes + _dropped(chosen, settings) + _sparse(chosen) + _cut_off(chosen.value.mask),
+    )
     doubt = settings.window.select is not None and doubted(study if labels is None else labels)
     warnings = (*_doubts(chosen.value, settings), *((doubt,) if doubt else ()))
     window = {"window": _window(chosen.value, settings)}
@@ -99,7 +111,15 @@ def _fitting(labels: Volume, volume: Volume, settings: Settings) -> Volume:
     """Lay a label map onto the study's grid; refuse one of which no label is asked for."""
     if settings.window.select is None:
         raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
-    return onto_grid(labels, volume)
+    labels = whole(labels)
+    try:
+        return onto_grid(labels, volume)
+    except GeometryError as fault:
+        if option := volume.other_frame or labels.other_frame:
+            whose = "study" if volume.other_frame else "label map"
+            fault.args = (f"{fault} Or: {option}, for the {whose} holds two frames that disagree.",)
+            fault.flags += (option.split()[0],)
+        raise
 
 
 @timed("window")
@@ -139,6 +159,19 @@ def _dropped(chosen: Stage[Chosen], settings: Settings) -> tuple[str, ...]:
         f"{found.dropped} of {found.components} components of the window ({found.dropped_voxels} voxels) were "
         "left out, which lie in nothing that is 12 mm thick, as a scanner's table: --keep all keeps them",
     )
+
+
+def _cut_off(mask: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Say at which end slices a window is cut off, and goes on beyond the study."""
+    pixels = np.count_nonzero(mask, axis=(1, 2))
+    ends = [name for name, end in (("first", 0), ("last", -1)) if pixels[end] > CUT_OFF * pixels.max()]
+    return (
+        (f"the window is cut off at the {' and the '.join(ends)} slice: the surface is closed there",) if ends else ()
+    )
+
+
+def _sparse(chosen: Stage[Chosen]) -> tuple[str, ...]:
+    return (chosen.value.told,) if chosen.value.told else ()
 
 
 def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:

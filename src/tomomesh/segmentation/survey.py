@@ -8,9 +8,9 @@ import numpy as np
 
 from ..model.volume import AXES
 from .labels import labels_in
-from .otsu import histogram, otsu_levels
-from .padding import padding
-from .window import PRESETS_HU, otsu_thresholds
+from .otsu import REACH, bulk, histogram, otsu_levels
+from .padding import all_padding
+from .window import PRESETS_HU, may_be_ct, otsu_thresholds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,6 +29,11 @@ CUT_OFF = 0.01
 on it."""
 OBLONG = 0.01
 """Part by which the sides of a pixel may differ without a remark. Only a remark depends on it."""
+FAR = 4.0
+"""How many times as wide as the bulk of the levels (`segmentation.otsu.TAILS`) their whole range is from which on the
+histogram is that of the bulk. Only a picture depends on it: the bulk keeps a quarter of the bars at least."""
+AIR = PRESETS_HU["skin"][0]
+"""Where 2 % of the levels are below this, those without a unit may be Hounsfield units. Only suggestions need it."""
 THICK = 5
 """Pixels that slices may be apart without a remark. Only a remark depends on it: steps are then seen in a mesh."""
 
@@ -46,8 +51,9 @@ def survey(volume: Volume) -> dict[str, Any]:
         Size, spacing, frame, tilt, the range and histogram of the gray levels, suggested windows and the share of the
         voxels in each, the labels of a label map, the reader's notes, and remarks on what a mesh of it will show.
     """
-    voxels, padded = volume.voxels, padding(volume.voxels)
-    low, high = float(voxels.min()), float(voxels.max())
+    voxels, padded = volume.voxels, all_padding(volume)
+    measured = voxels if padded is None else voxels[~padded]
+    low, high = _drawn_from(measured)
     return {
         "slices_rows_columns": list(volume.shape),
         "layers": volume.layers,
@@ -62,10 +68,12 @@ def survey(volume: Volume) -> dict[str, Any]:
         "size_mm": (np.array(volume.spacing_mm) * volume.shape[::-1]).tolist(),
         "type": str(voxels.dtype),
         "gray_unit": volume.unit,
-        "lowest": low,
-        "highest": high,
-        "histogram": histogram(voxels, low, high, BARS).tolist() if high > low else [voxels.size],
-        "windows": _windows(volume, padded),
+        "lowest": float(voxels.min()),
+        "highest": float(voxels.max()),
+        "histogram": histogram(measured, low, high, BARS).tolist() if high > low else [measured.size],
+        "histogram_from": low,
+        "histogram_to": high,
+        "windows": _windows(volume, measured, padded),
         "labels": labels_in(voxels),
         "notes": list(volume.notes),
         "remarks": list(_remarks(volume, padded)),
@@ -80,16 +88,24 @@ def _tilt(volume: Volume) -> float:
     return float(np.degrees(np.arccos(min(1.0, cosine))))
 
 
-def _windows(volume: Volume, padded: NDArray[np.bool_] | None) -> dict[str, dict[str, Any]]:
-    """Suggest windows: Otsu's, those above three and four classes, and for CT the presets."""
-    measured = volume.voxels if padded is None else volume.voxels[~padded]
+def _drawn_from(measured: NDArray[Any]) -> tuple[float, float]:
+    """Return the range of the histogram: all levels, unless a few far ones would leave the others too few bars."""
+    low, high = float(measured.min()), float(measured.max())
+    first, last = bulk(measured)
+    reach = REACH * (last - first)
+    first, last = max(low, first - reach), min(high, last + reach)
+    return (first, last) if 0 < FAR * (last - first) < high - low else (low, high)
+
+
+def _windows(volume: Volume, measured: NDArray[Any], padded: NDArray[np.bool_] | None) -> dict[str, dict[str, Any]]:
+    """Suggest windows: Otsu's, those above three and four classes, and for what may be a CT the presets."""
     limits: dict[str, Any] = {"otsu": otsu_thresholds(volume, padded)}
     if volume.layers == 1:
         for classes in (3, 4):
             limit = otsu_levels(measured, classes)[-1]
             limits |= {} if limit in limits.values() else {f"otsu of {classes}": limit}
     windows = {name: (limit, np.inf) for name, limit in limits.items()}
-    windows |= PRESETS_HU if volume.voxels.min() < 0 else {}
+    windows |= PRESETS_HU if may_be_ct(volume) and (volume.unit == "HU" or bulk(measured)[0] < AIR) else {}
     return {name: _window(volume.voxels, *bounds) for name, bounds in windows.items()}
 
 
@@ -110,8 +126,9 @@ def _finite(limit: Any) -> Any:
 def _remarks(volume: Volume, padded: NDArray[np.bool_] | None) -> Iterator[str]:
     """Say what a mesh of the study will show that nobody may expect."""
     if padded is not None:
-        level = volume.voxels[padded][0]
-        yield f"{padded.mean():.1%} of the voxels are padding, {level:g}: it counts as background"
+        held = volume.voxels[padded]
+        levels = f"{held.min():g}" if held.min() == held.max() else f"{held.min():g} to {held.max():g}"
+        yield f"{padded.mean():.1%} of the voxels are padding, {levels}: it counts as background"
     columns, rows, step = np.sqrt((volume.grid.affine[:3, :3] ** 2).sum(axis=0))
     if abs(columns - rows) > OBLONG * min(columns, rows):
         yield f"pixels are not square, {columns:.4g} x {rows:.4g} mm: the mesh keeps the distances"

@@ -139,13 +139,17 @@ def choose_window(
     return -np.inf if lower is None else lower, np.inf if upper is None else upper
 
 
+def may_be_ct(volume: Volume) -> bool:
+    """Tell whether gray levels may be Hounsfield units: where the file says so, or says nothing and air is below 0."""
+    return volume.layers == 1 and volume.unit in ("HU", "stored") and bool(volume.voxels.min() < 0)
+
+
 def _check_ct(volume: Volume, preset: str) -> None:
-    lowest = volume.voxels.min()
-    if lowest < 0:
+    if may_be_ct(volume):
         return
     raise UsageError(
         "the study is not in Hounsfield units",
-        found=f"--preset = {preset}, lowest gray level = {lowest:g}",
+        found=f"--preset = {preset}, lowest gray level = {volume.voxels.min():g} ({volume.unit})",
         expected="a CT whose air lies below 0",
         hint="--select, which chooses labels" if labels_in(volume.voxels)
         else "--lower and --upper, in the study's own gray levels",

@@ -24,7 +24,7 @@ def param(
     *,
     kind: type | None = None,
     unit: str = "",
-    choices: tuple[str, ...] = (),
+    choices: tuple[str, ...] | tuple[int, ...] = (),
     low: float = -math.inf,
     above: float = -math.inf,
     high: float = math.inf,
@@ -82,7 +82,7 @@ def _check(entry: Field[Any], value: Any) -> None:
             raise UsageError(
                 f"{option} has no such value",
                 found=f"{option} = {_said(value)}",
-                expected=" | ".join(meta["choices"]),
+                expected=" | ".join(map(str, meta["choices"])),
             )
         return
     if meta["kind"] is bool:

@@ -31,6 +31,14 @@ class PrintSettings(Group):
         None, "diameter of a hole below the lowest place of every cavity, so that resin or powder can leave",
         unit="mm", above=0,
     )  # fmt: skip
+    one_piece: bool = param(False, "leave out all pieces but the largest, with what floats free of the plate")
+    fill_cavities: bool = param(False, "fill the cavities that have no way out")
+    thicken: float | None = param(
+        None,
+        "thicken the walls that are thinner than this, about their middle; gaps as narrow close",
+        unit="mm",
+        above=0,
+    )
     least_wall: float = param(
         0.8, "thinnest wall that the printer makes; a thinner one makes the part not printable", unit="mm", above=0
     )
@@ -39,9 +47,9 @@ class PrintSettings(Group):
     @property
     def cuts(self) -> bool:
         """Whether a solid is to be cut."""
-        return any(value is not None for value in (self.flat_base, self.hollow, self.drain))
+        return any(value is not None for value in (self.flat_base, self.thicken, self.hollow, self.drain))
 
     @property
     def asked(self) -> bool:
         """Whether there is to be a part, or a verdict."""
-        return self.print_check or self.cuts or self.scale != 1
+        return self.print_check or self.cuts or self.one_piece or self.fill_cavities or self.scale != 1

@@ -29,6 +29,9 @@ class ReadSettings(Group):
     skip_bad: bool = param(
         False, "go on without the files of a series that cannot be read, where the others still make a regular stack"
     )
+    nifti_form: str = param(
+        "sform", "the frame that is taken of a NIfTI file that holds two", choices=("sform", "qform")
+    )
     level: int = param(0, "level of an OME-Zarr pyramid, 0 being the full resolution", low=0)
     fill_chunks: bool = param(
         False, "take missing chunks of a Zarr array for its fill value, whatever the voxels beside them are"

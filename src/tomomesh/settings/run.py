@@ -16,10 +16,11 @@ class RunSettings(Group):
 
     seed: int = param(0, "seed of everything drawn at random", low=0)
     threads: int = param(0, "threads; 0 is one a core", low=0, high=1024)
-    units: str = param(
-        "mm",
-        "unit that the numbers of a cloud are in, or those of a mesh to print, whose own file is believed where this "
-        "is not given; studies are always in mm",
+    units: str | None = param(
+        None,
+        "unit that the numbers of a cloud, or of a mesh to print, are in; by default the one that the file states, "
+        "else mm; studies are always in mm",
+        kind=str,
         choices=("mm", "cm", "m", "unknown"),
     )
     frame: str = param(
@@ -28,6 +29,12 @@ class RunSettings(Group):
         "and superior (lps) or to the right, anterior and superior (ras), or the indices (i, j, k) of the file's own "
         "voxels (voxel)",
         choices=("lps", "ras", "voxel"),
+    )
+    precision: int = param(
+        64,
+        "bits of the coordinates in .ply and .vtp, which some viewers want to be 32; 64 all the same where 32 would "
+        "let two vertices fall together",
+        choices=(64, 32),
     )
     local_origin: bool = param(
         False, "count a cloud's coordinates from its lowest corner, which report and file name: for STL far from 0"

@@ -36,7 +36,15 @@ class WindowSettings(Group):
         choices=PRESETS,
     )
     select: tuple[int, ...] | None = param(
-        None, "labels of a label map whose voxels are the window", kind=int, low=0, length=MANY
+        None,
+        "labels of a label map whose voxels are the window; on the command line by their names too, where the file has "
+        "them: a NIfTI label table (TotalSegmentator), a .seg.nrrd, a DICOM segmentation",
+        kind=int,
+        low=0,
+        length=MANY,
+    )
+    fill_slices: bool = param(
+        False, "interpolate the slices without labels between those with, as one smooth solid, and end it beyond them"
     )
     keep: str = param(
         "auto",

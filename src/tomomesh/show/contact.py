@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.transforms import ScaledTranslation
 
 from ..measure.rings import assess_contours
 from ..model.networks import Networks
-from .marks import lines, small_print
+from .marks import lines
 from .plane import PIXELS, Plane
 from .render import nice_length
 from .style import ACCENT, INK, MUTED, NETWORK, TRACKS, canvas, styled
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 
 COLUMNS, ROWS = 6, 5
 """Slices of a page."""
-EDGE = 0.03
-"""Share of a slice's width between its border and the scale bar."""
+BAR = 13
+"""Points between the first slice and the scale bar above it."""
 MOST_LINES = 3
 """Contours of a slice whose measures are written."""
 PALE, PAPER = (217, 224, 230), (255, 255, 255)
@@ -199,11 +200,12 @@ def write_beside(
     )  # fmt: skip
 
 
-def scale_bar(ax: Axes, bounds: Floats, plane: Plane, color: str = INK) -> None:
-    """Put the length that all slices share into a corner of the first."""
-    (left, low), (right, high) = bounds
-    length = nice_length(float(right - left))
-    margin = EDGE * float(right - left)
-    corner = np.array([left + margin, low + margin if plane.upward else high - margin])
-    lines(ax, np.array([[corner, corner + np.array([length, 0.0])]]), color=color, width=1.6)
-    small_print(ax, f"{length:g} {plane.unit}".strip(), corner, (0, 6), color=color, align="left")
+def scale_bar(ax: Axes, bounds: Floats, plane: Plane) -> None:
+    """Put the length that all slices share above the first, where it hides none of it."""
+    left, right = float(bounds[0, 0]), float(bounds[1, 0])
+    length = nice_length(right - left)
+    share = length / (right - left)
+    look: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "color": INK}
+    above = ax.transAxes + ScaledTranslation(0, BAR / 72, ax.get_figure(root=True).dpi_scale_trans)
+    ax.plot([0, share], [1, 1], color=INK, linewidth=1.6, transform=above, clip_on=False, solid_capstyle="butt")
+    ax.annotate(f"{length:g} {plane.unit}".strip(), (share, 1), (4, BAR), va="center", fontsize=6.8, **look)

@@ -1,4 +1,4 @@
-"""The history of a fit: how fast, how far, how much energy."""
+"""The history of a fit and of a training: how fast, how far, how much energy."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.trace import Trace
+    from ..som.history import History
 
 
 @styled
@@ -48,6 +49,32 @@ def draw_fit(trace: Trace, *, tolerance: float | None = None, unit: str = "mm") 
     heading(axes[3], "Vertices", "number of vertices held back or not attracted")
     for ax in axes[2:]:
         ax.set_xlabel("step")
+    return figure
+
+
+@styled
+def draw_learning(history: History, *, unit: str = "") -> Figure:
+    """Draw the course of a training over its epochs: error, moves, radius and, online, learning rate.
+
+    Parameters
+    ----------
+    history : History
+        Of one epoch at least.
+    unit : str
+        Of the inputs.
+    """
+    online = bool((history.alpha < 1).any())
+    rate = np.where(history.alpha < 1, history.alpha, np.nan)  # the re-fit without strays is in batch
+    figure, axes = canvas(9.2, 3.1, 1, 3)
+    ending = f", {unit}" if unit else ""
+    _curves(axes[0], {"quantization error": history.quantization_error})
+    heading(axes[0], "Quantization error", f"mean distance of an input to its winner{ending}")
+    _curves(axes[1], {"largest move": history.largest_move}, log=True)
+    heading(axes[1], "Largest move", f"of a neuron in an epoch{ending}")
+    _curves(axes[2], {"radius": history.radius} | ({"learning rate": rate} if online else {}), log=online)
+    heading(axes[2], "Radius" + (" and learning rate" if online else ""), "of the neighborhood, hops")
+    for ax in axes:
+        ax.set_xlabel("epoch")
     return figure
 
 

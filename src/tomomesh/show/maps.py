@@ -57,18 +57,19 @@ def draw_maps(codebook: Floats, network: Lattice, labels: NDArray[np.integer], *
     corners = _hexagon() if network.name == "hexagonal" else _SQUARE
     places = laid_flat(network)
     size = np.ptp(places, axis=0) + 1
-    figure, axes = canvas(8.6, float(np.clip(3.4 * size[1] / size[0], 1.6, 6.0)) + 0.8, 1, 2)
+    figure, axes = canvas(8.6, float(np.clip(3.4 * size[1] / size[0], 1.6, 6.0)) + 1.1, 1, 2)
     centers, far = u_matrix(codebook, network)
-    _draw_cells(axes[0], centers, corners / 2, far, f"distance of neighbors{f' ({unit})' if unit else ''}")
+    of = f"distance of neighbors{f' ({unit})' if unit else ''}"
+    _draw_cells(axes[0], centers, corners / 2, far, of, lowest=float(far.min()))
     heading(axes[0], "a  U-matrix", f"{network.name} of {network.shape[0]} x {network.shape[1]} neurons")
     _draw_cells(axes[1], places, corners, hits, "inputs won")
     dead = int((hits == 0).sum())
     heading(axes[1], "b  Hits", f"{len(labels):,} inputs, {dead or 'no'} dead neuron{'' if dead == 1 else 's'}")
     if len(hits) <= MOST_NUMBERS:
         _number(axes[1], places, hits)
-    for ax in axes:
-        ax.set_xlim(places[:, 0].min() - 0.6, max(places[:, 0].max(), centers[:, 0].max()) + 0.6)
-        ax.set_ylim(places[:, 1].min() - 0.6, max(places[:, 1].max(), centers[:, 1].max()) + 0.6)
+    for ax, middles, reach in ((axes[0], centers, 0.35), (axes[1], places, 0.6)):
+        low, high = middles.min(axis=0) - reach, middles.max(axis=0) + reach
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     return figure
 
 
@@ -132,16 +133,19 @@ def _hexagon() -> Floats:
     return np.asarray(np.stack([np.cos(turn), np.sin(turn)], axis=1) / np.sqrt(3))
 
 
-def _draw_cells(ax: Axes, centers: Floats, corners: Floats, values: NDArray[np.generic], name: str) -> None:
-    """Fill a cell around each center, and put a scale beside them."""
-    scale = ScalarMappable(Normalize(0, float(values.max()) or 1.0), TINT)
+def _draw_cells(
+    ax: Axes, centers: Floats, corners: Floats, values: NDArray[np.generic], name: str, *, lowest: float = 0.0
+) -> None:
+    """Fill a cell around each center, and put a scale beside them, from the lowest value on."""
+    highest = float(values.max())
+    scale = ScalarMappable(Normalize(lowest if lowest < highest else 0.0, highest or 1.0), TINT)
     cells = PolyCollection(list(centers[:, None] + corners), facecolors=scale.to_rgba(values), edgecolors="face")
     cells.set_linewidth(0.3)
     ax.add_collection(cells)
-    bar = ax.get_figure(root=True).colorbar(scale, ax=ax, shrink=0.75, aspect=22, pad=0.02)  # type: ignore[union-attr]
+    bar = ax.get_figure(root=True).colorbar(scale, ax=ax, location="bottom", shrink=0.75, aspect=30, pad=0.02)  # type: ignore[union-attr]
     bar.outline.set_visible(False)
     bar.set_label(name)
-    bar.ax.yaxis.set_major_locator(MaxNLocator(nbins=6, integer=np.issubdtype(values.dtype, np.integer)))
+    bar.ax.xaxis.set_major_locator(MaxNLocator(nbins=6, integer=np.issubdtype(values.dtype, np.integer)))
     ax.set_aspect("equal")
     ax.set_axis_off()
 

@@ -74,7 +74,7 @@ def _page(
         write_beside(ax, f"{k + 1}", 0, 1.0, color=INK, weight="bold")
     for ax in axes:
         ax.set_axis_off()
-    scale_bar(axes[0], bounds, plane, color="white")
+    scale_bar(axes[0], bounds, plane)
     figure.suptitle(which, x=0.01, ha="left", fontsize=10, fontweight="bold")
     note = "the mesh where the plane of each slice cuts it, at its ends half a slice inside"
     figure.text(0.99, 1 - 0.12 / figure.get_figheight(), note, ha="right", va="top", color=MUTED, fontsize=8)

@@ -79,6 +79,9 @@ class Plane:
         axes[0].set_ylabel(f"along a column ({self.unit})")
 
 
+FAR = 2.0
+"""How far a single level at an end is from the others, in parts of their span, where it is taken for one that nothing
+measured, as -9999: it is drawn black or white. Background of 0 around a head is nearer. Only pictures depend on it."""
 PIXELS = Plane()
 """A slice whose pixels are squares of 1 mm."""
 
@@ -89,9 +92,19 @@ def gray(image: Pixels) -> Floats:
 
 
 def contrast(levels: Floats) -> tuple[float, float]:
-    """Return the span of nearly all levels, or of all where nearly all are equal."""
+    """Return the span of nearly all levels, or of all where nearly all are equal; no far level at an end counts."""
+    for end in (levels.min(), levels.max()):
+        others = levels[levels != end]
+        low, high = _span(others) if others.size else (end, end)
+        if 0 < FAR * (high - low) < min(abs(end - low), abs(end - high)):
+            levels = others
+    low, high = _span(levels)
+    return (low, high) if low < high else (float(levels.min()), float(levels.max()))
+
+
+def _span(levels: Floats) -> tuple[float, float]:
     low, high = np.percentile(levels, [0.2, 99.8])
-    return (float(low), float(high)) if low < high else (float(levels.min()), float(levels.max()))
+    return float(low), float(high)
 
 
 def panels(width: float, count: int, size: Floats, more: float, gap: float = 0.02) -> tuple[Figure, list[Axes]]:

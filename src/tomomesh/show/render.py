@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from ..model.mesh import TriMesh
 
 
+NARROWEST = 0.45
+"""Shorter over longer side of a page at least, so that what is written has room."""
+
+
 @dataclass(frozen=True)
 class View:
     """How space is looked at and named: the camera, the unit, and what +x, +y and +z are called."""
@@ -64,11 +68,30 @@ def frame(ax: Axes, points: NDArray[np.float64], view: View) -> None:
     size = float((high - low).max()) or 1.0
     ax.set_axis_off()
     ax.set_aspect("equal")
-    ax.set_xlim(low[0] - 0.04 * size, high[0] + 0.04 * size)
-    ax.set_ylim(low[1] - 0.20 * size, high[1] + 0.04 * size)
+    (left, bottom), (right, top) = _box(view, points)
+    ax.set(xlim=(left, right), ylim=(bottom, top))
     corner = np.array([low[0], low[1] - 0.13 * size])
     _scale_bar(ax, corner, size, view.unit)
     _directions(ax, np.array([high[0] - 0.09 * size, low[1] - 0.13 * size]), 0.085 * size, view)
+
+
+def page(view: View, points: NDArray[np.float64], width: float, more: float) -> tuple[float, float]:
+    """Return the width and height, in inches, of a page of one panel on which (n, 3) points leave no half empty.
+
+    The longer side of the panel is `width`; `more` inches are written above it.
+    """
+    low, high = _box(view, points)
+    across, up = high - low
+    side = max(across, up)
+    return max(width * across / side, NARROWEST * width), max(width * up / side, NARROWEST * width) + more
+
+
+def _box(view: View, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the lowest and the highest place of a panel that holds points, its scale bar and its axes."""
+    seen = view.camera.project(points)[:, :2]
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    size = float((high - low).max()) or 1.0
+    return low - size * np.array([0.04, 0.20]), high + 0.04 * size
 
 
 def nice_length(size: float) -> float:

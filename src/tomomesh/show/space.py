@@ -10,7 +10,7 @@ from matplotlib.colors import Normalize, to_rgba
 
 from ..model.points import BRIDGE, CAP, NEURON
 from .marks import dots
-from .render import View, draw_faces, draw_smooth, draw_wires, frame
+from .render import View, draw_faces, draw_smooth, draw_wires, frame, page
 from .style import ACCENT, HEIGHT, INK, NETWORK, canvas, heading, styled
 
 if TYPE_CHECKING:
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from ..model.points import PointSet
 
 MOST_POINTS = 60_000
+MOST_LINED = 20_000
+"""Faces of a panel whose sides are drawn: those of more are under four dots long, and their lines a mud."""
 KINDS = {NEURON: ("o", NETWORK), BRIDGE: ("D", ACCENT), CAP: ("s", INK)}
 OF_NETWORKS, OF_VOXELS = ("neurons", "bridges", "caps"), ("crossings", "beside added voxels", "on the border")
 """What points of each kind are called, where there are networks and where there are none."""
@@ -31,9 +33,10 @@ FRONT = View()
 @styled
 def draw_points(points: PointSet, view: View = FRONT) -> Figure:
     """Draw the set P, colored by height; the nearer, the larger and the stronger (Fig. 7)."""
-    figure, (ax,) = canvas(6.4, 6.2)
     every = -(-len(points) // MOST_POINTS)
     positions, kinds = points.positions[::every], points.kinds[::every]
+    width, height = page(view, positions, 5.6, 0.6)
+    figure, (ax,) = canvas(width + 0.8, height)
     names = OF_NETWORKS if (points.neurons >= 0).any() else OF_VOXELS
     bar = figure.colorbar(_scatter(ax, positions, kinds, names, view), ax=ax, shrink=0.45, aspect=22, pad=0.01)
     bar.outline.set_visible(False)
@@ -84,10 +87,16 @@ def draw_surfaces(
         panels.append(("Triangulated", f"{len(triangulated.faces):,} triangles", triangulated.corners))
     if smoothed is not None:
         panels.append(("Smoothed", "low-pass filter", smoothed.corners))
-    figure, axes = canvas(4.1 * len(panels), 4.6, 1, len(panels))
+    places = np.concatenate([polygons.reshape(-1, 3) for *_, polygons in panels])
+    width, height = page(view, places, 4.1, 0.6)
+    figure, axes = canvas(width * len(panels), height, 1, len(panels))
     for letter, ax, (title, note, polygons) in zip("abc", axes, panels, strict=False):
-        draw_faces(ax, polygons, view.camera, edge="#5c4f43", width=_line_width(len(polygons)))
-        frame(ax, polygons.reshape(-1, 3), view)
+        lined = len(polygons) <= MOST_LINED
+        draw_faces(
+            ax, polygons, view.camera, edge="#5c4f43" if lined else "face",
+            width=_line_width(len(polygons)) if lined else 0.3,
+        )  # fmt: skip
+        frame(ax, places, view)
         heading(ax, f"{letter}  {title}", note)
     return figure
 
@@ -95,7 +104,7 @@ def draw_surfaces(
 @styled
 def draw_wireframe(mesh: TriMesh, view: View = FRONT, title: str = "The fitted mesh") -> Figure:
     """Draw the edges that face the viewer (Fig. 9)."""
-    figure, (ax,) = canvas(6.0, 6.2)
+    figure, (ax,) = canvas(*page(view, mesh.vertices, 6.0, 0.6))
     draw_wires(ax, mesh.corners, view.camera, width=1.2 * _line_width(len(mesh.faces)))
     frame(ax, mesh.vertices, view)
     heading(ax, title, f"{len(mesh.vertices):,} vertices, {len(mesh.faces):,} triangles")
@@ -105,7 +114,7 @@ def draw_wireframe(mesh: TriMesh, view: View = FRONT, title: str = "The fitted m
 @styled
 def draw_shaded(mesh: TriMesh, view: View = FRONT, title: str = "The fitted surface") -> Figure:
     """Draw the surface in light and shade (Fig. 10)."""
-    figure, (ax,) = canvas(6.0, 6.2)
+    figure, (ax,) = canvas(*page(view, mesh.vertices, 6.0, 0.6))
     draw_smooth(ax, mesh, view.camera)
     frame(ax, mesh.vertices, view)
     heading(ax, title, f"{len(mesh.faces):,} triangles, shaded")

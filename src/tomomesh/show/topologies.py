@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap
 
 from ..model.lattice import lattice
 from .camera import Camera
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from ..model.lattice import Lattice
 
 FRONT = Camera()
+SIGNAL_TO_NETWORK = LinearSegmentedColormap.from_list("depth", [SIGNAL, NETWORK])
+"""From far to near."""
 
 
 @styled
@@ -89,14 +93,39 @@ def draw_adapted(
     panels = [(start, "start")] if start is not None else []
     panels.append((codebook, "adapted"))
     figure, axes = canvas(4.3 * len(panels), 4.4, 1, len(panels))
+    around = flat(np.concatenate([region, *(neurons for neurons, _ in panels)]), camera)
     for ax, (neurons, state) in zip(axes, panels, strict=True):
-        places = flat(neurons, camera)
         dots(ax, flat(region, camera), size=5, color=SIGNAL)
-        lines(ax, places[network.edges], color=NETWORK, width=1.1)
-        dots(ax, places, size=16, color=NETWORK, rim="white", width=0.5)
+        _draw_network(ax, neurons, network, camera)
         heading(ax, title, f"{network.name} of {len(network)} neurons, {state}")
         frame(ax)
+        _limit(ax, around)
     return figure
+
+
+def _draw_network(ax: Axes, neurons: NDArray[np.float64], network: Lattice, camera: Camera) -> None:
+    """Draw a network; one in space from far to near, the nearer the larger and the stronger."""
+    places, edges = flat(neurons, camera), network.edges
+    if neurons.shape[1] != 3:
+        lines(ax, places[edges], color=NETWORK, width=1.1)
+        dots(ax, places, size=16, color=NETWORK, rim="white", width=0.5)
+        return
+    depth = camera.project(neurons)[:, 2]
+    near = (depth - depth.min()) / (np.ptp(depth) or 1.0)
+    order = np.argsort(near[edges].mean(axis=1), kind="stable")
+    along = near[edges[order]].mean(axis=1)
+    colors = np.asarray(SIGNAL_TO_NETWORK(along))
+    ax.add_collection(LineCollection(list(places[edges[order]]), colors=colors, linewidths=0.5 + 1.3 * along, zorder=3))
+    order = np.argsort(near, kind="stable")
+    colors = np.asarray(SIGNAL_TO_NETWORK(near[order]))
+    dots(ax, places[order], size=6 + 22 * near[order], color=colors, rim="white", width=0.5)
+
+
+def _limit(ax: Axes, places: NDArray[np.float64]) -> None:
+    """Give a panel the limits that all panels of a figure share."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    margin = 0.05 * float((high - low).max() or 1.0)
+    ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
 
 
 def flat(points: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from contextlib import contextmanager
+from operator import index
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,12 +13,35 @@ import numpy as np
 from ..errors import UsageError
 from ..kernels.som.online import INDEX_BITS
 from ..model.graph import lattice_of
-from ..model.lattice import lattice
+from ..model.lattice import lattice, other_number
+from .schedules import schedule_warnings
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
     from numpy.typing import ArrayLike, NDArray
 
     from ..model.lattice import Lattice
+    from ..settings import NetworkSettings
+    from .schedules import Fall
+
+PARAMETERS = {"neurons": "n_neurons", "network": "topology", "iterations": "epochs"}
+"""Options of the command line that the estimator calls otherwise."""
+
+
+@contextmanager
+def as_parameters() -> Iterator[None]:
+    """Name parameters in what is raised, and no options: who trains a network in Python has none."""
+    try:
+        yield
+    except UsageError as error:
+        named = re.sub(r"--([a-z]+(?:-[a-z]+)*)", lambda found: _parameter(found[1]), str(error))
+        error.args = (named,)
+        raise
+
+
+def _parameter(option: str) -> str:
+    return PARAMETERS.get(option, option.replace("-", "_"))
 
 
 def checked_matrix(X: ArrayLike, estimator: str, *, features: int | None = None) -> NDArray[np.float64]:
@@ -64,14 +90,17 @@ def checked_weights(sample_weight: ArrayLike | None, samples: int) -> NDArray[np
     return weights
 
 
-def checked_lattice(topology: str, neurons: int, *, shape: tuple[int, int] | None, edges: ArrayLike | None) -> Lattice:
-    """Return the network of a topology, or of a graph's edges (e, 2).
+def checked_lattice(
+    topology: str, neurons: int | tuple[int, int], *, shape: tuple[int, int] | None, edges: ArrayLike | None
+) -> Lattice:
+    """Return the network of a topology, or of a graph's edges (e, 2); two numbers of neurons are a shape.
 
     Raises
     ------
     UsageError
-        Where edges are given to another topology, or there are too many neurons.
+        Where edges are given to another topology, the neurons are no number, or there are too many.
     """
+    neurons, shape = _counted(neurons, shape)
     if topology == "graph":
         found = lattice_of(np.empty((0, 2), int) if edges is None else edges, neurons)
     elif edges is not None:
@@ -81,6 +110,29 @@ def checked_lattice(topology: str, neurons: int, *, shape: tuple[int, int] | Non
     if len(found) > INDEX_BITS:
         raise UsageError("the network is too large", found=f"{len(found)} neurons", expected=f"{INDEX_BITS}")
     return found
+
+
+def warnings_of(
+    lattice: Lattice, asked: int | tuple[int, int] | None, settings: NetworkSettings, falls: Mapping[str, Fall]
+) -> list[str]:
+    """Return what to be warned of: falls that rise, and another number of neurons than was asked for."""
+    other = other_number(lattice, asked) if isinstance(asked, int) else None
+    return [*schedule_warnings(settings, **falls), *([f"{other} (shape sets the sides)"] if other else [])]
+
+
+def _counted(neurons: Any, shape: Any) -> tuple[int, tuple[int, int] | None]:
+    """Return a number of neurons, and a shape where there is one."""
+    if np.ndim(neurons) and shape is not None:
+        raise UsageError("two shapes are asked for", found=f"n_neurons = {neurons}, shape = {shape}", expected="one")
+    sides = shape if np.ndim(neurons) == 0 else neurons
+    try:
+        if sides is None:
+            return index(neurons), None
+        rows, columns = map(index, sides)
+    except (TypeError, ValueError):
+        found = f"n_neurons = {neurons!r}" if sides is None else f"shape = {sides!r}"
+        raise UsageError("neurons are counted", found=found, expected="a whole number, or two as shape") from None
+    return rows * columns, (rows, columns)
 
 
 def seed_of(random_state: Any) -> int:

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..settings import NetworkSettings
-from .checks import checked_lattice, checked_matrix, checked_weights, not_fitted, seed_of
+from .checks import as_parameters, checked_lattice, checked_matrix, checked_weights, not_fitted, seed_of, warnings_of
 from .fit import fit, match
-from .inputs import flat
+from .inputs import area_of_each, flat
 from .measures import quantization_error
 from .parameters import Parametrized
 from .saving import load_network, save_network
-from .schedules import schedule_warning
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from ..model.lattice import Lattice
-    from .fit import Callback
+    from .fit import Callback, Fitted
     from .history import History
     from .schedules import Fall
 
@@ -33,8 +32,8 @@ class SOM(Parametrized):
 
     Parameters
     ----------
-    n_neurons : int
-        Neurons u; a sheet or a sphere has the number that it can have nearest to it.
+    n_neurons : int, or (rows, columns)
+        Neurons u; a sheet or a sphere has the number that it can have nearest to it. Two numbers are a `shape`.
     topology : {"grid", "hexagonal", "chain", "ring", "cylinder", "torus", "sphere", "graph"}
     shape : (rows, columns), optional
         Sides of a grid, hexagonal grid, cylinder or torus, in place of `n_neurons`.
@@ -58,8 +57,9 @@ class SOM(Parametrized):
         The training stops after an epoch in which no neuron moved farther.
     trim : float
         Inputs farther from their neuron than this many medians are dropped in a second fit; 0: none.
-    pixel_area : float
-        Area that one input stands for, where inputs are the pixels of a band; else 0.
+    pixel_area : float, optional
+        Area that one input stands for, where the inputs of a ring fill a band; 0 where they lie on a line. Found from
+        the inputs where not given.
     random_state : int, RandomState, Generator or None
         `fit` stores the seed that it comes down to.
     callback : callable, optional
@@ -104,7 +104,7 @@ class SOM(Parametrized):
 
     def __init__(
         self,
-        n_neurons: int = 100,
+        n_neurons: int | tuple[int, int] = 100,
         *,
         topology: str = "grid",
         shape: tuple[int, int] | None = None,
@@ -121,7 +121,7 @@ class SOM(Parametrized):
         radius_power: float | None = None,
         least_move: float = 0.0,
         trim: float = 0.0,
-        pixel_area: float = 0.0,
+        pixel_area: float | None = None,
         random_state: Any = None,
         callback: Callback | None = None,
     ) -> None:
@@ -164,21 +164,26 @@ class SOM(Parametrized):
         """
         inputs = checked_matrix(X, type(self).__name__)
         weights = checked_weights(sample_weight, len(inputs))
-        settings = self._settings(len(inputs))
-        alpha_fall, radius_fall = (None if isinstance(f, str) else f for f in (self.alpha_fall, self.radius_fall))
-        if warning := schedule_warning(settings, alpha_fall=alpha_fall, radius_fall=radius_fall):
-            warnings.warn(warning, stacklevel=2)
-        self.lattice_ = checked_lattice(self.topology, self.n_neurons, shape=self.shape, edges=self.edges)
-        self.seed_ = seed_of(self.random_state)
-        start = None if isinstance(self.start, str) else np.asarray(self.start, np.float64)
-        fitted = fit(
-            inputs, self.lattice_, settings, np.random.default_rng(self.seed_), pixel_area=self.pixel_area,
-            weights=weights, start=start, callback=self.callback,
-            alpha_fall=alpha_fall, radius_fall=radius_fall, record=True,
-        )  # fmt: skip
+        with as_parameters():
+            fitted = self._fitted(inputs, weights)
         dropped = ~fitted.kept if weights is None else ~fitted.kept & (weights > 0)
         self.history_, self.strays_ = fitted.history, int(dropped.sum())
         return self._settle(fitted.codebook, inputs, weights)
+
+    def _fitted(self, inputs: NDArray[np.float64], weights: NDArray[np.float64] | None) -> Fitted:
+        """Train; warn of what is likely not meant."""
+        settings = self._settings(len(inputs))
+        falls: Any = {name: f for name in ("alpha_fall", "radius_fall") if callable(f := getattr(self, name))}
+        self.lattice_ = checked_lattice(self.topology, self.n_neurons, shape=self.shape, edges=self.edges)
+        for warning in warnings_of(self.lattice_, None if self.shape else self.n_neurons, settings, falls):
+            warnings.warn(warning, stacklevel=3)
+        self.seed_ = seed_of(self.random_state)
+        area = area_of_each(inputs, self.lattice_, weights) if self.pixel_area is None else self.pixel_area
+        return fit(
+            inputs, self.lattice_, settings, np.random.default_rng(self.seed_), pixel_area=area, weights=weights,
+            start=None if isinstance(self.start, str) else np.asarray(self.start, np.float64),
+            callback=self.callback, record=True, **falls,
+        )  # fmt: skip
 
     def partial_fit(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None) -> Self:
         """Train on: as many presentations of the new inputs as there are, at the last learning rate and radius.
@@ -190,8 +195,10 @@ class SOM(Parametrized):
         inputs = self._matrix(X)
         weights = checked_weights(sample_weight, len(inputs))
         rate, reach = float(self.alpha[1]), float(self.history_.radius[-1])
+        with as_parameters():
+            own = self._settings(len(inputs))
         settings = replace(
-            self._settings(len(inputs)), training="online", iterations=len(inputs), trim=0.0, alpha=(rate, rate),
+            own, training="online", iterations=len(inputs), trim=0.0, alpha=(rate, rate),
             radius=(reach, reach), neighborhood="bubble" if self.neighborhood == "bubble" else "gaussian",
         )  # fmt: skip
         fitted = fit(

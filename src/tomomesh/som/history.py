@@ -35,6 +35,12 @@ class History:
     def __len__(self) -> int:
         return len(self.radius)
 
+    def __repr__(self) -> str:
+        """Return one line: the numbers of all epochs would fill a page."""
+        ends = [float(self.quantization_error[n]) for n in (0, -1)] if len(self) else []
+        told = f", quantization error {ends[0]:.4g} to {ends[1]:.4g}" if ends else ""
+        return f"<History: {len(self)} epochs{told}>"
+
     def then(self, later: History) -> History:
         """Append what happened later."""
         pairs = [(getattr(self, entry.name), getattr(later, entry.name)) for entry in fields(self)]

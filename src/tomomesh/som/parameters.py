@@ -6,6 +6,18 @@ import inspect
 from importlib import import_module
 from typing import Any, Self
 
+MOST = 60
+"""Characters of a parameter up to which it is printed as it is."""
+
+
+def _short(value: Any) -> str:
+    """Return a value in one short line: an array by its shape."""
+    told = repr(value)
+    if len(told) <= MOST and "\n" not in told:
+        return told
+    shape = getattr(value, "shape", None) or (len(value) if hasattr(value, "__len__") else "")
+    return f"<{type(value).__name__} {shape}>".replace(" >", ">")
+
 
 class Parametrized:
     """An estimator whose parameters are those of its ``__init__``, kept under their own names."""
@@ -29,7 +41,7 @@ class Parametrized:
         return self
 
     def __repr__(self) -> str:
-        changed = [f"{name}={getattr(self, name)!r}" for name, default in self._defaults().items()
+        changed = [f"{name}={_short(getattr(self, name))}" for name, default in self._defaults().items()
                    if getattr(self, name) is not default and repr(getattr(self, name)) != repr(default)]  # fmt: skip
         return f"{type(self).__name__}({', '.join(changed)})"
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import EmptyError, UsageError
-from ..model.lattice import lattice
+from ..model.lattice import lattice, other_number
 from ..settings import IN_SLICE
 from .even_spacing import bridged_edges, even_spacing
 from .fit import fit, start_positions
 from .measures import network_measures
-from .schedules import schedule_warning
+from .schedules import schedule_warnings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,13 +87,13 @@ def train_region(
     if settings.even:
         codebook, _ = even_spacing(codebook, graph, bridged_edges(codebook, graph, settings.bridge))
     measures = _measures(inputs, graph, codebook, fitted.kept)
-    measures |= {"epochs": len(fitted.history), "seed": seed, "warnings": _warnings(settings)}
+    measures |= {"epochs": len(fitted.history), "seed": seed, "warnings": _warnings(graph, settings)}
     return TrainedNetwork(inputs, graph, start, codebook, measures, fitted.history)
 
 
-def _warnings(settings: NetworkSettings) -> list[str]:
-    warning = schedule_warning(settings)
-    return [warning] if warning else []
+def _warnings(graph: Lattice, settings: NetworkSettings) -> list[str]:
+    other = other_number(graph, settings.neurons)
+    return [*schedule_warnings(settings), *([other] if other else [])]
 
 
 def _measures(

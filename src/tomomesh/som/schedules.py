@@ -98,14 +98,14 @@ def radius_power(settings: NetworkSettings) -> float:
     return 5.0 if settings.training == "online" else 2.0
 
 
-def schedule_warning(
+def schedule_warnings(
     settings: NetworkSettings, *, alpha_fall: Fall | None = None, radius_fall: Fall | None = None
-) -> str | None:
-    """Say so where the learning rate of online training falls faster than the radius.
+) -> list[str]:
+    """Say so where a learning rate or a radius rises, and where the rate of online training falls faster than it.
 
-    The network then stiffens before its neighborhood is narrow: measured on a ring, five times the distance to the
-    true line. The falls are compared by their means over time. The radius' is taken as from 10 to 1 where it
-    follows from the network.
+    What rises ends as it should begin: no network comes to rest. Where the rate falls faster, the network stiffens
+    before its neighborhood is narrow: measured on a ring, five times the distance to the true line. The falls are
+    compared by their means over time. The radius' is taken as from 10 to 1 where it follows from the network.
 
     Parameters
     ----------
@@ -115,13 +115,21 @@ def schedule_warning(
 
     Returns
     -------
-    str or None
+    list of str
     """
-    if settings.training != "online":
-        return None
     reach = settings.radius or (10.0, 1.0)
-    rate_left = _left(*settings.alpha, SAMPLES, alpha_fall or settings.alpha_fall, settings.alpha_power).mean()
-    reach_left = _left(*reach, SAMPLES, radius_fall or settings.radius_fall, radius_power(settings)).mean()
-    if rate_left >= reach_left - 1e-9:
-        return None
-    return "the learning rate falls faster than the radius: the network stiffens before it has found its place"
+    rate_left = _left(*settings.alpha, SAMPLES, alpha_fall or settings.alpha_fall, settings.alpha_power)
+    reach_left = _left(*reach, SAMPLES, radius_fall or settings.radius_fall, radius_power(settings))
+    found = _rising("radius", reach, reach_left)
+    if settings.training != "online":
+        return found
+    found = _rising("learning rate", settings.alpha, rate_left) + found
+    if not found and rate_left.mean() < reach_left.mean() - 1e-9:
+        found = ["the learning rate falls faster than the radius: the network stiffens before it has found its place"]
+    return found
+
+
+def _rising(name: str, ends: tuple[float, float], left: NDArray[np.float64]) -> list[str]:
+    """Say so where a value is larger at the end than at the beginning."""
+    first, last = (ends[1] + (ends[0] - ends[1]) * float(left[n]) for n in (0, -1))
+    return [f"the {name} rises from {first:g} to {last:g}: the network comes to no rest"] if last > first else []

@@ -7,6 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..cuberille.leak_test import SURE, close_leaks
 from ..cuberille.neighbors import once_each
@@ -103,15 +104,24 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     mesh, taken_back, crossing = apart.value
     cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64))
     trace = None if rest.value.fitted is None else rest.value.fitted.trace
+    filled = rest.value.filled | _interpolated(mesh.moved(mesh.vertices + origin), points)
     enclosed = hollow(shell.value.leak_test, shell.value.taken(settings), shell.value.cubes, shell.value.cell)
     surface = Surface(
         points.cloud, cuberille, smoothed.moved(smoothed.vertices + origin),
-        mesh.moved(mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=rest.value.filled,
+        mesh.moved(mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=filled,
         cavities=int(kept.inward.sum()), crossing=crossing,
         encloses=enclosed if walls.value == 1 else None,
     )  # fmt: skip
-    fitted = fit_found(trace, len(smoothed.vertices), taken_back=taken_back, filled=rest.value.filled)
+    fitted = fit_found(trace, len(smoothed.vertices), taken_back=taken_back, filled=filled)
     return folded(surface, settled, shell, walls, rough, rest, apart, fitted, place_found(points))
+
+
+def _interpolated(mesh: TriMesh, points: Points) -> NDArray[np.bool_]:
+    """Tell which faces (m,) are nearer to what was interpolated between the points than to these."""
+    if len(points.between) == 0:
+        return np.zeros(len(mesh.faces), np.bool_)
+    nearest = np.asarray(cKDTree(points.places).query(mesh.corners.mean(axis=1))[1])
+    return nearest >= len(points.cloud)
 
 
 @timed("cubes")

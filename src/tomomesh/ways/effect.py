@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..settings import MATTERS, asked_by, option_of
 from . import choose_way, way_of
 from .way import INPUTS, POINTS
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection
+    from dataclasses import Field
 
     from ..settings import Settings
 
@@ -32,7 +34,8 @@ def without_effect(settings: Settings, given: Collection[str], *, input: str) ->
     settings : Settings
         All parameters of the run.
     given : collection of str
-        The bare names of those that were asked for; the others are not looked at.
+        The bare names of those that were asked for, with their values where these are known; the others are not
+        looked at.
     input : str
         What is read: ``gray`` or ``color`` for a study, ``cloud``, or ``stack`` for a cloud of contours on parallel
         slices.
@@ -48,7 +51,7 @@ def without_effect(settings: Settings, given: Collection[str], *, input: str) ->
     found = []
     for group, entry in entries:
         name = entry.name
-        if name not in given:
+        if name not in given or (isinstance(given, Mapping) and _asks_for_nothing(entry, given[name])):
             continue
         unread = (group in GROUPS or name in BESIDE) and name not in ALWAYS and name not in way.reads
         reason = way.because(settings, input) if unread else _missing(way.reads.get(name, {}), values)
@@ -56,6 +59,11 @@ def without_effect(settings: Settings, given: Collection[str], *, input: str) ->
         instead = f": {INSTEAD[name]} has" if name in INSTEAD and input not in POINTS else ""
         found += [f"{asked_by(entry)} has no effect {reason}{instead}"] if reason else []
     return found
+
+
+def _asks_for_nothing(entry: Field[Any], value: object) -> bool:
+    """Tell whether a value leaves to the program what it would choose anyway: a number that is "auto", written out."""
+    return bool(entry.metadata["auto"]) and value in (None, "auto")
 
 
 def _missing(conditions: Mapping[str, tuple[str, ...]], values: Mapping[str, object]) -> str:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def surface_near_points(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
     """Turn a cloud into a closed surface, each of whose vertices is drawn to the point nearest to it."""
     spaced = measured("points", sampling_distance, distinct(points.cloud.positions))
-    told = points_found(points.cloud, spaced.value, unit=settings.run.units)
+    told = points_found(points.cloud, spaced.value, unit=points.place.unit)
     made = surface_on_cubes(points.cloud, spaced.value, settings, progress)
     return folded(made.value, spaced, told, made, place_found(points))
 

@@ -5,17 +5,32 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..contours.axis import half_planes
 from ..contours.known import known_slices
-from ..contours.slices import find_slices
-from ..errors import EmptyError
+from ..contours.slices import find_slices, one_slice
+from ..contours.turning import between_half_planes
+from ..errors import EmptyError, GeometryError
 from ..model.columns import box
 from ..results import Place
 from ..stage import Stage, timed
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ..contours.slices import Slices
     from ..model.points import PointSet
     from ..settings import Settings
+
+
+OWN = ("um", "mm", "cm", "m", "voxel", "unknown")
+"""Units that files of tomomesh name."""
+METERS = {
+    "in": (0.0254, "inches"), "ft": (0.3048, "feet"), "us-ft": (1200 / 3937, "US survey feet"),
+    "km": (1000.0, "kilometers"),
+}  # fmt: skip
+"""Units that other files state, to meters and words."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +43,19 @@ class Points:
         Counted from its lowest corner, where that was asked for.
     place : Place
     slices : Slices or None
+    between : (k, 3) float array
+        Places interpolated between outlines in planes about one axis; none of any other cloud.
     """
 
     cloud: PointSet
     place: Place
     slices: Slices | None
+    between: NDArray[np.float64]
+
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """The points, and what was interpolated between them, (n + k, 3)."""
+        return np.concatenate([self.cloud.positions, self.between])
 
     @property
     def input(self) -> str:
@@ -51,14 +74,52 @@ def take_points(cloud: PointSet, settings: Settings) -> Stage[Points]:
     """
     if len(cloud) == 0:
         raise EmptyError("there are no points", expected="at least one")
+    cloud, unit = in_unit(cloud, settings.run.units)
     lowest, _ = box(cloud.positions)
-    place = Place(settings.run.units, cloud.frame, tuple(lowest.tolist()), settings.run.local_origin)
+    place = Place(unit, cloud.frame, tuple(lowest.tolist()), settings.run.local_origin)
     if settings.run.local_origin:
         cloud = replace(cloud, positions=cloud.positions - lowest)
-    slices = None
-    if settings.cubes.stacks != "none":
-        slices = known_slices(cloud) or find_slices(cloud.positions)
-    return Stage(Points(cloud, place, slices))
+    stacked = settings.cubes.stacks != "none"
+    slices = _slices(cloud, settings.cloud.thickness) if stacked else None
+    if slices or not stacked or settings.cubes.open or settings.fit.attraction == "nearest":
+        return Stage(Points(cloud, place, slices, np.empty((0, 3))))
+    return Stage(Points(*_turned_about(cloud, place)))
+
+
+def _slices(cloud: PointSet, thickness: float | None) -> Slices | None:
+    """Return the slices of a stack of contours, or the only one, where it was given a thickness; else None."""
+    found = known_slices(cloud, thickness) or find_slices(cloud.positions)
+    return found or (one_slice(cloud.positions, thickness) if thickness else None)
+
+
+def _turned_about(cloud: PointSet, place: Place) -> tuple[PointSet, Place, None, NDArray[np.float64]]:
+    """Interpolate between planes about an axis, where a cloud lies in such, and note that in the cloud."""
+    found = half_planes(cloud.positions)
+    if found is None:
+        return cloud, place, None, np.empty((0, 3))
+    told = f"the points lie in {len(found.angles) // 2} planes about one axis: what is between is interpolated"
+    return replace(cloud, notes=(*cloud.notes, told)), place, None, between_half_planes(found)
+
+
+def in_unit(cloud: PointSet, asked: str | None) -> tuple[PointSet, str]:
+    """Return a cloud in a unit of `OWN`, and that unit: as asked for, else as its file states, else millimeters.
+
+    Raises
+    ------
+    GeometryError
+        For degrees, and other units that have no known length.
+    """
+    unit = asked or cloud.unit or "mm"
+    if unit in OWN:
+        return cloud, unit
+    if unit not in METERS:
+        raise GeometryError(
+            "the coordinates are no lengths that are known", found=f"unit = {unit}",
+            expected="meters, feet or another length, as of a projected coordinate system",
+            hint="--units, to take the numbers as lengths",
+        )  # fmt: skip
+    told = f"coordinates in {METERS[unit][1]} were converted to meters"
+    return replace(cloud, positions=cloud.positions * METERS[unit][0], notes=(*cloud.notes, told), unit="m"), "m"
 
 
 def place_found(points: Points) -> Stage[None]:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 from ..followed import outline_followed
 from ..isosurface.crossings import Levels
 from ..measure.rings import assess_contours
+from ..model.lattice import other_number
 from ..results import Enclosed, Segmentation
 from ..segmentation.contours.inputs import share_of_holes, slices_with_several
 from ..segmentation.sample import sample
 from ..segmentation.training import regions, train_study
 from ..segmentation.under_rings import surface_under
 from ..segmentation.window import by_layer
-from ..som.schedules import schedule_warning
+from ..som.schedules import schedule_warnings
 from ..stage import Stage, folded, measured, timed
 from .cubes import Inside, surface_on_cubes
 from .sections import body_of_cubes, missed, networks_on_slices, sampling_found
@@ -110,8 +111,9 @@ def _networks_found(networks: Networks, kept: Selected, settings: Settings) -> S
     if len(networks.lines):
         closed = networks.lattice.name == "ring"
         stats["rings"] = assess_contours(networks.lines, kept.study.spacing_mm[:2], closed=closed)
-    schedule = schedule_warning(settings.network)
-    return Stage(None, stats, (*((schedule,) if schedule else ()), *lost, *_overlooked(networks, kept, settings)))
+    other = other_number(networks.lattice, settings.network.neurons)
+    told = (*schedule_warnings(settings.network), *((other,) if other else ()))
+    return Stage(None, stats, (*told, *lost, *_overlooked(networks, kept, settings)))
 
 
 def _overlooked(networks: Networks, kept: Selected, settings: Settings) -> list[str]:

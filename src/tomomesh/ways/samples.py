@@ -42,17 +42,17 @@ it."""
 
 def lowest_corner(points: Points) -> Floats:
     """Return the corner (3,) that the samples of a cloud are counted from."""
-    return box(points.cloud.positions)[0]
+    return box(points.places)[0]
 
 
 @timed("samples")
 def settle(points: Points, settings: Settings, progress: Progress) -> Stage[Samples]:
     """Let each point settle on the surface around it; strays are left out. Positions count from the lowest corner."""
-    positions = points.cloud.positions
+    positions = points.places
     _require_digits(positions)
     require_room_for_points(len(positions))
     samples = settle_points(positions - lowest_corner(points), threads=settings.run.threads, progress=progress)
-    return _samples_found(len(positions), samples, settings.run.units)
+    return _samples_found(points, samples)
 
 
 def _require_digits(positions: Floats) -> None:
@@ -66,11 +66,13 @@ def _require_digits(positions: Floats) -> None:
         )  # fmt: skip
 
 
-def _samples_found(count: int, samples: Samples, unit: str) -> Stage[Samples]:
+def _samples_found(points: Points, samples: Samples) -> Stage[Samples]:
     """Tell how far apart the points are, how noisy, and how many are strays."""
+    count = len(points.places)
     section: dict[str, Any] = {
-        "unit": unit,
-        "count": count,
+        "unit": points.place.unit,
+        "count": len(points.cloud),
+        "interpolated": len(points.between),
         "distinct": len(samples.positions) + samples.strays,
         "strays": samples.strays,
         "spacing_mm": float(np.median(samples.spacing)),

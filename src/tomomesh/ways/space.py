@@ -19,6 +19,7 @@ from ..followed import Followed, outline_followed
 from ..isosurface.voxels import boundary
 from ..measure.intersections import CrossingFaces
 from ..model.columns import any_of
+from ..model.lattice import other_number
 from ..model.mesh import QuadMesh, TriMesh
 from ..model.points import PointSet
 from ..pointcloud.samples import settle_points
@@ -109,7 +110,8 @@ def segment_in_space(kept: Selected, settings: Settings, progress: Progress) -> 
     found = Segmentation(kept.study, kept.plane, kept.mask, labels.value, sampling.points, sampling, source)
     inside = not outlined and settings.network.network in SURFACES and not is_wall(mask)
     dropped = int(np.count_nonzero(kept.mask) - np.count_nonzero(mask))
-    told = _network_found(network, kept.mask, count, dropped, inside=inside)
+    asked = settings.network.neurons
+    told = _network_found(network, kept.mask, count, dropped, inside=inside, asked=asked)
     return folded(found, pieces, shown, trained, labels, told, points_found(sampling.points, sampling.spacing_mm))
 
 
@@ -127,7 +129,7 @@ def _shown(kept: Selected, mask: NDArray[np.bool_], settings: Settings) -> Shown
 
 
 def _network_found(
-    network: SpaceNetwork, mask: NDArray[np.bool_], pieces: int, dropped: int, *, inside: bool
+    network: SpaceNetwork, mask: NDArray[np.bool_], pieces: int, dropped: int, *, inside: bool, asked: int | None
 ) -> Stage[None]:
     """Tell of the one network in space, and what of the window it does not stand for."""
     voxels = int(np.count_nonzero(mask))
@@ -143,7 +145,8 @@ def _network_found(
         },
         "space": {"pieces": pieces, "dropped_voxels": dropped},
     }
-    warnings = []
+    other = other_number(network.lattice, asked)
+    warnings = [other] if other else []
     if inside:
         warnings.append("the window is a solid, and the surface lies inside of it: --signal boundary lays it around")
     if pieces > 1:

@@ -33,7 +33,7 @@ NAMED = 4
 def surface_of_stack(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
     """Close a cloud that is a stack of contours."""
     assert points.slices is not None
-    made = surface_of_slices(points.cloud, points.slices, settings, progress, unit=settings.run.units)
+    made = surface_of_slices(points.cloud, points.slices, settings, progress, unit=points.place.unit)
     return folded(made.value, made, place_found(points))
 
 
@@ -61,7 +61,8 @@ def surface_of_slices(
     edge = finest if asked.cell_mm is None else float(np.min(asked.cell_mm))
     closed = measured(
         "contours", contour_surface, cloud.positions, slices, edge=None if edge is None else edge * asked.cell_factor,
-        allow_leaks=asked.allow_leaks, fit=settings.fit, threads=settings.run.threads, progress=progress,
+        thickness=settings.cloud.thickness, allow_leaks=asked.allow_leaks, fit=settings.fit,
+        threads=settings.run.threads, progress=progress,
     )  # fmt: skip
     made = closed.value
     surface = Surface(
@@ -119,7 +120,7 @@ def _told_of_slices(made: ContourSurface, slices: Slices, widest: float, left: i
     stack, told = made.stack, []
     if stack.widest > APART:
         told.append(f"slices lie up to {widest:.4g} apart, {stack.step:.4g} as a rule: that is interpolated")
-    if stack.alone:
+    if stack.alone and stack.thickness is None:
         places = (slices.origin + part.place @ slices.axes for part in stack.alone[:NAMED])
         named = "; ".join(", ".join(f"{axis:.4g}" for axis in place) for place in places)
         more = "; ..." if len(stack.alone) > NAMED else ""

@@ -26,13 +26,15 @@ NOTHING = np.empty(0)
 def segment_by_voxels(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Boundary]]:
     """Take the boundary of the window in place of networks."""
     chosen, surface = kept.chosen, "outer" if settings.cubes.surface == "outer" else "all"
+    progress("voxels", 0, 1)
     bounded = measured(
         "points", boundary, chosen.volume, chosen.mask, lower=chosen.lower, upper=chosen.upper,
         layers=settings.window.layers, surface=surface, divide=settings.cubes.divide, threads=settings.run.threads,
     )  # fmt: skip
+    progress("voxels", 1, 1)
     found, spacing = bounded.value, max(kept.study.spacing_mm)
     sampling = Sampling(found.points, spacing, found.added, NOTHING, NOTHING)
-    labels = kept.mask.astype(np.uint16)
+    labels = kept.mask.view(np.uint8)
     made = Segmentation(kept.study, kept.plane, kept.mask, labels, found.points, sampling, found)
     return folded(made, bounded, points_found(found.points, spacing, bridged=found.added))
 

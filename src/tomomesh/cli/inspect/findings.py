@@ -84,12 +84,18 @@ def _of_voxels(found: dict[str, Any]) -> list[str]:
         f"({', '.join(f'{c:.1f}' for c in found['corner_mm'])}) mm LPS",
         f"slices    stored {found['stored_plane']}, columns-rows-slices run {found['stored_axes']}; "
         f"taken {found['default_plane']} by default",
-        f"levels    {found['lowest']:g} to {found['highest']:g} ({found['gray_unit']})",
+        f"levels    {found['lowest']:g} to {found['highest']:g} ({found['gray_unit']}){_drawn(found)}",
         f"          {_histogram(found['histogram'])}",
         *_told("windows", _windows(found["windows"])),
         *(_told("labels", _labels(found["labels"])) if found["labels"] else []),
         *(line for note in [*found["notes"], *found["remarks"]] for line in _told("note", note)),
     ]
+
+
+def _drawn(found: dict[str, Any]) -> str:
+    """Say what the histogram is drawn of, where it is not all levels."""
+    low, high = found["histogram_from"], found["histogram_to"]
+    return "" if (low, high) == (found["lowest"], found["highest"]) else f", drawn from {low:.4g} to {high:.4g}"
 
 
 def _histogram(counts: list[int]) -> str:

@@ -18,17 +18,17 @@ REFUSALS = (FormatError, GeometryError, ResourceError, UnreadableError)
 """What reading raises because of the study; anything else is the user's or the program's fault."""
 
 
-def inspected(study: str, settings: Settings, *, typed: str = "") -> dict[str, Any]:
+def inspected(study: str | tuple[str, ...], settings: Settings, *, typed: str = "") -> dict[str, Any]:
     """Return what is in a study, ready for JSON and without any patient data.
 
     Parameters
     ----------
-    study : str
-        The path of the study.
+    study : str, or tuple of str
+        The path of the study, or those of its slices.
     settings : Settings
         How it is read, and which part of it.
     typed : str
-        What the user typed in its place, for the study of a stream.
+        What the user typed in its place, for the study of a stream and slices that are named one by one.
 
     Returns
     -------
@@ -47,9 +47,9 @@ def inspected(study: str, settings: Settings, *, typed: str = "") -> dict[str, A
     series = [_series(one, alone=len(listing.series) == 1) for one in listing.series]
     found |= {"series": series, "segments": dict(listing.segments), "left_out": dict(listing.left_out)}
     found["refused"] = _refusal(fault)
-    if typed:
-        _rename(found, study, typed.split()[0])
-    path = f"./{study}" if study.startswith("-") else study  # else it would look like an option
+    if typed and isinstance(study, str):
+        _rename(found, study, shlex.split(typed)[0])
+    path = f"./{study}" if str(study).startswith("-") else str(study)  # else it would look like an option
     return found | {"next": next_step(found, typed or shlex.quote(path), settings, fault, listing.series)}
 
 
@@ -60,7 +60,9 @@ def _rename(found: dict[str, Any], study: str, name: str) -> None:
             one["refused"]["error"] = one["refused"]["error"].replace(study, name)
 
 
-def _surveyed(study: str, settings: Settings, listing: Listing) -> tuple[dict[str, Any], TomomeshError | None]:
+def _surveyed(
+    study: str | tuple[str, ...], settings: Settings, listing: Listing
+) -> tuple[dict[str, Any], TomomeshError | None]:
     """Return what is in a study, or the error that refuses it; a single file that is broken says nothing more."""
     from ...segmentation.crop import crop
     from ...segmentation.survey import survey

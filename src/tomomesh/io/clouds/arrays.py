@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from ...model.points import PointSet
     from ..fields import Cloud, Fields
+    from ..meshes.attributes import MeshAttributes
 
 POSITIONS = ("points", "positions", "xyz", "vertices", "pos", "arr_0")
 """What the positions in an NPZ file are called; the first that is there."""
@@ -87,7 +88,7 @@ def _positions(array: NDArray[Any], file: str) -> NDArray[np.float64]:
     return doubles(array)
 
 
-def write_npy(points: PointSet, path: str | Path, unit: str, frame: str) -> None:
+def write_npy(points: PointSet, path: str | Path, _beside: MeshAttributes) -> None:
     """Write positions alone."""
     with replacing(path) as file:
         np.lib.format.write_array(file, np.ascontiguousarray(points.positions, "<f8"), version=(1, 0))

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...errors import FormatError
 from ...model.points import COLORS
 from ..fields import AXES, IDS, flat_columns
 from ..files.atomic import replacing
-from ..files.signature import signature
+from ..files.limits import require_rows
+from ..files.source import first_bytes, whole
+from ..meshes.obj import VERTEX, unfolded
 from ..text import delimiter_of, first_row, parse_rows, read_lines, typed
+from .columns import PositionColumns, named_positions, positions_among
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,53 +24,108 @@ if TYPE_CHECKING:
 
     from ...model.points import PointSet
     from ..fields import Cloud, Fields
+    from ..meshes.attributes import MeshAttributes
 
-AXIS = re.compile(r"([xyz])(\W.*|_(mm|cm|m|um|km|in|ft))?", re.IGNORECASE)
-"""What the column of a coordinate is called: ``x``, ``X_mm``, ``x [m]``."""
+LONGEST_HEAD = 1 << 16
+"""Bytes at the beginning of a text in which its names are looked for."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """The lines of a text, those of counts and names made empty, and the names of its columns."""
+
+    lines: list[str]
+    names: list[str]
+    columns: PositionColumns
 
 
 def read_text(path: Path) -> Cloud:
-    """Read rows of numbers; one line of names may come first, also behind ``#`` or ``//``.
+    """Read rows of numbers; one line of names may come first, also behind ``#`` or ``//``, and a count before it.
 
-    Columns named x, y and z are the positions, else the first three are. The other columns that have a name
-    and hold numbers are fields.
+    Columns that are named as positions are (`named_positions`), else the first three. The other columns
+    that have a name and hold numbers are fields.
     """
-    lines = read_lines(path)
-    names = _names(lines[0]) if lines else []
-    before = 1 if names else 0
-    axes = _axes(names)
-    rows = parse_rows(lines[before:], required=axes, file=str(path), before=before)
-    return rows[:, axes], _named_columns(rows, names, axes, first_row(lines[before:]))
+    file = str(path)
+    found = _table(without_counts(read_lines(path), file), file)
+    axes = list(found.columns.axes)
+    rows = parse_rows(found.lines, required=axes, file=file)
+    return rows[:, axes], _named_columns(rows, found.names, axes, first_row(found.lines))
+
+
+def columns_frame(path: Path) -> dict[str, Any]:
+    """Return the unit that the names of the columns state, and what is to be told of them."""
+    lines = first_bytes(path, LONGEST_HEAD).decode("utf-8-sig", "replace").splitlines()
+    columns = _table(lines, str(path)).columns
+    return {"unit": columns.unit, "notes": columns.notes}
+
+
+def _table(lines: list[str], file: str) -> Table:
+    """Find the line of names: the first that is no comment, or a comment before it that names the positions."""
+    first = next((n for n, line in enumerate(lines) if line.split("#")[0].strip()), len(lines))
+    for n in (*range(first), *((first,) if first < len(lines) else ())):
+        names = _names(lines[n])
+        if named_positions(names) or (names and n == first):
+            kept = [*lines[:n], "", *lines[n + 1 :]] if n == first else lines
+            return Table(kept, names, positions_among(names, file=file))
+    return Table(lines, [], PositionColumns())
+
+
+def without_counts(lines: list[str], file: str) -> list[str]:
+    """Make lines empty that say how many rows follow, and a comment behind the first, where the text begins so.
+
+    Raises
+    ------
+    FormatError
+        Where the rows are not as many.
+    """
+    at = _next_row(lines, 0)
+    if at == len(lines) or not lines[at].strip().isdigit():
+        return lines
+    kept = list(lines)
+    while at < len(kept):
+        word = kept[at].strip()
+        if not word.isdigit():
+            raise FormatError(
+                "the count of the rows is wrong", file=file, found=f"row {at + 1} = another one",
+                expected="as many as it says",
+            )  # fmt: skip
+        kept[at], at = "", _next_row(kept, at + 1)
+        behind = kept[at] if at < len(kept) else ""
+        if behind and _is_comment(behind):
+            kept[at], at = "", _next_row(kept, at + 1)
+        end = at + int(word) + bool(named_positions(_names(behind)))
+        require_rows(int(word), sum(map(bool, map(str.strip, kept[at:end]))), "rows", file=file)
+        at = _next_row(kept, end)
+    return kept
+
+
+def _next_row(lines: list[str], start: int) -> int:
+    """Return the number of the next line that holds anything."""
+    return next((n for n in range(start, len(lines)) if lines[n].partition("#")[0].strip()), len(lines))
+
+
+def _is_comment(line: str) -> bool:
+    """Tell whether a line behind a count is words that name no positions."""
+    names = _names(line)
+    return not named_positions(names) and not _is_number(line.replace(",", " ").replace(";", " ").split()[0])
 
 
 def _names(line: str) -> list[str]:
     """Return the names of the columns, none where the line has none.
 
-    A line of names has three words at least, and no number among the first three; a comment must name x, y, z.
+    A line of names has three words at least, and no number among the first three.
     """
-    comment = line.lstrip().startswith("#")
     plain = line.strip().lstrip("#/").strip()
     names = [word.strip().strip("\"'") for word in plain.split(delimiter_of([plain]))]
-    named = len(names) >= 3 and not any(map(_is_number, names[:3]))
-    return names if named and (not comment or len(_found_axes(names)) == 3) else []
+    return names if len(names) >= 3 and not any(map(_is_number, names[:3])) else []
 
 
 def _is_number(word: str) -> bool:
     try:
-        float(word)
+        float(word.replace(",", "."))
     except ValueError:
         return False
     return True
-
-
-def _found_axes(names: list[str]) -> dict[str, int]:
-    matches = [AXIS.fullmatch(name) for name in names]
-    return {match[1].lower(): column for column, match in reversed([*enumerate(matches)]) if match}
-
-
-def _axes(names: list[str]) -> list[int]:
-    found = _found_axes(names)
-    return [found[axis] for axis in AXES] if len(found) == 3 else [0, 1, 2]
 
 
 def _named_columns(rows: NDArray[np.float64], names: list[str], axes: list[int], first: list[str]) -> Fields:
@@ -82,21 +141,23 @@ def _named_columns(rows: NDArray[np.float64], names: list[str], axes: list[int],
 
 def read_obj(path: Path) -> Cloud:
     """Read the vertices of an OBJ file, with their colors where they have any."""
-    lines = [line.lstrip()[2:] if line.lstrip()[:2] in ("v ", "v\t") else "" for line in read_lines(path)]
+    vertices = [words[1:] for words in map(str.split, unfolded(whole(path), str(path))) if words[:1] in VERTEX]
+    width = min(map(len, vertices), default=3)
+    lines = [" ".join(words[:width]) for words in vertices]
     rows = parse_rows(lines, required=(0, 1, 2), file=str(path))
-    colors = rows[:, -3:].T if rows.shape[1] >= 6 else ()
+    colors = rows[:, 3:6].T if rows.shape[1] == 6 else rows[:, 4:7].T if rows.shape[1] > 6 else ()
     return rows[:, :3], dict(zip(COLORS, colors, strict=False))
 
 
-def write_xyz(points: PointSet, path: str | Path, unit: str, frame: str) -> None:
+def write_xyz(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
     """Write positions under a comment."""
     rows = (f"{x!r} {y!r} {z!r}" for x, y, z in points.positions.tolist())
-    _write_lines(path, [f"# {signature(unit, frame)}", *rows])
+    _write_lines(path, [f"# {beside.head}", *rows])
 
 
-def write_csv(points: PointSet, path: str | Path, unit: str, frame: str) -> None:
+def write_csv(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
     """Write positions, ids and attributes under a line of names."""
-    head = [axis if unit == "unknown" else f"{axis}_{unit}" for axis in AXES]
+    head = [axis if beside.unit == "unknown" else f"{axis}_{beside.unit}" for axis in AXES]
     others = flat_columns(points.attributes, len(points), [*AXES, *head, *IDS])
     ids = (points.slices, points.neurons, points.kinds)
     columns: list[NDArray[Any]] = [*points.positions.T, *ids, *others.values()]

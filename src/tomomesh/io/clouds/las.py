@@ -27,17 +27,27 @@ HEAD = struct.Struct("<4s90xHII")
 RECORD_BYTES = 54
 """Least bytes of one of those records: their headers (LAS 1.4, variable length records)."""
 
+PROJECTION, SYSTEMS = "LASF_Projection", (2112, 34735)
+"""Who the records of the coordinate system are of, and their numbers: as text (WKT), and as keys of GeoTIFF."""
+
+UNITS = {1.0: "m", 0.3048: "ft", round(1200 / 3937, 9): "us-ft"}
+"""Meters to the names of units."""
+
 POINTS_AT_ONCE = 1 << 18
 """Points read at a time, at most 17 MB of them: a count that lies is found before much is allocated."""
 
 
 def read_las(path: Path) -> Cloud:
-    """Read a LAS or LAZ file of any version and point format that laspy knows."""
+    """Read a LAS or LAZ file of any version and point format that laspy knows.
+
+    Heights in another unit than the other two are brought to theirs.
+    """
     file = str(path)
     _check_head(path)
     laspy = required("laspy", file=file)
     if path.suffix.lower() == ".laz":
         required("lazrs", file=file)
+    heights = _meters(path)[1]
     with (
         third_party("laspy", file),
         # one thread: the parallel decoder takes memory for whatever a chunk's entry in their table says
@@ -51,7 +61,30 @@ def read_las(path: Path) -> Cloud:
     if not chunks:
         return np.empty((0, 3)), {}
     columns = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
-    return columns.pop(""), columns
+    return columns.pop("") * np.array([1.0, 1.0, heights]), columns
+
+
+def las_frame(path: Path) -> dict[str, Any]:
+    """Return the unit of the coordinate system that a LAS or LAZ file names; None where it names none."""
+    return {"unit": _meters(path)[0]}
+
+
+def _meters(path: Path) -> tuple[str | None, float]:
+    """Return the unit of the first two axes, and how many of them a unit of height is."""
+    file = str(path)
+    laspy = required("laspy", file=file)
+    with third_party("laspy", file), laspy.open(path, read_evlrs=False) as reader:
+        records = reader.header.vlrs
+        if not any(record.user_id == PROJECTION and record.record_id in SYSTEMS for record in records):
+            return None, 1.0
+        required("pyproj", file=file)
+        system = reader.header.parse_crs()
+    axes = [] if system is None else system.axis_info
+    if not axes:
+        return None, 1.0
+    unit = UNITS.get(round(axes[0].unit_conversion_factor, 9), axes[0].unit_name)
+    heights = axes[2].unit_conversion_factor / axes[0].unit_conversion_factor if len(axes) > 2 else 1.0
+    return unit, heights if unit in UNITS.values() else 1.0
 
 
 def _check_head(path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ...errors import EmptyError
@@ -11,10 +12,13 @@ from ..fields import point_set
 from ..files.source import existing_file, reader_of, suffix_of, whole
 from ..finite import check_finite
 from ..meshes.read import MESH_READERS
+from ..meshes.vtp import read_vtp
 from .arrays import read_npy, read_npz
 from .delimited import read_obj, read_text
 from .e57 import read_e57
+from .frame import frame_of_cloud
 from .las import read_las
+from .leica import read_pts, read_ptx
 from .pcd import read_pcd
 from .ply_vertices import read_ply
 
@@ -32,11 +36,12 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
     Parameters
     ----------
     path : path
-        ``.ply`` (text or binary); ``.xyz``, ``.txt`` or ``.csv`` (the columns named x, y and z, else the first
-        three); ``.npy`` with an (n, 3) array or named fields; ``.npz`` with ``points`` or the like; ``.pcd``;
-        ``.las``, ``.laz`` and ``.e57`` (with the extra ``clouds``, which compressed ``.pcd`` needs too); or the
-        vertices of ``.obj``, ``.off`` and ``.stl`` (its equal positions become one vertex); or a DICOM RT Structure
-        Set, of which one structure's contours are taken.
+        ``.ply`` (text or binary) and ``.vtp``; ``.xyz``, ``.asc``, ``.txt`` or ``.csv`` (the columns named x, y and z
+        or the like, else the first three; a count may come first); ``.pts`` and ``.ptx``; ``.npy`` with an (n, 3)
+        array or named fields; ``.npz`` with ``points`` or the like; ``.pcd``; ``.las``, ``.laz`` and ``.e57`` (with
+        the extra ``clouds``, which compressed ``.pcd`` needs too); or the vertices of ``.obj``, ``.off``, ``.3mf``,
+        ``.glb``, ``.gii`` and ``.stl`` (its equal positions become one vertex); or a DICOM RT Structure Set, of which
+        one structure's contours are taken.
     settings : CloudSettings, optional
         What to do where the file leaves a choice.
 
@@ -79,7 +84,7 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
     if len(positions) == 0:
         raise EmptyError("the cloud has no points", file=str(path))
     check_finite(positions, "row", file=str(path))
-    return point_set(positions, fields)
+    return replace(point_set(positions, fields), **frame_of_cloud(path))
 
 
 def _read_vertices(path: Path) -> Cloud:
@@ -102,5 +107,12 @@ POINT_READERS: dict[str, Callable[[Path], Cloud]] = {
     ".obj": read_obj,
     ".off": _read_vertices,
     ".stl": _read_vertices,
+    ".3mf": _read_vertices,
+    ".glb": _read_vertices,
+    ".gii": _read_vertices,
+    ".vtp": read_vtp,
+    ".asc": read_text,
+    ".pts": read_pts,
+    ".ptx": read_ptx,
 }
 """Suffix to reader."""

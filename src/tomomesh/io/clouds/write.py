@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..fields import AXES, IDS, flat_columns
 from ..files.atomic import check_output
-from ..files.signature import signature
 from ..files.source import suffix_of
-from ..meshes.attributes import MeshAttributes
+from ..meshes.attributes import MeshAttributes, narrowed
 from ..meshes.ply import write_ply
 from ..meshes.vtp import write_vtp_points
 from .arrays import write_npy
@@ -24,7 +21,9 @@ if TYPE_CHECKING:
     from ..fields import Fields
 
 
-def write_points(points: PointSet, path: str | Path, *, unit: str = "mm", frame: str = "LPS") -> None:
+def write_points(
+    points: PointSet, path: str | Path, *, unit: str = "mm", frame: str = "LPS", precision: int = 64
+) -> None:
     """Write a cloud.
 
     Parameters
@@ -36,6 +35,8 @@ def write_points(points: PointSet, path: str | Path, *, unit: str = "mm", frame:
         ``.xyz`` and ``.npy`` keep positions.
     unit, frame : str
         What the coordinates are in: named in the file where its format can.
+    precision : {64, 32}
+        Bits of the coordinates in PLY and VTP; 64 all the same where 32 would let points fall together.
 
     Raises
     ------
@@ -45,25 +46,21 @@ def write_points(points: PointSet, path: str | Path, *, unit: str = "mm", frame:
         Where the file cannot be written.
     """
     check_output(path, POINT_WRITERS)
-    POINT_WRITERS[suffix_of(path)](points, path, unit, frame)
+    POINT_WRITERS[suffix_of(path)](points, path, MeshAttributes(unit, frame, {}, {}, single=precision == 32))
 
 
-def _write_ply(points: PointSet, path: str | Path, unit: str, frame: str) -> None:
-    columns: Fields = dict(zip(AXES, np.asarray(points.positions, np.float64).T, strict=True))
+def _write_ply(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
+    columns: Fields = dict(zip(AXES, narrowed(points.positions, single=beside.single).T, strict=True))
     columns |= zip(IDS, (points.slices, points.neurons, points.kinds), strict=True)
     columns |= flat_columns(points.attributes, len(points), columns)
-    write_ply(path, signature(unit, frame), columns)
+    write_ply(path, beside.head, columns)
 
 
-def _write_vtp(points: PointSet, path: str | Path, unit: str, frame: str) -> None:
-    write_vtp_points(points, path, MeshAttributes(unit, frame, {}, {}))
-
-
-POINT_WRITERS: dict[str, Callable[[PointSet, str | Path, str, str], None]] = {
+POINT_WRITERS: dict[str, Callable[[PointSet, str | Path, MeshAttributes], None]] = {
     ".ply": _write_ply,
     ".xyz": write_xyz,
     ".csv": write_csv,
     ".npy": write_npy,
-    ".vtp": _write_vtp,
+    ".vtp": write_vtp_points,
 }
 """Suffix to writer."""

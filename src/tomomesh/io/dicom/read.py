@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,10 @@ from ...model.volume import Volume
 from ..files.source import counted
 from .bad import leave_out
 from .files import read_frames
-from .headers.kinds import SEGMENTED
+from .headers.identity import identity_of
+from .headers.kinds import SEGMENTED, class_of
+from .headers.multiframe import placed_evenly
+from .headers.unit import gray_unit
 from .pixels.decoder import Decoder
 from .series.choice import choose, stacks_among
 from .series.stack import Stack, stacked
@@ -24,6 +27,10 @@ if TYPE_CHECKING:
 
     from ...settings import ReadSettings
     from .headers.header import ImageFrame
+
+
+ULTRASOUND_VOLUME = "1.2.840.10008.5.1.4.1.1.6.2"
+"""The storage class of ultrasound in three dimensions."""
 
 
 def read_dicom(files: list[Path], settings: ReadSettings, *, study: str, others: Counter[str] | None = None) -> Volume:
@@ -77,14 +84,24 @@ def _read(files: list[Path], settings: ReadSettings, study: str, others: Counter
     choice = choose(reading.frames, settings.series, folder=study)
     stack, levels, without = _decoded(choice.frames, decode, settings, study)
     header = choice.frames[0].header
-    inverted = header.get("PhotometricInterpretation") == "MONOCHROME1"
-    unit = "HU" if header.get("Modality") == "CT" else "stored"
-    turned = ("MONOCHROME1: gray levels were inverted" if unit != "HU" else "MONOCHROME1: HU were kept",)
+    unit, in_unit = gray_unit(choice.frames)
     skipped = _left(stack) if broken or without else ()
-    notes = left + broken + choice.notes + without + skipped + stack.notes + levels.notes + (turned if inverted else ())
-    study_read = Volume.from_stored(levels.voxels, stack.affine, unit=unit, notes=notes)
-    padded = {frame.padding for frame in choice.frames}
-    return replace(study_read, padding=padded.pop() if len(padded) == 1 else None)
+    notes = left + broken + choice.notes + without + skipped + stack.notes + levels.notes + in_unit + _said(header)
+    read = Volume.from_stored(levels.voxels, stack.affine, unit=unit, notes=notes)
+    return replace(read, padding=levels.padding, dicom=identity_of(choice.frames))
+
+
+def _said(header: Any) -> tuple[str, ...]:
+    """Say of a header what turned its levels over, and where its places are not the patient's."""
+    notes = []
+    if header.get("PhotometricInterpretation") == "MONOCHROME1":
+        kept = header.get("Modality") == "CT"
+        notes.append("MONOCHROME1: HU were kept" if kept else "MONOCHROME1: gray levels were inverted")
+    if class_of(header) == ULTRASOUND_VOLUME:
+        notes.append("placed by the transducer, not by the patient: left, back and up are not known")
+    if placed_evenly(header):
+        notes.append("frames placed by SpacingBetweenSlices, one behind the other along their normal")
+    return tuple(notes)
 
 
 def _left(stack: Stack) -> tuple[str, ...]:

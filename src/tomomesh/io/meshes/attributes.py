@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from ..fields import Fields
 
 
+MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
+"""Millimeters in a unit that a file may name."""
+
+
 @dataclass(frozen=True)
 class MeshAttributes:
     """Unit, frame and fields of a mesh that is written.
@@ -29,17 +33,29 @@ class MeshAttributes:
         What the coordinates are in.
     vertex_fields, face_fields : dict of str to (n,) or (m,) array
         Single columns of numbers, by name.
+    z_up : bool
+        Whether z is up where the frame does not say so, as of a part to print.
+    single : bool
+        Whether formats of 64 bits are to hold 32, where these keep the vertices apart.
     """
 
     unit: str
     frame: str
     vertex_fields: Fields
     face_fields: Fields
+    z_up: bool = False
+    single: bool = False
 
     @property
     def head(self) -> str:
         """One line about the file: program, version, unit and frame."""
         return signature(self.unit, self.frame)
+
+
+def narrowed(positions: NDArray[np.float64], *, single: bool) -> NDArray[np.floating[Any]]:
+    """Return positions (n, 3) in 32 bits where that was asked for and keeps them apart, else in 64."""
+    narrow = _narrow(positions) if single else None
+    return np.asarray(positions, np.float64) if narrow is None else narrow
 
 
 def single_precision(vertices: NDArray[np.float64], path: str | Path, *, kind: str) -> NDArray[np.float32]:
@@ -59,10 +75,8 @@ def single_precision(vertices: NDArray[np.float64], path: str | Path, *, kind: s
     OutputError
         Where two vertices would fall together, or a coordinate is too large.
     """
-    with np.errstate(over="ignore"):
-        narrow = vertices.astype(np.float32)
-    kept = np.isfinite(narrow).all() and len(weld(narrow.astype(np.float64))[0]) == len(weld(vertices)[0])
-    if not kept:
+    narrow = _narrow(vertices)
+    if narrow is None:
         raise OutputError(
             f"the 32-bit coordinates of {kind} cannot keep the vertices apart",
             file=str(path),
@@ -70,3 +84,11 @@ def single_precision(vertices: NDArray[np.float64], path: str | Path, *, kind: s
             hint="a .ply file, which keeps 64 bits, or --local-origin for a cloud",
         )
     return narrow
+
+
+def _narrow(positions: NDArray[np.float64]) -> NDArray[np.float32] | None:
+    """Return positions in 32 bits, None where two would fall together, or one is too large."""
+    with np.errstate(over="ignore"):
+        narrow = positions.astype(np.float32)
+    apart = np.isfinite(narrow).all() and len(weld(narrow.astype(np.float64))[0]) == len(weld(positions)[0])
+    return narrow if apart else None

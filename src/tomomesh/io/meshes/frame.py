@@ -4,14 +4,31 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ..files.source import suffix_of
+from ..files.source import suffix_of, whole
+from .gifti import gifti_frame
+from .glb import glb_frame
 from .stl import STL_HEADER_BYTES
+from .threemf import threemf_frame
+from .vtp import vtp_frame
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 SIGNED_BYTES = 300
 """Bytes that hold the longest signature, 60, and what the formats have before it, of which PLY's 44 are the most."""
 
 SIGNATURE = re.compile(rb"(?:^|# |comment )tomomesh ([^\r\n]*)", re.MULTILINE)
+
+
+FRAMES: dict[str, Callable[[bytes, str], dict[str, str]]] = {
+    ".vtp": vtp_frame,
+    ".3mf": threemf_frame,
+    ".glb": glb_frame,
+    ".gii": gifti_frame,
+}
+"""Suffix to what a file's own fields state."""
 
 
 def frame_of_file(path: str | Path) -> dict[str, str]:
@@ -20,8 +37,10 @@ def frame_of_file(path: str | Path) -> dict[str, str]:
     Parameters
     ----------
     path : path
-        One of `MESH_READERS`, already known to be readable.
+        One of `MESH_READERS`, already known to be readable. Some of these name their unit whoever wrote them.
     """
+    if (state := FRAMES.get(suffix_of(path))) is not None:
+        return state(whole(path), str(path))
     with Path(path).open("rb") as file:
         found = SIGNATURE.search(file.read(STL_HEADER_BYTES if suffix_of(path) == ".stl" else SIGNED_BYTES))
     words = found[1].decode("ascii", "replace").split() if found else []

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...errors import FormatError
 from ..colors import named_colors
 from ..files.atomic import replacing
-from ..volumes.nifti import FLIP
-from .attributes import single_precision
+from ..files.source import third_party
+from ..volumes.nifti_frame import FLIP
+from .attributes import MM, single_precision
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,9 +22,7 @@ if TYPE_CHECKING:
     from ...model.mesh import TriMesh
     from ..fields import Fields
     from .attributes import MeshAttributes
-
-MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
-"""Millimeters in a unit; GIFTI has no other unit."""
+    from .through_trimesh import Arrays
 
 SCANNER, UNKNOWN = "NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_UNKNOWN"
 
@@ -29,7 +30,8 @@ SCANNER, UNKNOWN = "NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_UNKNOWN"
 def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write 32-bit coordinates in millimeters, RAS where the mesh has a patient frame, and the fields at vertices.
 
-    The array of positions says which: ``NIFTI_XFORM_SCANNER_ANAT``, else ``NIFTI_XFORM_UNKNOWN``.
+    The array of positions says which: ``NIFTI_XFORM_SCANNER_ANAT``, else ``NIFTI_XFORM_UNKNOWN``. No other array has a
+    frame (GIFTI 1.0, 2.3.4), though nibabel gives one to each; ITK and gifti_tool complain of them.
 
     Raises
     ------
@@ -39,20 +41,23 @@ def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None
     from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiMetaData
 
     placed, patient = _ras(mesh.vertices, beside)
-    space = SCANNER if patient else UNKNOWN
+    space, unit = SCANNER if patient else UNKNOWN, "mm" if beside.unit in MM else beside.unit
+    head = replace(beside, unit=unit, frame="RAS" if patient else beside.frame).head
     points = GiftiDataArray(
         single_precision(placed, path, kind="GIFTI"),
         intent="NIFTI_INTENT_POINTSET",
         datatype="NIFTI_TYPE_FLOAT32",
         coordsys=GiftiCoordSystem(space, space, np.eye(4)),
-        meta=GiftiMetaData(written_by=beside.head, coordinates="RAS, mm" if patient else beside.unit),
+        meta=GiftiMetaData(written_by=head, coordinates="RAS, mm" if patient else unit),
     )
-    faces = GiftiDataArray(mesh.faces.astype(np.int32), "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32")
-    more = [
+    others = [GiftiDataArray(mesh.faces.astype(np.int32), "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32")]
+    others += [
         GiftiDataArray(values, intent, "NIFTI_TYPE_FLOAT32", meta=GiftiMetaData(Name=name))
         for name, intent, values in _arrays(beside.vertex_fields)
     ]
-    image = GiftiImage(darrays=[points, faces, *more], meta=GiftiMetaData(Description=beside.head))
+    for array in others:
+        array.coordsys = None
+    image = GiftiImage(darrays=[points, *others], meta=GiftiMetaData(Description=head))
     with replacing(path) as file:
         file.write(image.to_xml())
 
@@ -71,3 +76,30 @@ def _arrays(fields: Fields) -> list[tuple[str, str, NDArray[np.float32]]]:
     others = {name: values for name, values in fields.items() if not colors or name not in colors[0]}
     found = [("color", "NIFTI_INTENT_RGB_VECTOR", (colors[1] / 255).astype(np.float32))] if colors else []
     return found + [(name, "NIFTI_INTENT_NONE", values.astype(np.float32)) for name, values in others.items()]
+
+
+def read_gifti(data: bytes, file: str) -> Arrays:
+    """Read the vertices and faces of a surface, in its own millimeters; positions are not moved by its matrix."""
+    from nibabel.gifti import GiftiImage
+
+    with third_party("nibabel", file):
+        image = GiftiImage.from_bytes(data)
+        points, faces = (
+            image.get_arrays_from_intent(name) for name in ("NIFTI_INTENT_POINTSET", "NIFTI_INTENT_TRIANGLE")
+        )
+        if len(points) != 1 or len(faces) != 1:
+            raise FormatError("the file is no surface", file=file, expected="one array of points, one of triangles")
+        return np.array(points[0].data, np.float64).reshape(-1, 3), np.array(faces[0].data, np.int64).reshape(-1, 3)
+
+
+def gifti_frame(data: bytes, file: str) -> dict[str, str]:
+    """Return the unit and the frame: RAS millimeters, but where tomomesh wrote it of another frame."""
+    from nibabel.gifti import GiftiImage
+
+    with third_party("nibabel", file):
+        image = GiftiImage.from_bytes(data)
+        written = image.meta.get("Description") or ""
+    named = dict(word.split("=", 1) for word in written.split() if "=" in word) if "tomomesh" in written else {}
+    unit = "mm" if named.get("unit", "mm") in MM else named["unit"]
+    frame = named.get("frame", "RAS")
+    return {"unit": unit, "frame": "RAS" if frame in ("LPS", "RAS") else frame}

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+import math
+import re
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ...errors import FormatError
 from ..colors import named_colors
 from ..files.atomic import replacing
+from .weld import weld
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
+    from .through_trimesh import Arrays
+
+VERTEX, FACE = (["v"], ["V"]), (["f"], ["F"])
+"""The words that begin the lines of vertices and of faces."""
 
 
 def write_obj(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
@@ -19,9 +31,68 @@ def write_obj(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     colors = named_colors(beside.vertex_fields)
     behind = [""] * len(mesh.vertices)
     if colors:
-        fractions = [f" {value / 255:.6g}" for value in range(256)]
+        # rounded up: VTK cuts off what it makes of them
+        fractions = [f" {math.ceil(value / 255 * 1e6) / 1e6:.6g}" for value in range(256)]
         behind = ["".join(fractions[value] for value in color) for color in colors[1].tolist()]
     vertices = (f"v {x!r} {y!r} {z!r}{color}" for (x, y, z), color in zip(mesh.vertices.tolist(), behind, strict=True))
     faces = (f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist())
     with replacing(path) as file:
         file.write(("\n".join([f"# {beside.head}", *vertices, *faces]) + "\n").encode("ascii"))
+
+
+def read_obj_mesh(data: bytes, file: str) -> Arrays:
+    """Read vertices and faces, polygons cut into fans; equal vertices become one where each is used once.
+
+    Numbers below 0 count back from the vertices so far.
+
+    Raises
+    ------
+    FormatError
+        For a vertex or a face that cannot be understood.
+    """
+    words = [line.split() for line in unfolded(data, file)]
+    places = [line[1:4] for line in words if line[:1] in VERTEX]
+    polygons = [[corner.partition("/")[0] for corner in line[1:]] for line in words if line[:1] in FACE]
+    before = np.cumsum([line[:1] in VERTEX for line in words], dtype=np.int64)[[line[:1] in FACE for line in words]]
+    try:
+        vertices = np.array(places, np.float64).reshape(-1, 3)
+        corners = np.array([corner for polygon in polygons for corner in polygon], np.int64)
+    except ValueError:
+        raise FormatError("a vertex or a face cannot be understood", file=file, expected="numbers") from None
+    sizes = np.array([len(polygon) for polygon in polygons], np.int64)
+    if (corners == 0).any() or (sizes < 3).any():
+        raise FormatError("a face cannot be understood", file=file, expected="three vertices or more, from 1 on")
+    numbers = np.where(corners > 0, corners - 1, corners + np.repeat(before, sizes))
+    faces = fans(numbers, sizes)
+    if len(numbers) == 0 or not np.array_equal(np.sort(numbers), np.arange(len(vertices))):
+        return vertices, faces
+    unique, merged = weld(vertices)
+    return unique, merged[faces]
+
+
+def unfolded(data: bytes, file: str) -> list[str]:
+    """Return the lines of a text, those joined that end with a backslash."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")  # names of materials may be in any code; the numbers are ASCII
+    return re.sub(r"\\[ \t]*\r?\n", " ", text).splitlines()
+
+
+def fans(corners: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Cut polygons into triangles around the first corner of each.
+
+    Parameters
+    ----------
+    corners : (c,) int64 array
+        The corners of all polygons, one after the other.
+    sizes : (p,) int64 array
+        Corners of each, at least 3.
+
+    Returns
+    -------
+    (c - 2p, 3) int64 array
+    """
+    first = np.repeat(np.cumsum(sizes) - sizes, sizes - 2)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
+    return corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]

@@ -11,6 +11,7 @@ from ...errors import FormatError
 from ..fields import AXES
 from ..files.atomic import replacing
 from ..files.limits import require_bytes
+from .attributes import narrowed
 from .through_trimesh import loaded
 
 if TYPE_CHECKING:
@@ -146,8 +147,8 @@ def read_ply_mesh(data: bytes, file: str) -> Arrays:
 
 
 def write_ply_mesh(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write 64-bit coordinates with all fields, of vertices and of faces."""
-    positions = dict(zip(AXES, np.asarray(mesh.vertices, np.float64).T, strict=True))
+    """Write 64-bit coordinates, or 32-bit ones where asked for, with all fields, of vertices and of faces."""
+    positions = dict(zip(AXES, narrowed(mesh.vertices, single=beside.single).T, strict=True))
     write_ply(path, beside.head, {**positions, **beside.vertex_fields}, mesh.faces, beside.face_fields)
 
 

@@ -9,9 +9,15 @@ from ...errors import EmptyError, FormatError
 from ...model.mesh import TriMesh
 from ..files.source import existing_file, reader_of, whole
 from ..finite import check_finite
+from .encapsulated import read_encapsulated
+from .gifti import read_gifti
+from .glb import read_glb
+from .obj import read_obj_mesh
 from .ply import read_ply_mesh
 from .stl import read_stl
+from .threemf import read_3mf
 from .through_trimesh import loaded
+from .vtp import read_vtp_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,7 +32,8 @@ def read_mesh(path: str | Path) -> TriMesh:
     Parameters
     ----------
     path : path
-        ``.stl`` (its equal positions become one vertex), ``.ply``, ``.obj`` or ``.off``.
+        ``.stl`` and DICOM Encapsulated STL, ``.dcm`` (equal positions become one vertex), ``.ply``, ``.obj``, ``.off``,
+        ``.vtp``, ``.3mf``, ``.glb`` or ``.gii``. Polygons are cut into triangles.
 
     Raises
     ------
@@ -65,7 +72,12 @@ def read_mesh(path: str | Path) -> TriMesh:
 MESH_READERS: dict[str, Callable[[bytes, str], Arrays]] = {
     ".stl": read_stl,
     ".ply": read_ply_mesh,
-    ".obj": partial(loaded, "obj"),
+    ".obj": read_obj_mesh,
     ".off": partial(loaded, "off"),
+    ".dcm": read_encapsulated,
+    ".vtp": read_vtp_mesh,
+    ".3mf": read_3mf,
+    ".glb": read_glb,
+    ".gii": read_gifti,
 }
 """Suffix to reader of vertices and faces."""

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...errors import FormatError
+from ..fields import doubles
 from ..files.atomic import replacing
 from ..files.limits import require_bytes
 from .attributes import single_precision
-from .through_trimesh import loaded
 from .weld import weld
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
@@ -29,33 +33,87 @@ BEFORE_FACES = STL_HEADER_BYTES + 4
 """Bytes before the first face: the text, and the count of faces."""
 
 
+BEGIN, CORNER = re.compile(rb"\s*solid\b", re.IGNORECASE), re.compile(rb"\svertex\s+(\S+\s+\S+\s+\S+)", re.IGNORECASE)
+NAMES = re.compile(rb"^[ \t]*(end[ \t]*)?solid\b[^\r\n]*", re.IGNORECASE | re.MULTILINE)
+FACET, CLOSED = re.compile(rb"\bfacet\b", re.IGNORECASE), re.compile(rb"\bend\s*facet\b", re.IGNORECASE)
+"""What a text is made of: its begin, the three numbers behind a corner, the names of solids, facets and their ends."""
+
+
 def read_stl(data: bytes, file: str) -> Arrays:
-    """Read vertices and faces, once a binary file is as long as its count says; text begins with ``solid``."""
-    if not (data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:1000]):
-        require_bytes(BEFORE_FACES, len(data), file=file)
-        count = int(np.frombuffer(data, "<u4", 1, STL_HEADER_BYTES)[0])
-        require_bytes(BEFORE_FACES + count * np.dtype(FACE).itemsize, len(data), file=file)
-    vertices, faces = loaded("stl", data, file)
-    unique, numbers = weld(vertices)
-    return unique, numbers[faces]
+    """Read vertices and faces, binary or text, of one solid or several; equal positions become one vertex.
+
+    A binary file is at least as long as its count says; what is behind its last face is passed over.
+
+    Raises
+    ------
+    FormatError
+        For a file that is cut off, and a text that cannot be understood.
+    """
+    corners = _text_corners(data, file) if _is_text(data) else _binary_corners(data, file)
+    unique, numbers = weld(corners)
+    return unique, numbers.reshape(-1, 3)
+
+
+def _is_text(data: bytes) -> bool:
+    """Tell whether a file is text: headers of binary files may begin with ``solid`` too, but their length is told."""
+    count = int(np.frombuffer(data, "<u4", 1, STL_HEADER_BYTES)[0]) if len(data) >= BEFORE_FACES else -1
+    exact = len(data) == BEFORE_FACES + count * np.dtype(FACE).itemsize
+    return not exact and bool(BEGIN.match(data)) and bool(FACET.search(data, 0, 1000))
+
+
+def _binary_corners(data: bytes, file: str) -> NDArray[np.float64]:
+    require_bytes(BEFORE_FACES, len(data), file=file)
+    count = int(np.frombuffer(data, "<u4", 1, STL_HEADER_BYTES)[0])
+    require_bytes(BEFORE_FACES + count * np.dtype(FACE).itemsize, len(data), file=file)
+    return doubles(np.frombuffer(data, FACE, count, BEFORE_FACES)["corners"].reshape(-1, 3))
+
+
+def _text_corners(data: bytes, file: str) -> NDArray[np.float64]:
+    ends = [found for found in NAMES.finditer(data) if found[1]]
+    text = NAMES.sub(b"", data)
+    facets, closed = len(FACET.findall(text)), len(CLOSED.findall(text))
+    try:
+        corners = np.array(b" ".join(CORNER.findall(text)).split(), np.float64).reshape(-1, 3)
+    except ValueError:
+        raise FormatError("a corner is no three numbers", file=file, expected="vertex x y z") from None
+    # `endfacet` is one word, and `end facet` counts among the facets
+    facets -= len(re.findall(rb"\bend\s+facet\b", text, re.IGNORECASE))
+    if not ends or facets != closed or len(corners) != 3 * facets:
+        raise FormatError(
+            "the text is cut off, or its faces are no triangles", file=file,
+            found=f"facets = {facets}, ended = {closed}, corners = {len(corners)}",
+            expected="three corners a facet, and endsolid",
+        )  # fmt: skip
+    return corners
 
 
 def write_stl(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write a binary file of 32-bit coordinates, each face with its normal, behind a header that names the frame.
+    """Write a binary file.
 
     Raises
     ------
     OutputError
         Where 32 bits cannot keep the vertices apart.
     """
+    data = stl_bytes(mesh, path, beside)
+    with replacing(path) as file:
+        file.write(data)
+
+
+def stl_bytes(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> bytes:
+    """Return a binary file: 32-bit coordinates, each face with its normal, behind a header that names the frame.
+
+    Raises
+    ------
+    OutputError
+        Where 32 bits cannot keep the vertices apart; `path` is named.
+    """
     rows = np.zeros(len(mesh.faces), FACE)
     rows["corners"] = single_precision(mesh.vertices, path, kind="STL")[mesh.faces]
     length = np.linalg.norm(mesh.face_vectors, axis=1, keepdims=True)
     rows["normal"] = mesh.face_vectors / np.where(length > 0, length, 1.0)
-    with replacing(path) as file:
-        file.write(_shortened(beside.head).encode("ascii").ljust(STL_HEADER_BYTES))
-        file.write(np.array(len(rows), "<u4").tobytes())
-        file.write(rows.tobytes())
+    head = _shortened(beside.head).encode("ascii").ljust(STL_HEADER_BYTES)
+    return head + np.array(len(rows), "<u4").tobytes() + rows.tobytes()
 
 
 def _shortened(head: str) -> str:

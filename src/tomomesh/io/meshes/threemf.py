@@ -1,30 +1,40 @@
 """3MF: the zip of XML that slicers for 3D printing read.
 
+In millimeters always: Slic3r, OpenSCAD and assimp pass over the unit that a model names.
+
 Written with the standard library: it is one text in a zip with two fixed companions. trimesh's exporter stamps the time
 and random ids into the file, and lib3mf is a compiled library; it judges what is written here in the tests.
 """
 
 from __future__ import annotations
 
+import io
 import zipfile
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from itertools import chain, islice
+from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ...errors import OutputError
+from ...errors import FormatError, OutputError
 from ..colors import named_colors
 from ..files.atomic import replacing
+from ..files.limits import require_memory
+from ..files.markup import parsed_xml
+from ..files.source import third_party
+from .attributes import MM
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
+    from xml.etree.ElementTree import Element
+
+    from numpy.typing import NDArray
 
     from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
-
-UNITS = {"um": "micron", "mm": "millimeter", "cm": "centimeter", "m": "meter"}
-"""Units to the names that 3MF has for them."""
+    from .through_trimesh import Arrays
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 MATERIAL = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
@@ -49,24 +59,34 @@ FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 COLORS_ID, MESH_ID = 1, 2
 """Numbers of the two resources of a file; any will do."""
 
+UNITS = {"micron": "um", "millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"}
+"""The names that 3MF has for units to ours."""
+
+MOST_PIECES = 1 << 16
+"""Objects that a file may build, those within others counted each time: they could double from object to object."""
+
+IDENTITY, TRIPLE = "1 0 0 0 1 0 0 0 1 0 0 0", ("v1", "v2", "v3")
+"""The place of what has none, as four rows of three; the corners of a triangle."""
+
 
 def write_3mf(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write one object of 64-bit coordinates, with colors at its corners where there are any.
+    """Write one object of 64-bit coordinates in millimeters, with colors at its corners where there are any.
 
     Raises
     ------
     OutputError
         For coordinates of an unknown unit: 3MF has none without.
     """
-    if beside.unit not in UNITS:
+    if beside.unit not in MM:
         raise OutputError(
             "a 3MF file names a unit, and that of the coordinates is unknown",
             file=str(path),
             found=f"unit = {beside.unit}",
-            expected=" | ".join(UNITS),
+            expected=" | ".join(MM),
             hint="--units",
         )
-    members = {**COMPANIONS, "3D/3dmodel.model": "".join(_model(mesh, beside))}
+    sized = mesh.moved(MM[beside.unit] * mesh.vertices)
+    members = {**COMPANIONS, "3D/3dmodel.model": "".join(_model(sized, replace(beside, unit="mm")))}
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in members.items():
             entry = zipfile.ZipInfo(name, FIRST_DAY)
@@ -77,7 +97,7 @@ def write_3mf(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
 def _model(mesh: TriMesh, beside: MeshAttributes) -> Iterator[str]:
     colors = named_colors(beside.vertex_fields)
     palette, numbers = np.unique(colors[1], axis=0, return_inverse=True) if colors else (None, np.zeros(0, np.int64))
-    yield f'{DECLARATION}<model unit="{UNITS[beside.unit]}" xml:lang="en-US" xmlns="{CORE}" xmlns:m="{MATERIAL}">\n'
+    yield f'{DECLARATION}<model unit="millimeter" xml:lang="en-US" xmlns="{CORE}" xmlns:m="{MATERIAL}">\n'
     yield f'<metadata name="Application">tomomesh</metadata>\n<metadata name="Description">{beside.head}</metadata>\n'
     yield "<resources>\n"
     if palette is not None:
@@ -99,3 +119,70 @@ def _triangles(mesh: TriMesh, numbers: np.ndarray[tuple[int], np.dtype[np.int64]
         return
     for (a, b, c), (d, e, f) in zip(mesh.faces.tolist(), numbers[mesh.faces].tolist(), strict=True):
         yield f'<triangle v1="{a}" v2="{b}" v3="{c}" pid="{COLORS_ID}" p1="{d}" p2="{e}" p3="{f}"/>\n'
+
+
+def read_3mf(data: bytes, file: str) -> Arrays:
+    """Read the meshes that a file builds, each where it builds it, in the file's unit.
+
+    Raises
+    ------
+    FormatError
+        For a file that is no zip with one model, or whose model cannot be understood.
+    """
+    root = _root(data, file)
+    try:
+        objects = {one.get("id", ""): one for one in root.iter(f"{{{CORE}}}object")}
+        items = root.iter(f"{{{CORE}}}item")
+        every = chain.from_iterable(_placed(objects, item, np.eye(4, 3), len(objects)) for item in items)
+        placed = list(islice(every, MOST_PIECES + 1))
+        if len(placed) > MOST_PIECES:
+            raise ValueError(len(placed))
+    except (KeyError, ValueError, TypeError, IndexError):
+        raise FormatError("the model cannot be understood", file=file, expected="objects and a build of 3MF") from None
+    first = np.cumsum([0, *(len(vertices) for vertices, _ in placed)])
+    vertices = np.concatenate([np.empty((0, 3)), *(vertices for vertices, _ in placed)])
+    faces = [np.empty((0, 3), np.int64), *(faces + n for (_, faces), n in zip(placed, first, strict=False))]
+    return vertices, np.concatenate(faces)
+
+
+def threemf_frame(data: bytes, file: str) -> dict[str, str]:
+    """Return the unit, and the frame where tomomesh wrote the file."""
+    root = _root(data, file)
+    told = next((one.text or "" for one in root.iter(f"{{{CORE}}}metadata") if one.get("name") == "Description"), "")
+    frame = [word.removeprefix("frame=") for word in told.split() if word.startswith("frame=")]
+    unit = {"unit": UNITS.get(root.get("unit", "millimeter"), "mm")}
+    return unit | ({"frame": frame[0]} if told.startswith("tomomesh") and frame else {})
+
+
+def _root(data: bytes, file: str) -> Element:
+    """Return the model of a package."""
+    with third_party("zipfile", file), zipfile.ZipFile(io.BytesIO(data)) as archive:
+        models = [one for one in archive.infolist() if one.filename.lower().endswith("3d/3dmodel.model")]
+        if len(models) != 1:
+            raise FormatError("the file has no model", file=file, expected="3D/3dmodel.model")
+        require_memory(models[0].file_size, file=file)
+        text = archive.read(models[0])
+    return parsed_xml(text, file)
+
+
+def _placed(objects: dict[str, Element], item: Element, outer: NDArray[np.float64], depth: int) -> Iterator[Arrays]:
+    """Yield the mesh of an item or a component, empty or not, and of the components of its object.
+
+    `depth` ends circles.
+    """
+    if depth < 0:
+        raise ValueError(depth)
+    own = np.array(item.get("transform", IDENTITY).split(), np.float64).reshape(4, 3)
+    matrix = np.vstack([own[:3] @ outer[:3], own[3] @ outer[:3] + outer[3]])
+    found = objects[item.get("objectid", "")]
+    mesh = found.find(f"{{{CORE}}}mesh")
+    vertices, faces = _numbers(mesh, "vertex", "xyz", np.float64), _numbers(mesh, "triangle", TRIPLE, np.int64)
+    mirrored = np.linalg.det(matrix[:3]) < 0
+    yield vertices @ matrix[:3] + matrix[3], faces[:, ::-1] if mirrored else faces
+    for component in found.iter(f"{{{CORE}}}component"):
+        yield from _placed(objects, component, matrix, depth - 1)
+
+
+def _numbers(mesh: Element | None, name: str, keys: Sequence[str], kind: type) -> NDArray[Any]:
+    every = [] if mesh is None else mesh.iter(f"{{{CORE}}}{name}")
+    return np.array([[one.attrib[key] for key in keys] for one in every], kind).reshape(-1, 3)

@@ -10,25 +10,30 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...errors import FormatError
+from ...model.points import COLORS
 from ..colors import named_colors
-from ..fields import IDS, flat_columns
+from ..fields import IDS, doubles, flat_columns
 from ..files.atomic import replacing
+from ..files.source import whole
+from .attributes import narrowed
+from .obj import fans
+from .vtk_arrays import TYPES, PolyData
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+    from xml.etree.ElementTree import Element
 
     from numpy.typing import NDArray
 
     from ...model.mesh import TriMesh
     from ...model.points import PointSet
-    from ..fields import Fields
+    from ..fields import Cloud, Fields
     from .attributes import MeshAttributes
+    from .through_trimesh import Arrays
 
-VTK_TYPES = {
-    "i1": "Int8", "u1": "UInt8", "i2": "Int16", "u2": "UInt16", "i4": "Int32", "u4": "UInt32",
-    "i8": "Int64", "u8": "UInt64", "f4": "Float32", "f8": "Float64",
-}  # fmt: skip
+VTK_TYPES = {code: name for name, code in TYPES.items()}
 """NumPy's codes of the types of numbers to VTK's names."""
 
 PARTS = ("Verts", "Lines", "Strips", "Polys")
@@ -36,9 +41,72 @@ PARTS = ("Verts", "Lines", "Strips", "Polys")
 
 
 def write_vtp_mesh(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write a mesh of 64-bit coordinates with all its fields; colors are one array named ``RGB``."""
+    """Write a mesh with all its fields, of 64-bit coordinates unless asked else; colors are one array named ``RGB``."""
     point_data, cell_data = _arrays(beside.vertex_fields), _arrays(beside.face_fields)
     _write(path, beside, mesh.vertices, "Polys", mesh.faces, point_data, cell_data)
+
+
+def read_vtp_mesh(data: bytes, file: str) -> Arrays:
+    """Read the vertices and polygons of a file of anybody's, these cut into fans.
+
+    Raises
+    ------
+    FormatError
+        For a file that is none of VTK's polygons, or is broken, and for one with strips of triangles.
+    """
+    parsed = PolyData.parsed(data, file)
+    vertices, faces, first = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
+    for piece in parsed.pieces:
+        if int(piece.get("NumberOfStrips", 0)):
+            raise FormatError("strips of triangles are not read", file=file, expected="polygons")
+        cells = parsed.arrays(piece, "Polys")
+        corners, ends = (np.array(cells.get(name, np.empty(0)), np.int64) for name in ("connectivity", "offsets"))
+        sizes = np.diff(ends, prepend=0)
+        if (sizes < 3).any() or sizes.sum() != len(corners):
+            raise FormatError("the polygons cannot be understood", file=file)
+        faces.append(fans(corners + first, sizes))
+        vertices.append(_positions(parsed, piece))
+        first += len(vertices[-1])
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def read_vtp(path: Path) -> Cloud:
+    """Read the points of a file of anybody's, and what it says of each."""
+    parsed = PolyData.parsed(whole(path), str(path))
+    pieces = [(_positions(parsed, piece), parsed.arrays(piece, "PointData")) for piece in parsed.pieces]
+    if not pieces:
+        return np.empty((0, 3)), {}
+    shared = set.intersection(*(set(fields) for _, fields in pieces))
+    names = [name for name in pieces[0][1] if name in shared]
+    fields = {name: np.concatenate([fields[name] for _, fields in pieces]) for name in names}
+    positions = np.concatenate([positions for positions, _ in pieces])
+    if any(len(values) != len(positions) for values in fields.values()):
+        raise FormatError("an array does not fit the points", file=str(path))
+    return positions, _apart(fields)
+
+
+def vtp_frame(data: bytes, file: str) -> dict[str, str]:
+    """Return the unit and the frame of a file that tomomesh wrote; none of another's."""
+    texts = PolyData.parsed(data, file).texts()
+    own = texts.get("written_by", "").startswith("tomomesh")
+    return {name: texts[name] for name in ("unit", "frame") if own and name in texts}
+
+
+def _positions(parsed: PolyData, piece: Element) -> NDArray[np.float64]:
+    found = [*parsed.arrays(piece, "Points").values()]
+    if len(found) != 1 or found[0].shape != (int(piece.get("NumberOfPoints", 0)), 3):
+        raise FormatError("the points have no positions", file=parsed.file, expected="three numbers each")
+    return doubles(found[0])
+
+
+def _apart(fields: Fields) -> Fields:
+    """Take colors that are one array apart."""
+    colors = fields.get("RGB")
+    if colors is None or colors.ndim != 2 or colors.dtype != np.uint8:
+        return fields
+    return {name: values for name, values in fields.items() if name != "RGB"} | dict(
+        zip(COLORS, colors.T, strict=False)
+    )
 
 
 def write_vtp_points(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
@@ -78,7 +146,7 @@ def _write(
                 f'<Piece NumberOfPoints="{len(positions)}"{counts}>',
                 *_section("PointData", point_data),
                 *_section("CellData", cell_data),
-                *_section("Points", {"Points": positions}),
+                *_section("Points", {"Points": narrowed(positions, single=beside.single)}),
                 *(line for name in PARTS for line in _cells(name, cells if name == part else cells[:0])),
                 "</Piece>",
                 "</PolyData>",

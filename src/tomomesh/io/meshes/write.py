@@ -35,6 +35,8 @@ def write_mesh(
     frame: str = "LPS",
     vertex_fields: Mapping[str, NDArray[Any]] | None = None,
     face_fields: Mapping[str, NDArray[Any]] | None = None,
+    z_up: bool = False,
+    precision: int = 64,
 ) -> None:
     """Write a triangle mesh; the same mesh gives the same bytes.
 
@@ -44,14 +46,18 @@ def write_mesh(
         Its coordinates are written as they are.
     path : path
         ``.ply`` and ``.vtp`` (binary), ``.obj``, ``.off`` and ``.3mf`` (text) keep 64-bit coordinates; ``.stl``,
-        ``.glb`` and ``.gii`` (binary) 32-bit ones.
+        ``.glb`` and ``.gii`` (binary; Connectome Workbench wants ``.surf.gii``) 32-bit ones.
     unit, frame : str
-        What the coordinates are in, named in the file.
+        What the coordinates are in, named in the file; OFF has no place for it.
     vertex_fields : mapping of str to (n,) or (n, c) array, optional
-        Numbers at the vertices. PLY, VTP, GLB and GIFTI keep them all, OBJ, OFF and 3MF the colors (``red``,
-        ``green`` and ``blue``), STL none.
+        Numbers at the vertices. PLY, VTP, GLB and GIFTI keep them all, OBJ and 3MF the colors (``red``, ``green`` and
+        ``blue``), STL and OFF none.
     face_fields : mapping of str to (m,) or (m, c) array, optional
         Numbers on the faces, kept by PLY and VTP.
+    z_up : bool
+        Whether z is up where the frame does not say so, as of a part to print: GLB has y up.
+    precision : {64, 32}
+        Bits of the coordinates in PLY and VTP; 64 all the same where 32 would let vertices fall together.
 
     Raises
     ------
@@ -73,12 +79,13 @@ def write_mesh(
     check_output(path, MESH_WRITERS)
     at_vertices = flat_columns(vertex_fields or {}, len(mesh.vertices), AXES)
     on_faces = flat_columns(face_fields or {}, len(mesh.faces), ["count", "corners", "vertex_indices"])
-    MESH_WRITERS[suffix_of(path)](mesh, path, MeshAttributes(unit, frame, at_vertices, on_faces))
+    beside = MeshAttributes(unit, frame, at_vertices, on_faces, z_up=z_up, single=precision == 32)
+    MESH_WRITERS[suffix_of(path)](mesh, path, beside)
 
 
 KEEP_ALL = (".ply", ".vtp")
 KEEP_AT_VERTICES = (".glb", ".gii")
-KEEP_COLORS = (".obj", ".off", ".3mf")
+KEEP_COLORS = (".obj", ".3mf")
 """Suffixes by the fields that the format keeps: all, those at vertices, and the colors at vertices."""
 
 
@@ -99,5 +106,6 @@ MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, MeshAttributes], None]] =
     ".vtp": write_vtp_mesh,
     ".3mf": write_3mf,
     ".gii": write_gifti,
+    ".surf.gii": write_gifti,
 }
-"""Suffix to writer."""
+"""Suffix to writer; that of a surface for Connectome Workbench is both, of which the last decides."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...settings import ReadSettings
@@ -9,18 +10,18 @@ from ..dicom import Listing, is_segmentation, list_dicom, lone_object
 from ..dicom.objects.segmentation import segments_of
 from ..files.archive import unpacked_zip
 from ..files.source import existing, existing_file, suffix_of
-from .slices import slices_behind
+from .slices import ARCHIVES, Slices, in_words, slices_among, slices_behind
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Sequence
 
 
-def list_series(path: str | Path, *, settings: ReadSettings | None = None) -> Listing:
+def list_series(path: str | Path | Sequence[str | Path], *, settings: ReadSettings | None = None) -> Listing:
     """List the DICOM series of a study from their headers alone.
 
     Parameters
     ----------
-    path : path
+    path : path, or sequence of path
         As `read_volume` takes it.
     settings : ReadSettings, optional
         Under which each series would be read.
@@ -39,15 +40,18 @@ def list_series(path: str | Path, *, settings: ReadSettings | None = None) -> Li
     ResourceError
         For an archive that holds too much.
     """
-    path, settings = existing(path), settings or ReadSettings()
-    if path.is_dir() or suffix_of(existing_file(path)) != ".zip":
-        return _listed(path, settings, study=str(path))
+    settings = settings or ReadSettings()
+    if not isinstance(path, (str, Path)):
+        several = [Path(one) for one in path]
+        return _listed(slices_among(several), settings, study=in_words(several))
+    path = existing(path)
+    if path.is_dir() or suffix_of(existing_file(path)) not in ARCHIVES:
+        return _listed(slices_behind(path, str(path)), settings, study=str(path))
     with unpacked_zip(path) as folder:
-        return _listed(folder, settings, study=str(path))
+        return _listed(slices_behind(folder, str(path)), settings, study=str(path))
 
 
-def _listed(path: Path, settings: ReadSettings, *, study: str) -> Listing:
-    slices = slices_behind(path, study)
+def _listed(slices: Slices, settings: ReadSettings, *, study: str) -> Listing:
     alone = lone_object(slices.dicom)
     if alone is not None and is_segmentation(alone):
         return Listing(files=1, segments=tuple(segments_of(alone).items()))

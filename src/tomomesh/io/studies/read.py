@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...errors import FormatError, UnreadableError
+from ...errors import FormatError, UnreadableError, UsageError
 from ...settings import ReadSettings
 from ..dicom import index_in, is_dicom, is_index, is_segmentation, lone_object, read_dicom, read_index
 from ..dicom.headers.kinds import STRUCTURES, storage_class
@@ -17,14 +18,13 @@ from ..volumes.metaimage import read_metaimage
 from ..volumes.mgh import read_mgh
 from ..volumes.nifti import read_nifti
 from ..volumes.npy import read_npy_volume
-from ..volumes.nrrd import read_nrrd
+from ..volumes.nrrd.nrrd import read_nrrd
 from ..volumes.tiff import read_tiff
 from ..volumes.zarr.omezarr import is_zarr, read_omezarr
-from .slices import slices_in
+from .slices import ARCHIVES, Slices, in_words, slices_among, slices_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
     from ...model.volume import Volume
 
@@ -50,7 +50,7 @@ def _read_zip(path: Path, settings: ReadSettings, select: Sequence[int] | None =
     with unpacked_zip(path) as folder:
         files, _ = regular_files(folder, deep=True)
         stores = [folder] if is_zarr(folder) else [path for path in folder.iterdir() if path.is_dir() and is_zarr(path)]
-        whole = stores + [file for file in volumes_among(files) if suffix_of(file) != ".zip"]
+        whole = stores + [file for file in volumes_among(files) if suffix_of(file) not in ARCHIVES]
         one = len(whole) == 1 and not any(map(is_dicom, files))
         return read_volume(whole[0] if one else folder, settings=settings, select=select)
 
@@ -74,6 +74,7 @@ VOLUME_READERS: dict[str, Callable[[Path, ReadSettings], Volume]] = {
     ".dcm": _read_one_dicom,
     ".ima": _read_one_dicom,
     ".zip": _read_zip,
+    ".ozx": _read_zip,
 }
 """Suffix of a single file to its reader; folders, and DICOM of any name, are known by their content."""
 
@@ -92,20 +93,23 @@ def volumes_among(files: Sequence[Path]) -> list[Path]:
 
 
 def read_volume(
-    path: str | Path, *, settings: ReadSettings | None = None, select: Sequence[int] | None = None
+    path: str | Path | Sequence[str | Path],
+    *,
+    settings: ReadSettings | None = None,
+    select: Sequence[int] | None = None,
 ) -> Volume:
     """Read a study.
 
     Parameters
     ----------
-    path : path
+    path : path, or sequence of path
         A DICOM, NIfTI, NRRD, MetaImage, MGH, NPY or multi-page TIFF file, a folder of DICOM, PNG, TIFF or JPEG
-        slices or of OME-Zarr, a DICOMDIR, or a zip file of one of these.
+        slices or of OME-Zarr, a DICOMDIR, or a zip file of one of these. Several files are the slices of one study.
     settings : ReadSettings, optional
         What to do where the files leave a choice.
     select : sequence of int, optional
-        The labels that are wanted. Of a DICOM segmentation, whose segments may overlap, only these are read; any other
-        label map is read whole.
+        The labels that are wanted. Of a DICOM segmentation, or Slicer's of several layers, whose segments may overlap,
+        only these are read; any other label map is read whole.
 
     Returns
     -------
@@ -137,7 +141,10 @@ def read_volume(
     >>> study
     Volume(4 x 3 x 2 of int16, 0.5 x 0.5 x 2 mm)
     """
-    path, settings = existing(path), settings or ReadSettings()
+    settings = settings or ReadSettings()
+    if not isinstance(path, (str, Path)):
+        return _read_named([Path(one) for one in path], settings, select)
+    path = existing(path)
     if path.is_dir() and is_zarr(path):
         return read_omezarr(path, settings)
     if path.is_dir():
@@ -150,6 +157,8 @@ def read_volume(
         return _read_one_dicom(path, settings, select)
     if reader is _read_zip:
         return _read_zip(path, settings, select)
+    if reader is read_nrrd:
+        return read_nrrd(path, settings, select)
     if reader is None:
         raise FormatError(
             "the file is of an unknown kind",
@@ -165,19 +174,35 @@ def _read_folder(folder: Path, settings: ReadSettings, select: Sequence[int] | N
     """Read what its DICOMDIR names, all DICOM below it, or its images; where it holds none, those of sub-folders."""
     if (index := index_in(folder)) is not None:
         return read_index(index, settings, study=str(folder))
-    slices = slices_in(folder)
+    return _read_slices(slices_in(folder), settings, select, study=str(folder))
+
+
+def _read_named(paths: list[Path], settings: ReadSettings, select: Sequence[int] | None) -> Volume:
+    """Read the study whose files are named one by one: one alone, slices, or a header and what belongs to it."""
+    if len(paths) < 2:
+        if not paths:
+            raise UsageError("there is no study", found="0 files", expected="the slices of one")
+        return read_volume(paths[0], settings=settings, select=select)
+    slices = slices_among(paths)
+    if len(whole := volumes_among(slices.rest)) == 1:
+        return read_volume(whole[0], settings=settings, select=select)
+    return _read_slices(slices, settings, select, study=in_words(paths))
+
+
+def _read_slices(slices: Slices, settings: ReadSettings, select: Sequence[int] | None, *, study: str) -> Volume:
+    """Read all DICOM among some files, or all images."""
     if (alone := lone_object(slices.dicom)) is not None:
-        return _read_one_dicom(alone, settings, select, study=str(folder))
+        return _read_one_dicom(alone, settings, select, study=study)
     if slices.dicom:
-        return read_dicom(slices.dicom, settings, study=str(folder), others=slices.others)
+        return read_dicom(slices.dicom, settings, study=study, others=slices.others)
     if slices.images:
-        return read_images(slices.images, settings, folder=str(folder))
+        return read_images(slices.images, settings, folder=study)
     others = slices.others + Counter(_kind(path) for path in slices.rest)
     if not others:
-        raise UnreadableError("the folder is empty", file=str(folder), expected=READABLE)
+        raise UnreadableError("the folder is empty", file=study, expected=READABLE)
     raise FormatError(
         f"0 of {sum(others.values())} files are images",
-        file=str(folder),
+        file=study,
         found=counted(others),
         expected=READABLE,
     )

@@ -7,11 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..dicom import GONE, NOT_DICOM, dicom_among, index_in, indexed, is_dicom, is_index
-from ..files.source import regular_files, suffix_of
+from ..files.source import existing, regular_files, suffix_of
 from ..volumes.images import FAMILIES
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
+
+ARCHIVES = (".zip", ".ozx")
+"""Suffixes of archives: zip files, and those of OME-Zarr's RFC 9, which are zip files of one image."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,30 @@ def slices_behind(path: Path, study: str) -> Slices:
     if path.is_dir():
         return slices_in(path)
     return Slices([path], [], [], Counter()) if is_dicom(path) else Slices([], [], [path], Counter())
+
+
+def slices_among(paths: Sequence[Path]) -> Slices:
+    """Sort files that were named one by one, as a shell does that expands ``ct/*.dcm``; of folders all files below.
+
+    Raises
+    ------
+    UnreadableError, FormatError
+        For a path that is missing, may not be read, or leads to no file and no folder.
+    """
+    files: dict[Path, None] = {}  # each once, in their order
+    for path in map(existing, paths):
+        files |= dict.fromkeys(regular_files(path, deep=True)[0] if path.is_dir() else [path])
+    named = [path for path in files if not is_index(path)]
+    dicom = dicom_among(named)
+    if dicom:
+        return Slices(dicom, [], [], Counter({NOT_DICOM: len(named) - len(dicom)}))
+    images = [path for path in named if suffix_of(path) in FAMILIES]
+    return Slices([], images, [] if images else named, Counter())
+
+
+def in_words(paths: Sequence[Path]) -> str:
+    """Put files that were named one by one into words: the first, and how many others there are."""
+    return f"{paths[0]} and {len(paths) - 1} more"
 
 
 def slices_in(folder: Path) -> Slices:

@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from numpy.typing import DTypeLike, NDArray
 
 
+WHITE_IS_ZERO = 0
+"""TIFF's photometric interpretation of pictures whose low numbers are bright."""
+
+
 def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
     """Return real numbers in the machine's own byte order.
 
@@ -28,6 +32,35 @@ def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
             expected="integers or real numbers of at most 64 bits",
         )
     return voxels.astype(voxels.dtype.newbyteorder("="), copy=False)
+
+
+def bright_is_high(voxels: NDArray[Any], bits: int) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """Turn over, in place, the gray levels of TIFF pages that are WhiteIsZero, as `io.dicom` does MONOCHROME1's.
+
+    Parameters
+    ----------
+    voxels : array
+    bits : int
+        Of a number that is WhiteIsZero; 0 for other pages.
+
+    Returns
+    -------
+    voxels : array
+        The standard says of numbers without a sign alone which is black, ``2**bits - 1``; others stay. Single bits
+        stay too: they are masks, which tifffile writes as WhiteIsZero without turning them over, and drawings, whose
+        black is the figure.
+    notes : tuple of str
+    """
+    if not bits:
+        return voxels, ()
+    if bits == 1:
+        return voxels, ("low bits are bright (WhiteIsZero): taken for a mask, as they are",)
+    if voxels.dtype.kind != "u":
+        return voxels, (f"low gray levels are bright (WhiteIsZero): {voxels.dtype} numbers are left as they are",)
+    black = voxels.dtype.type(2**bits - 1)
+    return np.subtract(black, voxels, out=voxels), (
+        "low gray levels are bright in the file (WhiteIsZero): they were turned over",
+    )
 
 
 def check_scale(slope: float, intercept: float, *, file: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,8 @@ from ...settings import ReadSettings
 from ..files.limits import require_memory
 from ..files.source import existing_file, suffix_of, third_party
 from .affine import required_spacing, upright
-from .gray import native, without_holes
+from .gray import WHITE_IS_ZERO, bright_is_high, native, without_holes
+from .slice_names import in_order
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,12 +27,15 @@ FAMILIES = {".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF", ".jpg": "JPEG", ".jp
 CONVERTED_MODES = {"RGB": "RGB", "RGBA": "RGB", "P": "RGB", "1": "L", "LA": "L"}
 """Pillow's modes that are turned into another before they are read."""
 
+PHOTOMETRIC, BITS = 262, 258
+"""Numbers of TIFF's fields that say which numbers are bright, and how many bits one has."""
+
 GRAY_MODES = ("L", "I", "F", "I;16", "I;16B", "I;16L")
 """Pillow's modes of one channel."""
 
 
 def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Volume:
-    """Stack slices in the natural order of their names.
+    """Stack slices in the order of the numbers in their names.
 
     Parameters
     ----------
@@ -66,17 +69,17 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
             expected="one kind",
         )
     spacing = required_spacing(settings.spacing, file=folder, what=f"{kinds[0]} slices hold no spacing")
-    ordered = sorted(files, key=natural)
-    first = _pixels(ordered[0])
+    ordered, told = in_order(files)
+    first, turned = _pixels(ordered[0])
     require_memory(first.nbytes * len(ordered), file=folder)
     stack = np.empty((len(ordered), *first.shape), first.dtype)
     for k, path in enumerate(ordered):
-        pixels = _pixels(path)
+        pixels, more = _pixels(path)
         _check_same_kind(pixels, first, path.name, ordered[0].name)
-        stack[k] = pixels
+        stack[k], turned = pixels, turned or more
     voxels, notes = without_holes(stack, file=folder)
     note = f"{len(ordered)} {kinds[0]} slices in the order of their names: columns left, rows back, slices up"
-    return Volume.from_stored(voxels, upright(spacing), notes=(note, *notes))
+    return Volume.from_stored(voxels, upright(spacing), notes=(note, *told, *turned, *notes))
 
 
 def read_picture(path: str | Path) -> Volume:
@@ -96,14 +99,8 @@ def read_picture(path: str | Path) -> Volume:
     return read_images([file], ReadSettings(spacing=(1.0, 1.0, 1.0)), folder=str(path))
 
 
-def natural(path: Path) -> tuple[list[tuple[int, int, str]], str]:
-    """Order names as people do: slice 2 before slice 10."""
-    parts = re.split(r"([0-9]+)", path.name)
-    return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in parts if part], str(path)
-
-
-def _pixels(path: Path) -> NDArray[Any]:
-    """Return one slice, (J, I) or (J, I, 3)."""
+def _pixels(path: Path) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """Return one slice, (J, I) or (J, I, 3), and whether its gray levels were turned over."""
     from PIL import Image
 
     with third_party("Pillow", path.name):
@@ -124,7 +121,12 @@ def _pixels(path: Path) -> NDArray[Any]:
                     found=f"mode = {image.mode}",
                     expected="gray or RGB",
                 )
-    return native(pixels, file=path.name)
+            white = getattr(image, "tag_v2", {}).get(PHOTOMETRIC) == WHITE_IS_ZERO
+            bits = image.tag_v2.get(BITS, (1,))[0] if white else 0
+    pixels = native(pixels, file=path.name)
+    if bits and pixels.dtype == np.uint8:
+        pixels = 255 - pixels  # Pillow has turned them over
+    return bright_is_high(pixels.copy() if bits else pixels, min(bits, 8 * pixels.itemsize))
 
 
 def _check_same_kind(pixels: NDArray[Any], first: NDArray[Any], name: str, first_name: str) -> None:

@@ -13,7 +13,7 @@ from ..files.source import existing_file, suffix_of, third_party
 from ..files.unpack import GZIP, PLAIN, check_promise, fill, unpacked
 from .affine import check_affine, check_spacing, passed_over
 from .gray import native, without_holes
-from .nifti import FLIP
+from .nifti_frame import FLIP
 
 if TYPE_CHECKING:
     from pathlib import Path

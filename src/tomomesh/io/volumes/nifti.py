@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import FormatError, GeometryError
+from ...errors import FormatError
 from ...model.volume import Volume
 from ..files.detached import beside
-from ..files.source import existing_file, suffix_of, third_party
+from ..files.source import existing_file, suffix_of
 from ..files.unpack import GZIP, PLAIN, check_promise, fill, unpacked
-from .affine import (
-    GIVEN,
-    SMALLEST_SPACING,
-    SPACING_HINT,
-    brought_to_mm,
-    check_affine,
-    check_spacing,
-    passed_over,
-    upright,
-)
 from .gray import native, scaled, scaled_dtype, without_holes
+from .nifti_frame import frame_of
 from .nifti_header import NIFTI_HEADERS, NiftiLayout, layout_of, unpack_header
 
 if TYPE_CHECKING:
@@ -31,17 +23,8 @@ if TYPE_CHECKING:
 
     from ...settings import ReadSettings
 
-FLIP = np.diag([-1.0, -1.0, 1.0, 1.0])
-"""RAS to LPS and back."""
-
-NIFTI_UNITS_MM = {0: 1.0, 1: 1000.0, 2: 1.0, 3: 0.001}
-"""Millimeters in the header's units of space (nifti1.h): unknown, meter, millimeter, micron."""
-
 PAIRED = {".hdr": ".img", ".img": ".hdr"}
 """Suffixes of a pair of files, and their partners'."""
-
-UNPLACED = "no orientation in the file (sform_code = qform_code = 0): taken for columns right, rows front, slices up"
-"""The note on a file of the standard's method 1."""
 
 
 def read_nifti(path: Path, settings: ReadSettings) -> Volume:
@@ -57,7 +40,8 @@ def read_nifti(path: Path, settings: ReadSettings) -> Volume:
     Returns
     -------
     Volume
-        In patient millimeters, LPS. The sform is used where its code is not 0, else the qform, else the pixel sizes
+        In patient millimeters, LPS. The sform is used where its code is not 0, else the qform (the other way round with
+        ``nifti_form="qform"``), else the pixel sizes
         alone, with a note: the standard's method 1, x = pixdim[1] i to the right, y = pixdim[2] j to the front,
         z = pixdim[3] k up.
 
@@ -71,14 +55,14 @@ def read_nifti(path: Path, settings: ReadSettings) -> Volume:
     with unpacked(front, _packing(front), file=name) as stream:
         header = unpack_header(stream.read(max(NIFTI_HEADERS)), settings, paired=front != back, file=name)
     layout = layout_of(header, paired=front != back, file=name)
-    affine, notes = _frame(header, settings, name)
+    affine, notes, other = frame_of(header, settings, layout.shape, name)
     check_promise(layout.offset + layout.promised, back.stat().st_size, _packing(back), file=name)
     data = np.empty(layout.promised, np.uint8)
     with unpacked(back, _packing(back), file=name) as stream:
         stream.seek(layout.offset)
         fill(data, stream, file=name)
     stored, more = _gray(data, layout, name)
-    return Volume.from_stored(stored, affine, notes=notes + more)
+    return replace(Volume.from_stored(stored, affine, notes=notes + layout.notes + more), other_frame=other)
 
 
 def _packing(path: Path) -> str:
@@ -103,35 +87,6 @@ def _files(path: Path) -> tuple[Path, Path]:
         )
     partner = beside(path, found[0])
     return (path, partner) if suffix == ".hdr" else (partner, path)
-
-
-def _frame(header: Any, settings: ReadSettings, name: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Return the affine in millimeters, LPS, and notes."""
-    pixdim = [float(size) for size in header["pixdim"][1:4]]
-    forms = [form for form in ("sform", "qform") if int(header[f"{form}_code"]) > 0]
-    broken = not forms or not all(SMALLEST_SPACING <= size < np.inf for size in pixdim)
-    if settings.spacing and broken:
-        return upright(settings.spacing), (GIVEN,)
-    check_spacing(pixdim, ["pixdim[1]", "pixdim[2]", "pixdim[3]"], file=name, hint=SPACING_HINT)
-    with third_party("nibabel", name):
-        affine = getattr(header, f"get_{forms[0]}")() if forms else upright(pixdim)
-    unit, notes = _unit(header, name)
-    affine = np.diag([unit, unit, unit, 1.0]) @ FLIP @ np.asarray(affine, np.float64)
-    check_affine(affine, file=name, hint="a file with a valid sform")
-    return affine, (() if forms else (UNPLACED,)) + notes + passed_over(settings.spacing)
-
-
-def _unit(header: Any, name: str) -> tuple[float, tuple[str, ...]]:
-    code = int(header["xyzt_units"]) & 7
-    if code not in NIFTI_UNITS_MM:
-        raise GeometryError(
-            "the unit of the coordinates is unknown",
-            file=name,
-            found=f"xyzt_units = {code}",
-            expected="0 to 3",
-        )
-    factor = NIFTI_UNITS_MM[code]
-    return factor, brought_to_mm(factor)
 
 
 def _gray(data: NDArray[np.uint8], layout: NiftiLayout, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:

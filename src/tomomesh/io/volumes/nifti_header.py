@@ -42,6 +42,8 @@ class NiftiLayout:
         Bytes before the first voxel.
     slope, intercept : float
         Scale of the gray levels; 1 and 0 where the header has none.
+    notes : tuple of str
+        What of the header is not used.
     """
 
     shape: tuple[int, int, int]
@@ -49,6 +51,7 @@ class NiftiLayout:
     offset: int
     slope: float
     intercept: float
+    notes: tuple[str, ...] = ()
 
     @property
     def promised(self) -> int:
@@ -116,13 +119,14 @@ def layout_of(header: Any, *, paired: bool, file: str) -> NiftiLayout:
         For sizes, types, scales and places that cannot be, and for several frames.
     """
     slope, intercept = float(header["scl_slope"]), float(header["scl_inter"])
-    if slope == 0:  # the standard's way to say: not scaled
+    notes = () if np.isfinite(slope) else (f"scl_slope = {slope:g}: gray levels as they are stored",)
+    if slope == 0 or notes:  # 0 is the standard's way to say: not scaled; its own readers take NaN for that
         slope, intercept = 1.0, 0.0
     check_scale(slope, intercept, file=file)
     offset = float(header["vox_offset"])
     if not offset >= (0 if paired else int(header["sizeof_hdr"])) or not offset.is_integer():
         raise FormatError("the place of the voxels is invalid", file=file, found=f"vox_offset = {offset:g}")
-    return NiftiLayout(_shape(header, file), _dtype(header, file), int(offset), slope, intercept)
+    return NiftiLayout(_shape(header, file), _dtype(header, file), int(offset), slope, intercept, notes)
 
 
 def _shape(header: Any, file: str) -> tuple[int, int, int]:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 TEXT = "text"
 """The packing of voxels that are written as words."""
 
+HEX = "hex"
+"""That of bytes that are written as two digits of base 16 each."""
+
 LONGEST_HEADER = 2**20
 """A header that does not end within these bytes is none: real ones have some thousand, and the names of
 `files.detached.MOST_FILES` data files, of 16 letters each, are as many."""
@@ -42,7 +45,7 @@ class Raster:
     dtype : data type
         Of one number, in the file's byte order.
     packing : str
-        One of `unpack`'s, or ``TEXT``.
+        One of `unpack`'s, ``TEXT`` or ``HEX``.
     parts : tuple of Path
         The files that hold the voxels, one after another, each as many.
     start : int
@@ -128,6 +131,9 @@ def read_raster(raster: Raster, *, file: str) -> NDArray[Any]:
         return native(np.concatenate([_words(raster, part, file) for part in raster.parts]), file=file).reshape(
             raster.shape
         )
+    if raster.packing == HEX:
+        digits = b"".join([_from_digits(raster, part, file) for part in raster.parts])
+        return native(np.frombuffer(digits, raster.dtype).reshape(raster.shape), file=file)
     starts = [_start(raster, part, file) for part in raster.parts]
     data = np.empty((len(raster.parts), raster.part_bytes), np.uint8)
     for row, part, start in zip(data, raster.parts, starts, strict=True):
@@ -157,6 +163,15 @@ def _words(raster: Raster, part: Path, file: str) -> NDArray[Any]:
     kind = raster.dtype.newbyteorder("=")
     with third_party("numpy", file):
         return np.array([kind.type(word) for word in words[: raster.share]], kind)
+
+
+def _from_digits(raster: Raster, part: Path, file: str) -> bytes:
+    least = raster.skip + raster.part_bytes
+    require_bytes(raster.start + 2 * least, part.stat().st_size, file=file)
+    with third_party("the reader of digits", file):
+        found = bytes.fromhex(whole(part)[raster.start :].decode("ascii"))[raster.skip : least]
+    require_bytes(raster.part_bytes, len(found), file=file)
+    return found
 
 
 def gray_or_color(stored: NDArray[Any], channels: int, *, file: str) -> tuple[NDArray[Any], tuple[str, ...]]:

@@ -12,26 +12,27 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
+import numpy as np
+
 from ...errors import FormatError
 from ...model.volume import Volume
 from ..files.extras import required
 from ..files.limits import require_bytes, require_memory
 from ..files.source import existing_file, third_party
 from .affine import GIVEN, UNTURNED, check_spacing, passed_over, required_spacing, upright
-from .gray import native
+from .gray import WHITE_IS_ZERO, bright_is_high, native
 from .raster import gray_or_color
 from .tiff_pages import check_chain
+from .units import millimeters
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from ...settings import ReadSettings
 
-STACKS = ("ZYX", "IYX", "QYX", "ZYXS", "IYXS", "QYXS")
-"""tifffile's letters for the axes of a stack: Z, or pages of an unknown kind; S is a color."""
+STACKS = tuple(pages + rest for pages in "ZIQ" for rest in ("YX", "YXS", "SYX"))
+"""tifffile's letters for the axes of a stack: Z, or pages of an unknown kind; S is a color, which may be planar."""
 
 UNPACKED_WITHOUT = (1, 8, 32946)
 """Compressions, none and deflate, that need no further package."""
@@ -39,12 +40,6 @@ UNPACKED_WITHOUT = (1, 8, 32946)
 TIFF_RATIO = 2**14
 """A packed byte is never taken to hold more bytes of voxels: ten times what deflate (1,032) and LZW (1,243, measured on
 zeros) reach."""
-
-TIFF_UNITS_MM = {
-    "nm": 1e-6, "µm": 1e-3, "μm": 1e-3, "um": 1e-3, "micron": 1e-3, "\\u00b5m": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3,
-    "inch": 25.4,
-}  # fmt: skip
-"""Millimeters in the units of OME-XML and of ImageJ."""
 
 Spacing = tuple[tuple[float, ...], tuple[str, ...]]
 """Distances along columns, rows and slices, and the unit of each."""
@@ -77,11 +72,16 @@ def read_tiff(path: Path, settings: ReadSettings) -> Volume:
         series = _only(pages.series, name)
         _check_promise(series, path.stat().st_size, name)
         spacing, notes = _spacing(pages, settings, name)
-        stored = native(series.asarray(), file=name)
+        stored = series.asarray()
         if stored.shape != series.shape:
             raise ValueError(stored.shape)
-    voxels, more = _voxels(stored, name)
-    return Volume.from_stored(voxels, upright(spacing), notes=notes + more)
+        keyframe, axes = series.keyframe, series.axes
+    stored = native(stored.view(np.uint8) if stored.dtype == np.bool_ else stored, file=name)
+    bits = keyframe.bitspersample if keyframe.photometric == WHITE_IS_ZERO else 0
+    stored, turned = bright_is_high(stored, bits)
+    stored = np.moveaxis(stored, 1, -1) if axes.endswith("SYX") else stored.reshape(*stored.shape[:3], -1)
+    voxels, more = gray_or_color(stored, stored.shape[3], file=name)
+    return Volume.from_stored(voxels, upright(spacing), notes=notes + turned + more)
 
 
 class _Complaints(logging.Handler):
@@ -129,7 +129,7 @@ def _only(found: list[Any], name: str) -> Any:
             expected="one stack of pages of one size",
             hint="one stack, written to a file of its own",
         )
-    if found[0].axes in ("YX", "YXS"):
+    if found[0].axes in ("YX", "YXS", "SYX"):
         raise FormatError("the file holds one slice", file=name, hint="the folder of the slices")
     if found[0].axes not in STACKS:
         raise FormatError(
@@ -157,7 +157,8 @@ def _check_promise(series: Any, size: int, name: str) -> None:
         ends = [start + count for start, count in zip(page.dataoffsets, page.databytecounts, strict=True)]
         require_bytes(max(ends, default=0), size, file=name)
         packed += sum(page.databytecounts)
-    require_bytes(series.nbytes, packed * (1 if keyframe.compression == 1 else TIFF_RATIO), file=name)
+    stored = series.nbytes // 8 if keyframe.bitspersample == 1 else series.nbytes  # bits are unpacked into bytes
+    require_bytes(stored, packed * (1 if keyframe.compression == 1 else TIFF_RATIO), file=name)
     if keyframe.compression not in UNPACKED_WITHOUT:
         required("imagecodecs", file=name)
 
@@ -165,11 +166,16 @@ def _check_promise(series: Any, size: int, name: str) -> None:
 def _spacing(pages: Any, settings: ReadSettings, name: str) -> Spacing:
     """Return the distances in mm, and notes: the file's own, else those that were given."""
     own = _of_ome(pages.ome_metadata, name) if pages.is_ome else _of_imagej(pages) if pages.is_imagej else None
-    if own is not None and all(unit in TIFF_UNITS_MM for unit in own[1]):
-        check_spacing(own[0], ["spacing along x", "spacing along y", "spacing along z"], file=name, hint="another file")
-        placed = tuple(value * TIFF_UNITS_MM[unit] for value, unit in zip(*own, strict=True))
-        return placed, (UNTURNED, *passed_over(settings.spacing))
-    return required_spacing(settings.spacing, file=name), (GIVEN,)
+    if own is None:
+        return required_spacing(settings.spacing, file=name), (GIVEN,)
+    factors = [factor for factor in map(millimeters, own[1]) if factor is not None]
+    if len(factors) < len(own[1]):
+        named = ", ".join(unit[:20] or "none" for unit in own[1])
+        what = f"the file does not say how far its voxels are apart (units of x, y, z: {named})"
+        return required_spacing(settings.spacing, file=name, what=what), (GIVEN,)
+    check_spacing(own[0], ["spacing along x", "spacing along y", "spacing along z"], file=name, hint="another file")
+    placed = tuple(value * factor for value, factor in zip(own[0], factors, strict=True))
+    return placed, (UNTURNED, *passed_over(settings.spacing))
 
 
 def _of_ome(text: str, name: str) -> Spacing | None:
@@ -186,15 +192,14 @@ def _of_ome(text: str, name: str) -> Spacing | None:
 
 
 def _of_imagej(pages: Any) -> Spacing | None:
-    """Return what ImageJ says: the distance of slices in its text, pixels per unit as the resolution."""
+    """Return what ImageJ says: the distance of slices in its text, pixels per unit as the resolution.
+
+    It leaves out a distance of 1, and the units of rows and slices where they are that of columns.
+    """
     told, tags = pages.imagej_metadata or {}, pages.pages[0].tags
-    if "spacing" not in told or "unit" not in told or not {"XResolution", "YResolution"} <= {tag.name for tag in tags}:
+    if "unit" not in told or not {"XResolution", "YResolution"} <= {tag.name for tag in tags}:
         return None
     per_unit = [tags[axis].value for axis in ("XResolution", "YResolution")]
     across = [below / above if above else math.nan for above, below in per_unit]
-    return (*across, float(told["spacing"])), (str(told["unit"]),) * 3
-
-
-def _voxels(stored: NDArray[Any], name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
-    stored = stored.reshape(*stored.shape[:3], -1)
-    return gray_or_color(stored, stored.shape[3], file=name)
+    units = tuple(str(told.get(key, told["unit"])) for key in ("unit", "yunit", "zunit"))
+    return (*across, abs(float(told.get("spacing", 1.0)))), units

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from ....errors import FormatError
 from ...files.limits import require_rows
 from ...files.source import third_party
 from ...volumes.gray import check_scale
+from .kinds import class_of
+from .multiframe import DOSE, PER_FRAME, SHARED, dose_scale, frame_places
+from .values import numbers
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import numpy as np
     from numpy.typing import NDArray
 
 GROUPS = {
@@ -23,11 +25,16 @@ GROUPS = {
     "PixelSpacing": "PixelMeasuresSequence",
     "RescaleSlope": "PixelValueTransformationSequence",
     "RescaleIntercept": "PixelValueTransformationSequence",
+    "RescaleType": "PixelValueTransformationSequence",
     "StackID": "FrameContentSequence",
 }
 """The functional group of an enhanced file that holds each field of a plain one."""
 
-PER_FRAME, SHARED = "PerFrameFunctionalGroupsSequence", "SharedFunctionalGroupsSequence"
+VOLUME_GROUPS = {
+    "ImagePositionPatient": ("PlanePositionVolumeSequence", "ImagePositionVolume"),
+    "ImageOrientationPatient": ("PlaneOrientationVolumeSequence", "ImageOrientationVolume"),
+}
+"""Where a volume of ultrasound keeps the same: in its transducer's own frame."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,8 @@ class ImageFrame:
         Of the gray levels.
     stack : str
         Which of the stacks of an enhanced file it belongs to.
+    rescale_type : str
+        What its scale gives; empty where it does not say.
     """
 
     path: Path
@@ -65,22 +74,32 @@ class ImageFrame:
     spacing: NDArray[np.float64] | None
     scale: tuple[float, float]
     stack: str = ""
+    rescale_type: str = ""
 
     @property
     def padding(self) -> tuple[float, float] | None:
-        """Lowest and highest gray level that stand for nothing measured; None where the header does not tell."""
-        header = self.header
-        first = header.get("PixelPaddingValue")
-        last = header.get("PixelPaddingRangeLimit", first)
-        plain = header.get("PhotometricInterpretation") == "MONOCHROME2" and "ModalityLUTSequence" not in header
-        if not plain or not isinstance(first, int) or not isinstance(last, int):
+        """First and last decoded number that stand for nothing measured; None where the header names none."""
+        header, inverted = self.header, self.header.get("PhotometricInterpretation") == "MONOCHROME1"
+        kind = next((kind for kind in ("Float", "DoubleFloat", "") if f"{kind}PixelPaddingValue" in header), "")
+        first = header.get(f"{kind}PixelPaddingValue")
+        last = header.get(f"{kind}PixelPaddingRangeLimit", first)
+        gray = inverted or header.get("PhotometricInterpretation") == "MONOCHROME2"
+        if (
+            not gray
+            or "ModalityLUTSequence" in header
+            or not all(isinstance(end, (int, float)) for end in (first, last))
+        ):
             return None
+        signed, turned = header.get("PixelRepresentation"), inverted and header.get("Modality") != "CT"
+        if kind:
+            return (-first, -last) if turned else (first, last)
         whole = 2 ** int(header.get("BitsAllocated") or 16)
-        lowest = -whole // 2 if header.get("PixelRepresentation") else 0
+        lowest = -whole // 2 if signed else 0
         # some write the bits of a negative number as a positive one
-        ends = [(end - lowest) % whole + lowest for end in (first, last)]
-        low, high = sorted(end * self.scale[0] + self.scale[1] for end in ends)
-        return float(low), float(high)
+        ends = [(int(end) - lowest) % whole + lowest for end in (first, last)]
+        if turned:
+            ends = [(-1 if signed else 2 ** int(header.get("BitsStored") or 16) - 1) - end for end in ends]
+        return ends[0], ends[1]
 
     @property
     def instance(self) -> int | None:
@@ -110,7 +129,11 @@ def frames_of(path: Path, header: Any) -> list[ImageFrame]:
                 found=f"NumberOfFrames = {count}, descriptions = {len(per_frame)}",
             )
         groups = [[*per_frame[number : number + 1], *shared[:1]] for number in range(count)]
-        return [_frame(path, header, number, groups[number]) for number in range(count)]
+        frames = [_frame(path, header, number, groups[number]) for number in range(count)]
+        if PER_FRAME in header or not frames:
+            return frames
+        places = frame_places(header, count, frames[0].position, frames[0].axes, path.name)
+        return [replace(frame, position=place) for frame, place in zip(frames, places, strict=True)]
 
 
 def _frame(path: Path, header: Any, number: int, groups: list[Any]) -> ImageFrame:
@@ -122,33 +145,31 @@ def _frame(path: Path, header: Any, number: int, groups: list[Any]) -> ImageFram
     axes, spacing = field("ImageOrientationPatient", 6), field("PixelSpacing", 2)
     slope, intercept = field("RescaleSlope", 1), field("RescaleIntercept", 1)
     scale = (1.0 if slope is None else float(slope[0]), 0.0 if intercept is None else float(intercept[0]))
+    scale = dose_scale(header, name) if class_of(header) == DOSE else scale
     check_scale(*scale, file=name)
     return ImageFrame(
         path,
         number,
         header,
         (_count(header, "Rows", name), _count(header, "Columns", name)),
-        None if _stacked_without_place(header) else field("ImagePositionPatient", 3),
+        field("ImagePositionPatient", 3),
         None if axes is None else axes.reshape(2, 3),
         None if spacing is None else spacing[::-1],  # stored: rows first
         scale,
         str(_find(header, groups, "StackID") or ""),
+        str(_find(header, groups, "RescaleType") or ""),
     )
 
 
 def _find(header: Any, groups: list[Any], keyword: str) -> Any:
-    """Return a field of a frame: from its own functional groups, those of all frames, or the header."""
+    """Return a field of a frame: from its own functional groups, those of all frames, the header, or its detector."""
     for group in groups:
-        items = group.get(GROUPS[keyword])
-        if items and keyword in items[0]:
-            return items[0].get(keyword)
-    return header.get(keyword)
-
-
-def _stacked_without_place(header: Any) -> bool:
-    """Tell whether a file holds several frames but one position at most: it is the first frame's only."""
-    frames = header.get("NumberOfFrames")
-    return frames is not None and int(frames) > 1 and PER_FRAME not in header
+        for sequence, inner in ((GROUPS[keyword], keyword), VOLUME_GROUPS.get(keyword, ("", ""))):
+            items = group.get(sequence) if sequence else None
+            if items and inner in items[0]:
+                return items[0].get(inner)
+    detector = header.get("DetectorInformationSequence") or []
+    return header.get(keyword, detector[0].get(keyword) if detector else None)
 
 
 def _count(header: Any, keyword: str, name: str, missing: int = 0) -> int:
@@ -157,28 +178,3 @@ def _count(header: Any, keyword: str, name: str, missing: int = 0) -> int:
     if not (count >= 1 and float(count).is_integer()):
         raise FormatError("a size is invalid", file=name, found=f"{keyword} = {count:g}", expected="at least 1")
     return int(count)
-
-
-def numbers(value: Any, count: int, keyword: str, name: str) -> NDArray[np.float64] | None:
-    """Return a field's numbers, None where it is missing or empty.
-
-    Raises
-    ------
-    FormatError
-        Where they are no numbers, or not as many as they must be.
-    """
-    if value is None or (isinstance(value, str) and not value.strip()) or value == []:
-        return None
-    values = [value] if isinstance(value, (str, int, float)) else list(value)
-    try:
-        found = np.array([float(one) for one in values])
-    except (TypeError, ValueError):
-        raise FormatError("a field holds no numbers", file=name, found=keyword) from None
-    if len(found) != count:
-        raise FormatError(
-            "a field has too few or too many numbers",
-            file=name,
-            found=f"{keyword} = {len(found)} numbers",
-            expected=f"{count}",
-        )
-    return found

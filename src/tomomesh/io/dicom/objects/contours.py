@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....errors import FormatError
-from ..headers.header import numbers
+from ..headers.values import numbers
 from .rings import parted
 
 if TYPE_CHECKING:

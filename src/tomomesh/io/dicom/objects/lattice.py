@@ -9,7 +9,7 @@ import numpy as np
 
 from ....errors import GeometryError
 from ...files.source import third_party
-from ..headers.header import numbers
+from ..headers.values import numbers
 from ..series.regular import EVEN
 from ..series.same_geometry import check_same_geometry, in_words
 from ..series.stack import ON_LINE, SAME_PLACE, stacked

@@ -56,7 +56,7 @@ class Planes:
         return slices_at(self.heights)
 
 
-def planes_of(contours: Sequence[Floats], *, file: str) -> Planes:
+def planes_of(contours: Sequence[Floats], *, file: str, thickness: float | None = None) -> Planes:
     """Find the planes of contours.
 
     Parameters
@@ -65,11 +65,13 @@ def planes_of(contours: Sequence[Floats], *, file: str) -> Planes:
         Each encloses an area.
     file : str
         The path as the user typed it.
+    thickness : float, optional
+        How thick a contour is that is alone, mm.
 
     Raises
     ------
     EmptyError
-        Where all lie in one plane.
+        Where all lie in one plane, and have no thickness.
     GeometryError
         Where a contour leaves its plane, or the planes are not parallel.
     """
@@ -84,11 +86,13 @@ def planes_of(contours: Sequence[Floats], *, file: str) -> Planes:
     labels = planes_within(height, column, (high - low).max(axis=1), SAME_HEIGHT_MM)
     heights = np.bincount(labels, height) / np.bincount(labels)
     gaps = np.array([typical_gap(heights[np.unique(labels[column == one])]) for one in range(column.max() + 1)])[column]
-    if not (gaps > SAME_HEIGHT_MM).any():
+    wide = gaps[gaps > SAME_HEIGHT_MM]
+    if len(wide) == 0 and thickness is None:
         raise EmptyError(
-            "contours on one slice enclose no volume", file=file, found="1 slice", expected="at least two slices"
-        )
-    apart = float(np.median(gaps[gaps > SAME_HEIGHT_MM]))
+            "contours on one slice enclose no volume", file=file, found="1 slice", expected="at least two slices",
+            hint="--thickness, for a slab",
+        )  # fmt: skip
+    apart = float(np.median(wide)) if len(wide) else thickness or 0.0
     off = np.array([np.abs(one[:, 2] - level).max() for one, level in zip(placed, height, strict=True)])
     if off.max() > MOST_OFF_PLANE * apart:
         raise GeometryError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,10 +12,13 @@ from ....errors import EmptyError, FormatError, GeometryError
 from ....model.volume import Volume
 from ...files.limits import require_memory
 from ...files.source import third_party
+from ...names import shown
 from ..headers.dataset import read_dataset
-from ..headers.header import frames_of, numbers
-from ..headers.names import shown
+from ..headers.header import frames_of
+from ..headers.identity import identity_of
+from ..headers.values import numbers
 from ..pixels.decoder import Decoder
+from ..pixels.tables import PALETTE
 from .lattice import lattice_of
 
 if TYPE_CHECKING:
@@ -106,7 +109,8 @@ def read_segmentation(path: Path, settings: ReadSettings, *, study: str, select:
     _require(found, voxels, select, study)
     empty = count - len(np.unique(levels))
     notes += (f"slices that the file leaves out, taken as background: {empty}",) if empty else ()
-    return Volume.from_stored(voxels, affine, notes=(f"segments: {_named(found.labels)}", *notes))
+    read = Volume.from_stored(voxels, affine, notes=(f"segments: {_named(found.labels)}", *notes))
+    return replace(read, dicom=identity_of(found.frames[:1]))
 
 
 def segments_of(path: Path) -> dict[int, str]:
@@ -129,6 +133,8 @@ def _header(path: Path) -> Segmentation:
         kind = str(header.get("SegmentationType", "")) or "missing"
         if kind not in ("BINARY", "FRACTIONAL", LABELMAP):
             raise FormatError("the segmentation is of an unknown type", file=name, found=f"SegmentationType = {kind}")
+        if header.get("PhotometricInterpretation") == PALETTE:  # its colors are for the eye: the numbers are segments
+            header.PhotometricInterpretation = "MONOCHROME2"
         described = [item for item in header.get("SegmentSequence") or [] if item.get("SegmentNumber") != 0]
         labels = {_number(item, "SegmentNumber", name): shown(item.get("SegmentLabel")) for item in described}
         segments = [0 if kind == LABELMAP else _segment_of(header, n, name) for n in range(len(frames))]

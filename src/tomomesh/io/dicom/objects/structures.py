@@ -13,9 +13,9 @@ from ....errors import EmptyError, FormatError, GeometryError, ResourceError, To
 from ....measure.polygon import side_lengths
 from ....model.points import NEURON, RING, STRUCTURE, PointSet
 from ...files.source import counted, third_party
+from ...names import shown
 from ..headers.dataset import read_dataset
 from ..headers.kinds import STRUCTURES, storage_class
-from ..headers.names import shown
 from .contours import CLOSED, OPEN, corners_of, ends_meet
 from .planes import directions, planes_of
 from .rings import filled, parted, pieces_of, thinned
@@ -105,7 +105,7 @@ def read_structure(path: Path, settings: CloudSettings) -> PointSet:
     taken = _chosen(structures, settings.structure, file=str(path))
     read = [_read(one, path, len(structures), settings) for one in taken]
     points = reduce(_stacked, (points for points, _ in read))
-    return replace(points, frame="LPS", notes=tuple(note for _, notes in read for note in notes))
+    return replace(points, frame="LPS", unit="mm", notes=tuple(note for _, notes in read for note in notes))
 
 
 def _read(taken: Structure, path: Path, of: int, settings: CloudSettings) -> tuple[PointSet, list[str]]:
@@ -119,7 +119,7 @@ def _read(taken: Structure, path: Path, of: int, settings: CloudSettings) -> tup
         points = _points(corners, np.zeros(len(corners), np.int64), _side(corners) / FINE, file=str(path))
         points = PointSet.from_positions(points.positions)
     else:
-        planes = planes_of(corners, file=str(path))
+        planes = planes_of(corners, file=str(path), thickness=settings.thickness)
         notes = [f"{told} on {planes.slices} slices"]
         points = _points(corners, planes.labels, planes.apart, file=str(path))
         number = np.full(len(points), taken.number, np.int32)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ....errors import FormatError
-from ..headers.header import numbers
+from ..headers.values import numbers
 
 if TYPE_CHECKING:
     from ..headers.header import ImageFrame

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ....errors import GeometryError, UsageError
-from ..headers.header import numbers
+from ..headers.values import numbers
 
 if TYPE_CHECKING:
     from ..headers.header import ImageFrame

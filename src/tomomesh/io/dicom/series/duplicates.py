@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ...files.source import third_party
-from ..headers.header import PER_FRAME
+from ..headers.multiframe import PER_FRAME, counting
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,6 +41,10 @@ def _pairs(a: ImageFrame, b: ImageFrame) -> Iterator[tuple[str, Any, Any]]:
         values = (list(content.get("DimensionIndexValues") or []) for content in (one, other))
         yield from zip(names, *values, strict=False)
         yield "TemporalPositionIndex", one.get("TemporalPositionIndex"), other.get("TemporalPositionIndex")
+    else:
+        vectors = ((keyword, np.atleast_1d(a.header.get(keyword))) for keyword in counting(a.header))
+        last = max(a.number, b.number)
+        yield from ((keyword, each[a.number], each[b.number]) for keyword, each in vectors if len(each) > last)
 
 
 def _content(frame: ImageFrame) -> Any:

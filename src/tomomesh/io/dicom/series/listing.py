@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ....errors import GeometryError, TomomeshError
+from ...names import shown
 from ..files import read_frames
-from ..headers.names import shown
 from .choice import grouped
 from .regular import steps_between
 from .same_geometry import check_same_geometry

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ....errors import GeometryError
+from ....errors import FormatError, GeometryError
 from ...volumes.affine import check_affine, check_spacing
+from ..headers.kinds import class_of
+from ..headers.multiframe import DOSE, PROJECTIONS, no_slices
 from .regular import regular
 from .same_geometry import check_same_geometry, in_words
 
@@ -41,6 +43,26 @@ class SliceLine:
     step: NDArray[np.float64]
     levels: NDArray[np.float64]
     notes: tuple[str, ...]
+
+
+class Unplaced(NamedTuple):
+    """Why the distance of the slices is not known, in the words of an error, and of a note once it is given."""
+
+    what: str
+    found: str
+    instead: str
+    note: str
+
+
+NOWHERE = Unplaced(
+    "slices have no position", "ImagePositionPatient = missing", "",
+    "slices without positions, in the order of their numbers",
+)  # fmt: skip
+FIRST_ALONE = Unplaced(
+    "the file tells where its first frame lies, but no other", "SpacingBetweenSlices = missing", "",
+    "frames without positions, one behind the other along their normal",
+)  # fmt: skip
+ONE = Unplaced("the series has one slice", "slices = 1", "the folder of the series, or ", "one slice")
 
 
 @dataclass(frozen=True)
@@ -84,12 +106,16 @@ def stacked(frames: list[ImageFrame], settings: ReadSettings, *, study: str) -> 
         Where the frames do not make one regular stack.
     """
     check_same_geometry(frames)
+    _check_slices(frames[0])
+    if class_of(frames[0].header) == DOSE:  # its planes may lie anywhere, and its values are meant to be interpolated
+        settings = replace(settings, fill_gaps=True, resample_slices=True)
     pixel, axes = pixel_of(frames[0], settings), axes_of(frames[0])
     normal = np.cross(axes[0], axes[1])
     lost = [frame for frame in frames if frame.position is None]
     if lost:
-        places = _numbered(frames)
-        line = _along(normal, np.zeros(3), _given(settings), len(places), lost[0])
+        places, first = _numbered(frames), _first_place(frames)
+        origin, unplaced = (np.zeros(3), NOWHERE) if first is None else (first, FIRST_ALONE)
+        line = _along(normal, origin, _given(settings), len(places), lost[0].path.name, unplaced)
     else:
         places = placed(frames, normal, SAME_PLACE * min(pixel))
         line = _line(places, normal, settings, min(pixel), study)
@@ -97,6 +123,23 @@ def stacked(frames: list[ImageFrame], settings: ReadSettings, *, study: str) -> 
     affine[:3] = np.column_stack([axes[0] * pixel[0], axes[1] * pixel[1], line.step, line.origin])
     check_affine(affine, file=study, hint="a series with a valid geometry")
     return Stack(places, line.levels, affine, line.notes)
+
+
+def _check_slices(frame: ImageFrame) -> None:
+    """Refuse frames that no distance makes slices."""
+    if what := no_slices(frame.header):
+        raise FormatError(
+            "the frames of the file are no slices",
+            file=frame.path.name,
+            found=what,
+            expected="slices of one volume",
+            hint="a series of slices that was computed from them" if PROJECTIONS in what else "",
+        )
+
+
+def _first_place(frames: list[ImageFrame]) -> NDArray[np.float64] | None:
+    """Return where a file begins that tells the place of its first frame alone; None for slices of several files."""
+    return frames[0].position if all(frame.path == frames[0].path for frame in frames) else None
 
 
 def _given(settings: ReadSettings) -> float | None:
@@ -165,22 +208,21 @@ def _numbered(frames: list[ImageFrame]) -> list[list[ImageFrame]]:
 
 
 def _along(
-    normal: NDArray[np.float64], origin: NDArray[np.float64], distance: float | None, count: int, frame: ImageFrame
-) -> SliceLine:
+    normal: NDArray[np.float64], origin: NDArray[np.float64], distance: float | None, count: int, name: str,
+    unplaced: Unplaced,
+) -> SliceLine:  # fmt: skip
     """Go along the normal by a distance that the user gave."""
-    lost = frame.position is None
     if distance is None:
         raise GeometryError(
-            "slices have no position" if lost else "the series has one slice",
-            file=frame.path.name,
-            found="ImagePositionPatient = missing" if lost else "slices = 1",
+            unplaced.what,
+            file=name,
+            found=unplaced.found,
             expected="two positions and more, or the distance of the slices",
-            hint="--spacing-z mm" if lost else "the folder of the series, or --spacing-z mm",
+            hint=f"{unplaced.instead}--spacing-z mm",
             flags=["--spacing-z"],
         )
-    note = "slices without positions, in the order of their numbers" if lost else "one slice"
     levels = np.arange(count, dtype=np.float64)
-    return SliceLine(origin, normal * distance, levels, (f"{note}: {distance:g} mm apart, as given",))
+    return SliceLine(origin, normal * distance, levels, (f"{unplaced.note}: {distance:g} mm apart, as given",))
 
 
 def placed(frames: list[ImageFrame], normal: NDArray[np.float64], nearest: float) -> list[list[ImageFrame]]:
@@ -220,7 +262,7 @@ def _line(
     """Follow the positions of the slices: the step keeps the shear of a tilted gantry."""
     origins, distance = np.array([place[0].position for place in places]), _given(settings)
     if len(places) == 1:
-        return _along(normal, origins[0], distance, 1, places[0][0])
+        return _along(normal, origins[0], distance, 1, places[0][0].path.name, ONE)
     heights = origins @ normal
     levels, notes = regular(heights, settings, pixel=pixel, study=study)
     way = origins[-1] - origins[0]

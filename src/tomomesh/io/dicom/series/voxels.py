@@ -24,11 +24,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Gray:
-    """Gray levels (K, J, I[, 3]), notes on them, and the files whose pixels are broken: the voxels lack theirs."""
+    """Gray levels of a stack.
+
+    Attributes
+    ----------
+    voxels : (K, J, I[, 3]) array
+    notes : tuple of str
+    bad : dict
+        The files whose pixels are broken: the voxels lack theirs.
+    padding : (lowest, highest) or None
+        Gray levels that stand for nothing measured, where the headers name them.
+    """
 
     voxels: NDArray[Any]
     notes: tuple[str, ...]
     bad: dict[Path, TomomeshError]
+    padding: tuple[float, float] | None = None
 
 
 def gray(stack: Stack, decode: Decoder, *, study: str) -> Gray:
@@ -59,7 +70,7 @@ def gray(stack: Stack, decode: Decoder, *, study: str) -> Gray:
         return Gray(voxels, (), slices.bad)
     note = (f"slices that repeat another, left out: {slices.repeats}",) if slices.repeats else ()
     voxels, holes = without_holes(voxels, file=study)
-    return Gray(voxels, note + holes, {})
+    return Gray(voxels, note + holes, {}, slices.padding)
 
 
 class _Slices:
@@ -72,6 +83,7 @@ class _Slices:
         self._kind: tuple[Any, ...] = ()
         self._dtype: np.dtype[Any] = np.dtype(np.int16)
         self.repeats = 0
+        self.padding: tuple[float, float] | None = None
         self.bad: dict[Path, TomomeshError] = {}
 
     def room(self, first: NDArray[Any]) -> NDArray[Any]:
@@ -103,7 +115,17 @@ class _Slices:
             self.bad[frame.path] = fault
             return None
         self._check_kind(stored, frame)
-        return scaled(stored, *frame.scale, self._dtype)
+        return self._padded(scaled(stored, *frame.scale, self._dtype), frame)
+
+    def _padded(self, levels: NDArray[Any], frame: ImageFrame) -> NDArray[Any]:
+        """Give a slice the padding of the first one that names some, whose scale may be another."""
+        if frame.padding is None:
+            return levels
+        low, high = np.sort(scaled(np.array(frame.padding), *frame.scale, self._dtype))
+        self.padding = self.padding or (float(low), float(high))
+        if self.padding == (low, high):
+            return levels
+        return np.where((levels >= low) & (levels <= high), self._dtype.type(self.padding[0]), levels)
 
     def _check_kind(self, stored: NDArray[Any], frame: ImageFrame) -> None:
         """Refuse a slice of another kind than the first; the first decides on the type of all gray levels."""

@@ -14,6 +14,7 @@ from ..affine import GIVEN, required_spacing, upright
 from ..raster import gray_or_color
 from .array import DOCUMENTS, document_of, open_array, read_array
 from .omezarr_frame import Axes, axes_of, frame_of
+from .origins import writer_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,7 +33,7 @@ def is_zarr(folder: Path) -> bool:
 
 
 def read_omezarr(folder: Path, settings: ReadSettings) -> Volume:
-    """Read an image of OME-NGFF 0.4 or 0.5, or an array (K, J, I[, L]), from a folder of Zarr, format 2 or 3.
+    """Read an image of OME-Zarr 0.4, 0.5 or 0.6, or an array (K, J, I[, L]), from a folder of Zarr, format 2 or 3.
 
     Parameters
     ----------
@@ -59,10 +60,10 @@ def read_omezarr(folder: Path, settings: ReadSettings) -> Volume:
         return _read_plain(folder, settings, name)
     image = _image(folder, name)
     with third_party("the reader of OME metadata", name):
-        axes = axes_of(image, file=name)
         level = _level(image, settings, name)
-        steps = [*level.get("coordinateTransformations", ()), *image.get("coordinateTransformations", ())]
-        affine, notes = frame_of(axes, steps, settings, file=name)
+        axes = axes_of(image, _system(level), file=name)
+        steps, finest = _steps(image, level), _steps(image, image["datasets"][0])
+        affine, notes = frame_of(axes, steps, finest, settings, writer=writer_of(image), file=name)
         place = _array_folder(folder, str(level["path"]), name)
     array = open_array(place, file=name)
     _check_shape(array, axes, name)
@@ -96,14 +97,14 @@ def _image(folder: Path, name: str) -> Any:
         attributes = document_of(folder, "zarr.json", file=name).get("attributes") or {}
         attributes = attributes.get("ome") or document_of(folder, ".zattrs", file=name)
         images = attributes.get("multiscales") or [None]
-        if images[0] is not None and "axes" in images[0]:
+        if images[0] is not None and {"axes", "coordinateSystems"} & set(images[0]):
             return images[0]
     several = {"bioformats2raw.layout", "plate", "well", "series"} & set(attributes)
     raise FormatError(
         "the folder holds no OME-Zarr image",
         file=name,
         found=f"metadata = {', '.join(sorted(several)) or 'no multiscales with axes'}",
-        expected="OME-NGFF 0.4 or 0.5",
+        expected="OME-Zarr 0.4, 0.5 or 0.6",
         hint="the folder of one image inside it, as NAME/0" if several else "the folder of one array, with --spacing",
     )
 
@@ -118,6 +119,20 @@ def _level(image: Any, settings: ReadSettings, name: str) -> Any:
             expected=f"0 to {len(levels) - 1}, 0 being the full resolution",
         )
     return levels[settings.level]
+
+
+def _steps(image: Any, level: Any) -> list[Any]:
+    """Return a level's transformations one by one, then the image's, which in 0.6 lead to other systems."""
+    after = () if "coordinateSystems" in image else image.get("coordinateTransformations", ())
+    steps = [*level.get("coordinateTransformations", ()), *after]
+    return [step for one in steps for step in (one["transformations"] if one["type"] == "sequence" else [one])]
+
+
+def _system(level: Any) -> str:
+    """Return the name of the coordinate system into which 0.6 carries a level."""
+    told = [one.get("output", "") for one in level.get("coordinateTransformations", ())]
+    output = told[0] if told else ""
+    return str(output.get("name", "") if isinstance(output, dict) else output)
 
 
 def _array_folder(folder: Path, path: str, name: str) -> Path:

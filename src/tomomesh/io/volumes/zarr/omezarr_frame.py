@@ -1,4 +1,4 @@
-"""Axes, units and transformations of an OME-Zarr image (OME-NGFF 0.4 and 0.5), to patient millimeters."""
+"""Axes, units and transformations of an OME-Zarr image (0.4, 0.5 and 0.6), to patient millimeters."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....errors import FormatError, GeometryError
-from ..affine import GIVEN, UNTURNED, brought_to_mm, check_spacing, passed_over, required_spacing, upright  # fmt: skip
+from ..affine import UNTURNED, brought_to_mm, check_affine, check_spacing, passed_over, required_spacing
+from ..units import millimeters
+from .origins import AlongAxes, origin_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,12 +19,6 @@ if TYPE_CHECKING:
 
 SPACE = ("x", "y", "z")
 """The axes that a stack must have, the columns' first."""
-
-OME_UNITS_MM = {
-    "angstrom": 1e-7, "nanometer": 1e-6, "micrometer": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "decimeter": 100.0,
-    "meter": 1e3, "inch": 25.4,
-}  # fmt: skip
-"""Millimeters in the format's units of space."""
 
 UPRIGHT = ((0, 1), (1, 1), (2, 1))
 """Patient axis and sign of x, y and z where nothing is said."""
@@ -33,6 +29,10 @@ TOWARDS = {
     "inferior-to-superior": (2, 1), "superior-to-inferior": (2, -1),
 }  # fmt: skip
 """Patient axis and sign of the format's anatomical directions (its RFC 4)."""
+
+SCALED = "no units in the file: --spacing is the size of a voxel, and scales the translation too"
+PATIENT = "no units in the file: taken for millimeters, for its axes have the directions of a patient"
+"""Notes on where the unit came from."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,15 @@ class Axes:
         return turned.reshape(*turned.shape[:3], -1)
 
 
-def axes_of(image: Any, *, file: str) -> Axes:
+def axes_of(image: Any, system: str = "", *, file: str) -> Axes:
     """Return the axes that an image names.
+
+    Parameters
+    ----------
+    image : dict
+        One of `multiscales`.
+    system : str
+        Of its coordinate systems, which 0.6 has, the one to take; the first where there is none of that name.
 
     Raises
     ------
@@ -73,7 +80,9 @@ def axes_of(image: Any, *, file: str) -> Axes:
     GeometryError
         For a single slice.
     """
-    told: list[Any] = [{"name": axis} if isinstance(axis, str) else axis for axis in image["axes"]]
+    systems = image.get("coordinateSystems") or [image]
+    chosen = next((one for one in systems if one.get("name") == system), systems[0])
+    told: list[Any] = [{"name": axis} if isinstance(axis, str) else axis for axis in chosen["axes"]]
     by_name = {str(axis["name"]): axis for axis in told}
     missing = [name for name in SPACE if name not in by_name]
     if missing == ["z"] and set(by_name) <= {"x", "y", "t", "c"}:
@@ -82,12 +91,18 @@ def axes_of(image: Any, *, file: str) -> Axes:
         found = f"axes = {', '.join(by_name)[:80]}"
         raise FormatError("the axes of the image are no stack's", file=file, found=found, expected="t, c, z, y, x")
     space = [by_name[name] for name in SPACE]
-    directions = [(axis.get("orientation") or {}).get("value", "") for axis in space]
-    return Axes(tuple(by_name), tuple(str(axis.get("unit", "")) for axis in space), tuple(map(str, directions)))
+    units = tuple(str(axis.get("unit") or "") for axis in space)
+    return Axes(tuple(by_name), units, tuple(_direction(axis) for axis in space))
+
+
+def _direction(axis: Any) -> str:
+    """Return the direction of an axis: RFC 4 has an object, ngff-zarr writes a bare word for nibabel's images."""
+    told = axis.get("orientation") or ""
+    return str(told.get("value", "") if isinstance(told, dict) else told)
 
 
 def frame_of(
-    axes: Axes, transformations: list[Any], settings: ReadSettings, *, file: str
+    axes: Axes, transformations: list[Any], finest: list[Any], settings: ReadSettings, *, writer: str, file: str
 ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Return the affine in millimeters, LPS, and notes.
 
@@ -95,8 +110,10 @@ def frame_of(
     ----------
     axes : Axes
         Of the image.
-    transformations : list of dict
-        Scales and translations, in the order in which they are done.
+    transformations, finest : list of dict
+        Scales and translations of a level, and of the finest, in the order in which they are done.
+    writer : str
+        As `origins.writer_of` tells it.
 
     Raises
     ------
@@ -106,23 +123,41 @@ def frame_of(
         For distances that no scanner writes, or that are missing, and directions that are no patient's.
     """
     scale, offset = _combined(axes, transformations, file)
-    if not all(unit in OME_UNITS_MM for unit in axes.units) or not transformations:
-        return upright(required_spacing(settings.spacing, file=file, what=_unknown(axes))), (GIVEN,)
     check_spacing(scale.tolist(), [f"scale of {name}" for name in SPACE], file=file, hint="a store with valid scales")
-    factors = np.array([OME_UNITS_MM[unit] for unit in axes.units])
-    affine = np.zeros((4, 4))
-    affine[3, 3] = 1.0
-    for column, (row, sign) in enumerate(_directions(axes, file)):
-        affine[row, column] = sign * scale[column] * factors[column]
-        affine[row, 3] = sign * offset[column] * factors[column]
-    notes: tuple[str, ...] = () if any(axes.directions) else (UNTURNED,)
-    notes += tuple(note for factor in sorted(set(factors.tolist())) for note in brought_to_mm(factor))
-    return affine, notes + passed_over(settings.spacing)
+    factors, notes = _factors(axes, scale, settings, file) if transformations else _given(axes, scale, settings, file)
+    turned = _directions(axes, file)
+    along = AlongAxes(
+        np.array([row for row, _ in turned]), np.array([sign for _, sign in turned]), offset * factors,
+        _combined(axes, finest, file)[1] * factors,
+    )  # fmt: skip
+    affine = np.eye(4)
+    affine[:3, :3] = 0.0
+    affine[along.rows, np.arange(3)] = along.signs * scale * factors
+    affine[:3, 3], told = origin_of(along, writer)
+    check_affine(affine, file=file, hint="a store with valid translations")
+    return affine, ((UNTURNED,) if not any(axes.directions) else ()) + told + notes
 
 
-def _unknown(axes: Axes) -> str:
+def _factors(
+    axes: Axes, scale: NDArray[np.float64], settings: ReadSettings, file: str
+) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Return the millimeters in the units of x, y and z."""
+    known = [factor for factor in map(millimeters, axes.units) if factor is not None]
+    if len(known) == len(SPACE):
+        told = tuple(note for factor in sorted(set(known)) for note in brought_to_mm(factor))
+        return np.array(known), told + passed_over(settings.spacing)
+    if settings.spacing is None and any(axes.directions) and not any(axes.units):
+        return np.ones(3), (PATIENT,)
+    return _given(axes, scale, settings, file)
+
+
+def _given(
+    axes: Axes, scale: NDArray[np.float64], settings: ReadSettings, file: str
+) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Return the factors by which the scales become the spacing that was given."""
     named = ", ".join(unit[:20] or "none" for unit in axes.units)
-    return f"the file does not say how far its voxels are apart (units of x, y, z: {named})"
+    what = f"the file does not say how far its voxels are apart (units of x, y, z: {named})"
+    return np.array(required_spacing(settings.spacing, file=file, what=what)) / scale, (SCALED,)
 
 
 def _combined(axes: Axes, transformations: list[Any], file: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -11,21 +11,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import FormatError
-from ...model.volume import Volume
-from ..files.detached import beside, check_count, numbered
-from ..files.source import first_bytes
-from ..files.unpack import BZIP2, GZIP, PLAIN
+from ....errors import FormatError
+from ....model.volume import Volume
+from ...files.detached import beside, check_count, numbered
+from ...files.source import first_bytes
+from ...files.unpack import BZIP2, GZIP, PLAIN
+from ..raster import HEX, LONGEST_HEADER, TEXT, Raster, gray_or_color, header_bytes, read_raster, sizes_of
 from .nrrd_frame import frame_of, is_spatial
-from .raster import LONGEST_HEADER, TEXT, Raster, gray_or_color, header_bytes, read_raster, sizes_of
+from .segments import label_map, segments_in
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from ...settings import ReadSettings
-    from .raster import HeaderFields
+    from ....settings import ReadSettings
+    from ..raster import HeaderFields
 
 TYPE_WORDS = {
     "i1": ("signed char", "int8", "int8_t"),
@@ -45,6 +47,7 @@ NRRD_TYPES = {name: code for code, names in TYPE_WORDS.items() for name in names
 
 PACKINGS = {
     "raw": PLAIN, "gzip": GZIP, "gz": GZIP, "bzip2": BZIP2, "bz2": BZIP2, "text": TEXT, "txt": TEXT, "ascii": TEXT,
+    "hex": HEX,
 }  # fmt: skip
 """The format's encodings."""
 
@@ -54,7 +57,14 @@ LIST = ""
 """The field under which the names stand that follow ``data file: LIST``."""
 
 
-def read_nrrd(path: Path, settings: ReadSettings) -> Volume:
+COLORS = ("rgb-color", "3-color", "rgba-color", "4-color")
+"""The format's kinds of an axis of color, as 3 or 4 bytes."""
+
+KINDLESS = ("", "none", "???")
+"""Kinds that say nothing; 3 or 4 bytes are taken for a color then."""
+
+
+def read_nrrd(path: Path, settings: ReadSettings, select: Sequence[int] | None = None) -> Volume:
     """Read a study, or a label map, from a ``.nrrd`` or ``.nhdr`` file.
 
     Parameters
@@ -63,6 +73,8 @@ def read_nrrd(path: Path, settings: ReadSettings) -> Volume:
         The file; data files of a ``.nhdr`` must be in its folder.
     settings : ReadSettings
         `spacing` stands in for one that the file does not hold.
+    select : sequence of int, optional
+        Of segments in several layers, those that are wanted, which may overlap.
 
     Returns
     -------
@@ -79,21 +91,35 @@ def read_nrrd(path: Path, settings: ReadSettings) -> Volume:
     sizes = sizes_of(fields["sizes"].split(), _dimension(fields, name), "sizes", file=name)
     spatial = is_spatial(fields, sizes, file=name)
     affine, notes = frame_of(fields, spatial, settings, file=name)
-    stored = read_raster(_raster(fields, sizes, path, length, name), file=name)
-    voxels, more = gray_or_color(_channels_last(stored, spatial), _channels(sizes, spatial), file=name)
+    segments = segments_in(fields, file=name)
+    if not segments:
+        _check_kinds(fields, sizes, spatial, name)
+    stored = _channels_last(read_raster(_raster(fields, sizes, path, length, name), file=name), spatial)
+    if segments:
+        voxels, more = label_map(stored, segments, select, file=name)
+    else:
+        voxels, more = gray_or_color(stored, stored.shape[3], file=name)
     return Volume.from_stored(voxels, affine, notes=notes + more)
 
 
 def _parse(start: bytes, name: str) -> tuple[HeaderFields, int]:
-    """Return the fields, their names without spaces, and the bytes up to the voxels; -1 where none follow."""
+    """Return the fields, their names without spaces, and the keys, as they are; with the bytes up to the voxels.
+
+    The bytes are -1 where no voxels follow.
+    """
     end = re.search(rb"\r?\n\r?\n", start)
     if not re.match(rb"NRRD000[1-9]\r?\n", start) or (end is None and len(start) >= LONGEST_HEADER):
         raise FormatError("the file has no NRRD header", file=name, expected="NRRD000n, fields, and an empty line")
     lines = start[: end.start() if end else None].decode("utf-8", "replace").splitlines()[1:]
     fields: HeaderFields = {}
     for number, line in enumerate(lines):
+        key, equals, said = line.partition(":=")
         field, colon, value = line.partition(": ")
-        if colon and not line.startswith("#"):
+        if line.startswith("#"):
+            continue
+        if equals and (not colon or len(key) < len(field)):
+            fields[key] = said.strip()
+        elif colon:
             fields[field.replace(" ", "").lower()] = value.strip()
         if fields.get("datafile", "").startswith("LIST"):
             fields[LIST] = "\n".join(one for one in lines[number + 1 :] if one.strip())
@@ -172,8 +198,20 @@ def _after_lines(part: Path, start: int, lines: int, name: str) -> int:
     return start + ends[lines - 1]
 
 
-def _channels(sizes: tuple[int, ...], spatial: list[bool]) -> int:
-    return int(np.prod([size for size, space in zip(sizes, spatial, strict=True) if not space], dtype=object))
+def _check_kinds(fields: HeaderFields, sizes: tuple[int, ...], spatial: list[bool], name: str) -> None:
+    """Refuse vectors and lists of three bytes, which are no colors."""
+    kinds = fields.get("kinds", "").lower().split()
+    if len(kinds) != len(sizes):
+        return
+    others = [(kind, size) for kind, size, space in zip(kinds, sizes, spatial, strict=True) if not space and size > 1]
+    if others and not (len(others) == 1 and others[0][0] in (*COLORS, *KINDLESS)):
+        raise FormatError(
+            "the file holds several values a voxel",
+            file=name,
+            found=", ".join(f"{size} of kind {kind[:20]}" for kind, size in others),
+            expected="one gray level, a color, or segments with names",
+            hint="one of them, written to a file of its own; or the kind RGB-color in the header, where it is a color",
+        )
 
 
 def _channels_last(stored: NDArray[Any], spatial: list[bool]) -> NDArray[Any]:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...errors import FormatError, GeometryError
-from .affine import (
+from ....errors import FormatError, GeometryError
+from ..affine import (
     GIVEN,
     SPACING_HINT,
     UNTURNED,
@@ -19,14 +19,15 @@ from .affine import (
     required_spacing,
     upright,
 )
-from .raster import floats_of
+from ..raster import floats_of
+from ..units import millimeters
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from ...settings import ReadSettings
+    from ....settings import ReadSettings
 
 SPACES = {
     "left-posterior-superior": (1, 1, 1), "lps": (1, 1, 1),
@@ -37,9 +38,6 @@ SPACES = {
 
 NAMELESS = ("", "scanner-xyz", "3d-right-handed")
 """Spaces that name no patient axes; ITK, which writes such files, means LPS."""
-
-NRRD_UNITS_MM = {"": 1.0, "mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "µm": 0.001, "μm": 0.001}
-"""Millimeters in the format's units of space, which are free text; none is taken for mm, as ITK does."""
 
 OTHER_KINDS = re.compile(r".*color|.*vector|.*matrix|list|time|point|normal|.*gradient|complex|quaternion|stub|scalar")
 """Kinds of axes that are none of space."""
@@ -96,8 +94,8 @@ def frame_of(
     origin = fields.get("spaceorigin", "")
     affine[:3, 3] = _vector(origin, "space origin", file) if origin else 0.0
     signs, notes = _signs(fields, file)
-    unit, more = _unit(fields, file)
-    affine[:3] *= unit * np.array(signs)[:, None]
+    units, more = _units(fields, file)
+    affine[:3] *= (units * np.array(signs))[:, None]
     check_affine(affine, file=file, hint="a file with valid space directions")
     notes += more + (() if origin else ("no space origin in the file: the first voxel is at 0",))
     return affine, notes + passed_over(settings.spacing)
@@ -133,16 +131,21 @@ def _signs(fields: Mapping[str, str], file: str) -> tuple[tuple[int, int, int], 
     )
 
 
-def _unit(fields: Mapping[str, str], file: str) -> tuple[float, tuple[str, ...]]:
-    units = {unit.lower() for unit in re.findall(r'"([^"]*)"', fields.get("spaceunits", ""))}
-    factors = {NRRD_UNITS_MM.get(unit) for unit in units or {""}}
-    factor = next(iter(factors))
-    if len(factors) > 1 or factor is None:
-        found = f"space units = {' '.join(sorted(units))[:80]}"
+def _units(fields: Mapping[str, str], file: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Return the millimeters in the unit of each axis of the space; none is taken for millimeters, as ITK does."""
+    units = re.findall(r'"([^"]*)"', fields.get("spaceunits", "")) or [""]
+    found = [1.0 if not unit else millimeters(unit) for unit in units]
+    factors = [factor for factor in found if factor is not None]
+    if len(factors) < len(units) or len(units) not in (1, 3):
+        told = f"space units = {' '.join(units)[:80]}"
         raise GeometryError(
-            "the unit of the coordinates is unknown", file=file, found=found, expected="mm | cm | m | um"
+            "the unit of the coordinates is unknown",
+            file=file,
+            found=told,
+            expected="mm | cm | m | um, as one or three",
         )
-    return factor, brought_to_mm(factor)
+    notes = tuple(note for factor in sorted(set(factors)) for note in brought_to_mm(factor))
+    return np.array(factors * (3 // len(factors))), notes
 
 
 def _without_directions(

@@ -1,0 +1,139 @@
+"""What was likely meant: another command, another option, a label by its name."""
+
+from __future__ import annotations
+
+import gzip
+import shlex
+from typing import TYPE_CHECKING
+
+import nibabel
+import numpy as np
+import pytest
+
+from tomomesh import io
+from tomomesh.cli import main
+from tomomesh.cli.faults import COMMANDS, USUAL
+from tomomesh.cli.options import build_parser
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+TABLE = b"""<?xml version="1.0"?><CaretExtension><VolumeInformation Index="0"><LabelTable>
+<Label Key="1" Red="0"><![CDATA[spleen]]></Label><Label Key="5" Red="1"><![CDATA[liver]]></Label>
+</LabelTable></VolumeInformation></CaretExtension>"""
+
+
+def ball() -> NDArray[np.uint8]:
+    found = np.zeros((12, 12, 12), np.uint8)
+    found[2:10, 2:10, 2:10] = 5
+    found[0, 0, 0] = 1
+    return found
+
+
+@pytest.fixture
+def named(tmp_path: Path) -> Path:
+    image = nibabel.Nifti1Image(ball(), np.eye(4))
+    image.header.extensions.append(nibabel.nifti1.Nifti1Extension(0, TABLE))
+    nibabel.save(image, tmp_path / "seg.nii.gz")
+    return tmp_path / "seg.nii.gz"
+
+
+def said(line: str, code: int, capsys: pytest.CaptureFixture[str]) -> str:
+    assert main(shlex.split(line)) == code
+    told = capsys.readouterr().err.strip().splitlines()
+    assert len(told) == 1
+    return told[0]
+
+
+class TestCommand:
+    @pytest.mark.parametrize(
+        ("line", "hint"),
+        [
+            ("reconstruct c.xyz -o m.stl", "tomomesh surface c.xyz -o mesh.stl"),
+            ("inspect c.xyz", "tomomesh surface c.xyz"),
+            ("segment c.xyz -o p.ply", "tomomesh surface c.xyz"),
+            ("surface v.nii.gz -o m.stl", "tomomesh reconstruct v.nii.gz -o mesh.stl"),
+            ("surface slices -o m.stl", "tomomesh reconstruct slices"),
+            ("check v.nii.gz", "tomomesh reconstruct v.nii.gz"),
+            ("print v.nii.gz -o m.stl", "tomomesh reconstruct v.nii.gz"),
+        ],
+    )
+    def test_that_reads_the_file_is_named(
+        self, line: str, hint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "c.xyz").write_text("0 0 0\n1 1 1\n")
+        (tmp_path / "v.nii.gz").write_bytes(gzip.compress(b""))
+        (tmp_path / "slices").mkdir()
+        assert f"Try: {hint}" in said(line, 4, capsys)
+
+    @pytest.mark.parametrize(
+        ("word", "hint"),
+        [("reconstrct", "tomomesh reconstruct"), ("convert", "tomomesh reconstruct"), ("poisson", "surface")],
+    )
+    def test_is_found_by_what_is_like_it(self, word: str, hint: str, capsys: pytest.CaptureFixture[str]) -> None:
+        assert hint in said(f"{word} a b", 2, capsys).split("Try: ")[1]
+
+    def test_of_a_file_alone(self, named: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        assert f"Try: tomomesh reconstruct {named} -o mesh.stl" in said(str(named), 2, capsys)
+
+    def test_nothing_is_said_of_what_is_like_nothing(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert "Try: `tomomesh --help`" in said("qqqqq", 2, capsys)
+
+
+class TestOption:
+    @pytest.mark.parametrize(
+        ("asked", "meant"),
+        [
+            ("--threshold 300", "--lower 300"),
+            ("--isovalue=300", "--lower=300"),
+            ("--smoothing 2", "--smooth 2"),
+            ("--decimate 1000", "--target-faces 1000"),
+            ("--label 5", "--select 5"),
+            ("--presett bone", "--preset bone"),
+            ("--target_faces 100", "--target-faces 100"),
+        ],
+    )
+    def test_is_found_by_its_usual_name(self, asked: str, meant: str, capsys: pytest.CaptureFixture[str]) -> None:
+        told = said(f"reconstruct a.nii -o m.stl {asked}", 2, capsys)
+        assert told.endswith(f"Try: {meant}.")
+
+    def test_of_another_command_is_not_named(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert "--lower" not in said("surface a.xyz -o m.stl --threshold 3", 2, capsys)
+
+    def test_the_tables_name_what_there_is(self) -> None:
+        commands = build_parser().commands
+        options = {option for one in commands.values() for option in one._option_string_actions}
+        assert {f"--{name}" for name in USUAL} <= options
+        assert set(COMMANDS) <= set(commands)
+        usual = [other for others in USUAL.values() for other in others]
+        assert len(usual) == len(set(usual))
+        assert not {f"--{other}" for other in usual} & set(commands["reconstruct"]._option_string_actions)
+
+
+class TestLabels:
+    def test_by_name(self, named: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        assert io.label_names(named) == {"spleen": 1, "liver": 5}
+        for label in ("liver", "5", "Liver"):
+            line = f"reconstruct --labels-in {named} --select {label} -o {tmp_path}/{label}.stl"
+            assert main(line.split()) == 0
+            assert "label(s) 5" in capsys.readouterr().out
+        assert (tmp_path / "liver.stl").read_bytes() == (tmp_path / "5.stl").read_bytes()
+
+    def test_a_name_like_it_is_named(self, named: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        told = said(f"reconstruct {named} -o m.stl --select livr", 2, capsys)
+        assert "liver (5)" in told.split("Try: ")[1]
+
+    def test_without_names(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        nibabel.save(nibabel.Nifti1Image(ball(), np.eye(4)), tmp_path / "plain.nii")
+        told = said(f"reconstruct {tmp_path}/plain.nii -o m.stl --select liver", 2, capsys)
+        assert "names none of its labels" in told
+        assert "tomomesh inspect" in told
+
+    def test_of_a_segmentation_by_slicer(self, tmp_path: Path) -> None:
+        first = b"Segment0_LabelValue:=1\nSegment0_Name:=Segment one\n"
+        head = b"NRRD0004\n" + first + b"Segment1_LabelValue:=7\r\nSegment1_Name:=tumor\n\n"
+        (tmp_path / "s.seg.nrrd").write_bytes(head + b"Segment2_Name:=no\nSegment2_LabelValue:=3\n")
+        assert io.label_names(tmp_path / "s.seg.nrrd") == {"Segment one": 1, "tumor": 7}
