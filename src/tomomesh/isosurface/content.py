@@ -25,11 +25,11 @@ turns 7 % more."""
 OF_MASK = 2.0
 """Sharpness of what comes from a mask, which tells nothing of it. Chosen: half changes the distance by +11 %, twice by
 -0.8 % with 5 % more turns."""
-OF_LEVELS = 10.0
+OF_LEVELS = 15.0
 """How stiff a net is against bends around thin voxels, over the stiffness that is set. Chosen where faces turn as much
 as after a windowed sinc filter: half changes the distance by -1 % and the turns by +7 %, twice by +3 and -5 %. Where
 there are two levels, it is as stiff as around a mask, whose steps it shall not follow either."""
-ALIKE, FEWEST = 0.01, 100
+SPREAD, FEWEST = 0.01, 100
 """Share of a border's height by which the middle half of its ends may differ where there are two levels, and at how
 many places at least. Measured: partial volumes of labels differ by 0, a CT's skin by .04, other studies by .1 and
 more. Chosen: half and twice change nothing; at .05 a CT's skin has 671 pieces in place of 4, of foam and sinuses."""
@@ -79,15 +79,16 @@ class Content:
 
     def is_mixed(self, mask: Mask) -> bool:
         """Tell whether voxels beside the border hold something of both of two levels, as those of a mask do not."""
-        mixed = self.mixed(round(1 / ALIKE))
-        return bool(mixed.any()) and bool(np.mean(mixed[beside_border(mask)]) > ALIKE)
+        mixed = self.mixed(round(1 / SPREAD))
+        return bool(mixed.any()) and bool(np.mean(mixed[beside_border(mask)]) > SPREAD)
 
     def kept(self, parts: Values) -> Mask:
         """Tell which parts are kept: those in the window, and of two levels those that hold just half of each.
 
         A level sheet as thick as one part fills the middle two of an even number by half.
         """
-        return self.bounds.kept(parts) | (np.abs(parts - self.bound) <= ALIKE * abs(self.inner - self.outer))
+        halved = np.abs(parts - self.bound) <= SPREAD * abs(self.inner - self.outer)
+        return np.asarray(self.bounds.kept(parts) | halved)
 
 
 def content_of(levels: Levels, mask: Mask, turned: Mask, axis: int, threads: int = 0) -> Content:
@@ -124,7 +125,7 @@ def _two_levels(levels: Levels, least: Floats, most: Floats) -> tuple[float, flo
     if len(least) < FEWEST:
         return None
     low, high = (np.percentile(ends, (25, 50, 75)) for ends in (least, most))
-    if max(np.ptp(low), np.ptp(high)) > ALIKE * (high[1] - low[1]):
+    if max(np.ptp(low), np.ptp(high)) > SPREAD * (high[1] - low[1]):
         return None
     within = [bool(levels.kept(np.array([[end]]))[0, 0]) for end in (low[1], high[1])]
     inner, outer = (float(low[1]), float(high[1])) if within[0] else (float(high[1]), float(low[1]))
