@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from tomomesh.model.mesh import TriMesh
 
-HEADS = [name for name, (_, labels) in STUDIES.items() if labels]
+HEADS = [name for name, (_, labels, _) in STUDIES.items() if labels]
 """Studies of labels alone: no picture of a patient is drawn."""
 
 

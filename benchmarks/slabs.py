@@ -1,6 +1,6 @@
 """Thick slices: surfaces of slabs made of thin studies, beside those of peers, against the surface of the thin study.
 
-``python benchmarks/slabs.py [--study 01 13 MR] [--thick 4 6] [--data levels labels] [--quick] [--each]``
+``python benchmarks/slabs.py [--study 01 13 MR CT] [--thick 2 4 6] [--data levels labels] [--quick] [--each]``
 """
 
 from __future__ import annotations
@@ -31,12 +31,15 @@ if TYPE_CHECKING:
     from tomomesh.model.mesh import TriMesh
 
 SKULL = (515, 516)
-STUDIES: dict[str, tuple[str, tuple[int, ...]]] = {
-    "01": ("synthseg/training_seg_01.nii.gz", SKULL),
-    "13": ("synthseg/training_seg_13.nii.gz", SKULL),
-    "MR": ("volrender/seg3D/MR.nii.gz", ()),
+STUDIES: dict[str, tuple[str, tuple[int, ...], float | None]] = {
+    "01": ("synthseg/training_seg_01.nii.gz", SKULL, 0.5),
+    "13": ("synthseg/training_seg_13.nii.gz", SKULL, 0.5),
+    "MR": ("volrender/seg3D/MR.nii.gz", (), None),
+    "CT": ("dicom2stl/ct_example.nii.gz", (), 300.0),
 }
-"""Label heads, of which the skull is taken, and a head of gray levels, whose skin is what lies above Otsu's level."""
+"""Label heads, of which the skull is taken; a head of gray levels, whose skin is what lies above Otsu's level; and one
+whose bone is what lies above 300 HU, of slices so thick that pairs of them tell more than slabs of four."""
+USUAL = ("01", "13", "MR")
 WAYS: dict[str, dict[str, Any]] = {
     "defaults": {},
     "--way voxels": {"way": "voxels"},
@@ -86,7 +89,7 @@ class Truth:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--study", nargs="+", choices=STUDIES, default=list(STUDIES))
+    parser.add_argument("--study", nargs="+", choices=STUDIES, default=list(USUAL))
     parser.add_argument("--thick", nargs="+", type=int, choices=(2, 3, 4, 6), default=[4, 6], help="slices of a slab")
     parser.add_argument("--data", nargs="+", choices=("levels", "labels"), default=["levels", "labels"])
     parser.add_argument("--quick", action="store_true", help="a quarter of each study alone")
@@ -155,13 +158,14 @@ def score(mesh: TriMesh, true: Truth) -> dict[str, float]:
 
 def thin(name: str, *, quick: bool = False) -> Thin:
     """Read a thin study, cropped to its structure: levels 0 and 1 of a label head, gray levels of the other."""
-    file, labels = STUDIES[name]
+    file, labels, level = STUDIES[name]
     volume = read_volume(SHARED / "data" / file)
     levels = np.isin(volume.voxels, labels) if labels else volume.voxels
-    level = 0.5 if labels else otsu_threshold(levels)
+    ball_mm = BALL_MM if level is None else None
+    level = otsu_threshold(levels) if level is None else level
     volume = replace(volume, voxels=levels.astype(np.float32))
     box = _box(volume.voxels > level, quick=quick)
-    return Thin(volume.cropped(box), level, None if labels else BALL_MM)
+    return Thin(volume.cropped(box), level, ball_mm)
 
 
 def _box(mask: NDArray[np.bool_], *, quick: bool) -> tuple[slice, slice, slice]:
