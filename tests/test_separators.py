@@ -15,7 +15,8 @@ ROI = ["-1", "2.5", "-3", "4", "5e1", "66"]
 
 
 def parsed(*words: str) -> dict[str, Any]:
-    return vars(build_parser().parse_args(joined(["reconstruct", "study.npy", "-o", "m.stl", *words])))
+    found: dict[str, Any] = vars(build_parser().parse_args(joined(["reconstruct", "study.npy", "-o", "m.stl", *words])))
+    return found
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,7 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     settled = settle(points, settings, progress)
     samples, origin = settled.value, lowest_corner(points)
     shell = _close(points, samples, settings, progress)
-    walls = _walls(shell.value, samples, points, settings)
+    walls = _walls(shell.value, samples, points, origin, settings)
     rough = measured("smooth", _smoothed, shell.value, settings)
     kept, smoothed, ring = rough.value.faces, rough.value.mesh, rough.value.ring
     rest = measured("fit", _fitted, shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
