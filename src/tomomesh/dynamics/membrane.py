@@ -32,8 +32,8 @@ def capped(mesh: TriMesh, free: NDArray[np.bool_]) -> NDArray[np.float64]:
         the others stay.
     """
     count, (a, b) = len(free), mesh.edges.T
-    links = sparse.coo_array((np.ones(len(a)), (a, b)), shape=(count, count))
-    links = sparse.csr_array(links + links.T)
+    one_way = sparse.coo_array((np.ones(len(a)), (a, b)), shape=(count, count))
+    links = sparse.csr_array(one_way + one_way.T)
     _, piece = connected_components(links, directed=False)
     held = np.bincount(piece, ~free) > 0
     moving = np.flatnonzero(free & held[piece])
