@@ -25,7 +25,7 @@ turns 7 % more."""
 OF_MASK = 2.0
 """Sharpness of what comes from a mask, which tells nothing of it. Chosen: half changes the distance by +11 %, twice by
 -0.8 % with 5 % more turns."""
-OF_LEVELS = 15.0
+OF_LEVELS = 12.0
 """How stiff a net is against bends around thin voxels, over the stiffness that is set. Chosen where faces turn as much
 as after a windowed sinc filter: half changes the distance by -1 % and the turns by +7 %, twice by +3 and -5 %. Where
 there are two levels, it is as stiff as around a mask, whose steps it shall not follow either."""

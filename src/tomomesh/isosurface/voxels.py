@@ -128,7 +128,7 @@ def boundary(
     net = net_around(_filled(joined) if surface == "outer" else joined, threads)
     x, y, z = (net.inner + 1).T
     found = crossings(levels, net.inner, net.steps, ~padded[z, y, x], thin)
-    if found.bending:
+    if found.stepped:  # gray levels say themselves where their border is
         found = replace(found, thin=thin_squares(joined, net))
     added = int(np.count_nonzero(joined) - np.count_nonzero(padded))
     return Boundary(affine, net, found, added, 1 if thin is None else thin.parts)
