@@ -63,9 +63,6 @@ scans that were measured."""
 FEW = 8
 """Cubes with points deep inside of a surface from which that is warned of. A warning's threshold, chosen: no mesh
 depends on it."""
-LIKE = 1.1
-"""How many times the volume of a tight shell what the normals say is inside may have: about 1.0 on a rocker arm, where
-they are right, 1.2 on a part whose hole they fill."""
 MADE_UP = 0.2
 """Share of a surface without samples from which it is refused, unless holes are to be filled: a third of a hemisphere's
 is, and a scan from four sides leaves a sixth."""
@@ -88,11 +85,6 @@ class Shell:
     leak_test: LeakTest
     doubt: str = ""
     """Where inside and outside were told apart by the normals alone, in words."""
-
-    @property
-    def volume(self) -> float:
-        """Volume inside, that of its cubes too."""
-        return float(np.abs(self.leak_test.faces.volumes).sum() * self.cell.prod())
 
     @property
     def is_thin(self) -> bool:
@@ -163,11 +155,10 @@ def _interpolated(mesh: TriMesh, points: Points) -> NDArray[np.bool_]:
 @timed("cubes")
 def _close(points: Points, samples: Samples, settings: Settings, progress: Progress) -> Stage[Shell]:
     shell = _tightest(len(points.cloud), samples, settings, progress)
-    unsure = shell.leak_test.two_sided < SURE or shell.leak_test.shell.closing > WIDE
+    unsure = not shell.leak_test.tight or shell.leak_test.shell.closing >= WIDE
     if unsure and settings.cubes.closing is None and not _is_wide(shell, samples) and not _is_flat(samples):
         other = _by_normals(shell, samples, lowest_corner(points), settings, progress)
-        alike = not shell.leak_test.tight or other.volume <= LIKE * shell.volume
-        shell = other if alike and other.leak_test.is_better_than(shell.leak_test) else shell
+        shell = other if other.leak_test.is_better_than(shell.leak_test) else shell
     told = shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
     said = (shell.doubt, _joined(shell, lowest_corner(points)))
     return folded(shell, told, Stage(None, warnings=tuple(one for one in said if one)))
