@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import nibabel
@@ -112,10 +113,17 @@ class TestStated:
     @pytest.mark.parametrize(("head", "unit"), [
         ("X [m];Y [m];Z [m]", "m"), ("x_cm;y_cm;z_cm", "cm"), ("East (ft);North (ft);Height (ft)", "ft"),
         ("x;y;z", None), ("lon;lat;alt", "degree"), ("x_mm;y_mm;z_cm", None),
+        ("x (nm);y (nm);z (nm)", "nm"), ("X [Kilometres];Y [Kilometres];Z [Kilometres]", "km"),
     ])  # fmt: skip
     def test_by_the_names_of_columns(self, tmp_path: Path, head: str, unit: str | None) -> None:
         (tmp_path / "c.csv").write_text(f"{head}\n1;2;3\n")
         assert read_points(tmp_path / "c.csv").unit == unit
+
+    @pytest.mark.parametrize(("unit", "taken", "scale"), [("nm", "um", 1e-3), ("yd", "m", 0.9144), ("km", "m", 1e3)])
+    def test_lengths_that_no_mesh_is_written_in_become_the_next(self, unit: str, taken: str, scale: float) -> None:
+        told = unit_taken(replace(PointSet.from_positions(sphere()), unit=unit))
+        assert told[0] == taken
+        np.testing.assert_allclose(told[1], scale * sphere())
 
     def test_millimeters_where_nothing_is(self) -> None:
         assert unit_taken(PointSet.from_positions(sphere()))[0] == "mm"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ...errors import FormatError
+from ...model.units import unit_named
 from ..fields import AXES
 
 if TYPE_CHECKING:
@@ -27,14 +28,11 @@ TRIPLES: tuple[tuple[frozenset[str], ...], ...] = (
 )
 """What the three are called together: coordinates, a patient's axes, ParaView's columns, a surveyor's."""
 
-UNIT_WORDS = {
-    **{word: word for word in ("mm", "cm", "m", "um", "km", "in", "ft")},
-    **{"µm": "um", "μm": "um", "inch": "in", "inches": "in", "feet": "ft", "us-ft": "us-ft", "ftus": "us-ft"},
-    **{"meter": "m", "meters": "m", "metre": "m", "metres": "m", "millimeter": "mm", "millimeters": "mm"},
+NO_LENGTHS = {
     **dict.fromkeys(("deg", "degree", "degrees", "°"), "degree"),
     **dict.fromkeys(("px", "pixel", "pixels", "voxel", "voxels"), "voxel"),
 }
-"""Words for units to their names."""
+"""Words for units that are no lengths, to their names."""
 
 NAME = re.compile(r"(?P<name>.*?)[\s_]*(?:[\[(/]\s*(?P<marked>[^\])]*?)\s*[\])]?|_(?P<behind>[a-zµμ]+))?")
 """A column's name and unit: ``x``, ``X_mm``, ``x [m]``, ``East (ft)``."""
@@ -86,8 +84,8 @@ def _parted(name: str) -> tuple[str, str | None]:
     """Return a name in small letters without marks, a coordinate's as its letter, and the unit behind it."""
     word = name.strip().lower()
     found = NAME.fullmatch(word)
-    marked = found and (found["marked"] or found["behind"] or "")
-    unit = UNIT_WORDS.get(marked or "")
+    marked = (found and (found["marked"] or found["behind"])) or ""
+    unit = NO_LENGTHS.get(marked) or unit_named(marked)
     base = found["name"] if found and (unit or found["marked"] is not None) else word
     plain = re.sub(r"[\s_.:-]+", "", base)
     letter = LETTER.fullmatch(plain)

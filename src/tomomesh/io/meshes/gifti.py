@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import FormatError
+from ...model.units import MM
 from ..colors import named_colors
 from ..files.atomic import replacing
 from ..files.source import third_party
 from ..volumes.nifti_frame import FLIP
-from .attributes import MM, single_precision
+from .attributes import single_precision
 
 if TYPE_CHECKING:
     from pathlib import Path
