@@ -20,6 +20,7 @@ from tomomesh.errors import GeometryError
 from tomomesh.io import read_points
 from tomomesh.settings import Settings
 from tomomesh.ways.points import take_points
+from writers import needed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -34,10 +35,6 @@ def sphere(radius: float = 3.0, count: int = 1500) -> NDArray[np.float64]:
     turn = np.arange(count) + 0.5
     z, angle = 1 - 2 * turn / count, 2.4 * turn
     return radius * np.column_stack([np.sqrt(1 - z**2) * np.cos(angle), np.sqrt(1 - z**2) * np.sin(angle), z])
-
-
-def package(name: str) -> Any:
-    return pytest.importorskip(name, reason=f"the package {name} is not installed", exc_type=ImportError)
 
 
 def unit_taken(cloud: PointSet, **changes: Any) -> tuple[str, NDArray[np.float64]]:
@@ -68,7 +65,7 @@ class TestStated:
         assert nearest.max() < 1e-6
 
     def test_by_an_e57(self, tmp_path: Path) -> None:
-        pye57 = package("pye57")
+        pye57 = needed("pye57")
         file = pye57.E57(str(tmp_path / "c.e57"), mode="w")
         file.write_scan_raw({f"cartesian{axis}": column for axis, column in zip("XYZ", sphere().T, strict=True)})
         file.close()
@@ -83,7 +80,7 @@ class TestStated:
     def test_by_a_las(
         self, tmp_path: Path, system: str, point_format: int, unit: str, meters: float, height: float
     ) -> None:
-        laspy, pyproj = package("laspy"), package("pyproj")
+        laspy, pyproj = needed("laspy"), needed("pyproj")
         header = laspy.LasHeader(point_format=point_format, version="1.4" if point_format > 5 else "1.2")
         header.scales = np.full(3, 1e-6)
         header.add_crs(pyproj.CRS.from_user_input(system))
@@ -99,7 +96,7 @@ class TestStated:
         np.testing.assert_array_equal(unit_taken(cloud, units="cm")[1], cloud.positions)
 
     def test_degrees_are_refused_unless_a_unit_is_given(self, tmp_path: Path) -> None:
-        laspy, pyproj = package("laspy"), package("pyproj")
+        laspy, pyproj = needed("laspy"), needed("pyproj")
         header = laspy.LasHeader(point_format=6, version="1.4")
         header.scales = np.full(3, 1e-6)
         header.add_crs(pyproj.CRS.from_epsg(4326))

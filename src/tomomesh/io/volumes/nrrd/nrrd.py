@@ -95,11 +95,10 @@ def read_nrrd(path: Path, settings: ReadSettings, select: Sequence[int] | None =
     affine, notes = frame_of(fields, spatial, settings, file=name)
     segments = segments_in(fields, file=name)
     stored = _channels_last(read_raster(_raster(fields, sizes, path, length, name), file=name), spatial)
-    if not segments:
-        _check_kinds(fields, sizes, spatial, stored, name)
     if segments:
         voxels, more = label_map(stored, segments, select, file=name)
     else:
+        _check_kinds(fields, sizes, spatial, stored, name)
         voxels, more = gray_or_color(stored, stored.shape[3], file=name)
     return Volume.from_stored(voxels, affine, notes=notes + more)
 
