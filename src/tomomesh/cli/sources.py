@@ -87,7 +87,12 @@ def _plain(name: str) -> str:
 
 
 def sources_of(chosen: Namespace, settings: Settings) -> list[str]:
-    """Return the files that are read; refuse a label map without labels, and a command without any."""
+    """Return the files that are read; refuse a label map without labels, and a command without any.
+
+    Raises
+    ------
+    UsageError
+    """
     study = chosen.study if isinstance(chosen.study, tuple) else (chosen.study,)
     sources = [path for path in (*study, chosen.labels_in) if path]
     if not sources:

@@ -80,7 +80,12 @@ def _arrays(fields: Fields) -> list[tuple[str, str, NDArray[np.float32]]]:
 
 
 def read_gifti(data: bytes, file: str) -> Arrays:
-    """Read the vertices and faces of a surface, in its own millimeters; positions are not moved by its matrix."""
+    """Read the vertices and faces of a surface, in its own millimeters; positions are not moved by its matrix.
+
+    Raises
+    ------
+    FormatError
+    """
     from nibabel.gifti import GiftiImage
 
     with third_party("nibabel", file):
