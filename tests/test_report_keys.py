@@ -44,8 +44,8 @@ def ball() -> Volume:
 def cloud(name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Return a sphere's samples, some of them, contours of them, their shadow on a plane, or points that fill it."""
     if name == "filled":
-        places = np.argwhere(np.ones((11, 11, 11))) - 5.0
-        return places[(places**2).sum(axis=1) < 25]
+        lattice = np.indices((11, 11, 11)).reshape(3, -1).T - 5.0
+        return np.asarray(lattice[(lattice**2).sum(axis=1) < 25])
     points = np.random.default_rng(0).normal(size=(1200, 3))
     points /= np.sqrt((points**2).sum(axis=1))[:, None]
     if name == "stack":
@@ -56,8 +56,8 @@ def cloud(name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
         )
     if name == "half planes":
         turn, angle = np.meshgrid(np.arange(12) * np.pi / 12, np.linspace(0, 2 * np.pi, 60, endpoint=False))
-        flat, turn = np.stack([np.sin(angle.ravel()), np.cos(angle.ravel())]), turn.ravel()
-        return np.column_stack([flat[0] * np.cos(turn), flat[0] * np.sin(turn), flat[1]])
+        away = np.sin(angle)
+        return np.stack([away * np.cos(turn), away * np.sin(turn), np.cos(angle)], axis=-1).reshape(-1, 3)
     kept = points[:, 2] > {"sheet": 0, "fill_holes": -0.8}.get(name, -np.inf)
     return points[kept] * [1, 1, name != "flat"]
 
