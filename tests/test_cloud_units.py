@@ -114,7 +114,9 @@ class TestStated:
     ])  # fmt: skip
     def test_by_the_names_of_columns(self, tmp_path: Path, head: str, unit: str | None) -> None:
         (tmp_path / "c.csv").write_text(f"{head}\n1;2;3\n")
-        assert read_points(tmp_path / "c.csv").unit == unit
+        cloud = read_points(tmp_path / "c.csv")
+        assert cloud.unit == unit
+        assert any("cm, mm: none was taken" in note for note in cloud.notes) == ("z_cm" in head and "y_mm" in head)
 
     @pytest.mark.parametrize(("unit", "taken", "scale"), [("nm", "um", 1e-3), ("yd", "m", 0.9144), ("km", "m", 1e3)])
     def test_lengths_that_no_mesh_is_written_in_become_the_next(self, unit: str, taken: str, scale: float) -> None:

@@ -75,8 +75,12 @@ def named_positions(names: Sequence[str]) -> PositionColumns | None:
         places = [next((n for n, name in enumerate(plain) if name in words), -1) for words in triple]
         if min(places) >= 0 and len(set(places)) == 3:
             named = {units[place] for place in places}
-            degrees = triple[0] is LONGITUDE
-            return PositionColumns(tuple(places), "degree" if degrees else named.pop() if len(named) == 1 else None)
+            if triple[0] is LONGITUDE:
+                return PositionColumns(tuple(places), "degree")
+            if len(named) == 1:
+                return PositionColumns(tuple(places), named.pop())
+            told = ", ".join(sorted(unit or "none" for unit in named))
+            return PositionColumns(tuple(places), notes=(f"the columns name several units, {told}: none was taken",))
     return None
 
 
