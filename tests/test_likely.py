@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import json
 import shlex
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import nibabel
 import numpy as np
 import pytest
 
+from test_io_nrrd import BALL, CORE, SHELL, layered, segment
 from tomomesh import io
 from tomomesh.cli import main
 from tomomesh.cli.faults import COMMANDS, USUAL
@@ -115,7 +117,7 @@ class TestOption:
 
 class TestLabels:
     def test_by_name(self, named: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        assert io.label_names(named) == {"spleen": 1, "liver": 5}
+        assert io.label_names(named) == {1: "spleen", 5: "liver"}
         for label in ("liver", "5", "Liver"):
             line = f"reconstruct --labels-in {named} --select {label} -o {tmp_path}/{label}.stl"
             assert main(line.split()) == 0
@@ -132,8 +134,21 @@ class TestLabels:
         assert "names none of its labels" in told
         assert "tomomesh inspect" in told
 
-    def test_of_a_segmentation_by_slicer(self, tmp_path: Path) -> None:
-        first = b"Segment0_LabelValue:=1\nSegment0_Name:=Segment one\n"
-        head = b"NRRD0004\n" + first + b"Segment1_LabelValue:=7\r\nSegment1_Name:=tumor\n\n"
-        (tmp_path / "s.seg.nrrd").write_bytes(head + b"Segment2_Name:=no\nSegment2_LabelValue:=3\n")
-        assert io.label_names(tmp_path / "s.seg.nrrd") == {"Segment one": 1, "tumor": 7}
+    @pytest.mark.parametrize("labels", [(1, 7), (1, 1)])
+    def test_of_a_segmentation_by_slicer_whose_layers_share_labels(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str], labels: tuple[int, int]
+    ) -> None:
+        told = segment(0, "Whole ball", labels[0], 0) | segment(1, "core", labels[1], 1)
+        path = layered(tmp_path / "s.seg.nrrd", [BALL * labels[0], CORE * labels[1]], **told)
+        number = labels[1] if labels[1] > 1 else 2
+        assert io.label_names(path) == {1: "Whole ball", number: "core"}
+        for name, mask in (("whole_ball", BALL), ("CORE", CORE)):
+            line = f"reconstruct {path} --select {name} -o {tmp_path}/m.stl --report {tmp_path}/r.json --way voxels"
+            assert main(line.split()) == 0
+            report = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
+            assert report["window"]["window_voxels"] == np.count_nonzero(mask)
+
+    def test_that_two_have_is_no_label(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        told = segment(0, "rib", 1, 0) | segment(1, "rib", 2, 0)
+        path = layered(tmp_path / "s.seg.nrrd", [SHELL + 2 * CORE], **told)
+        assert "rib (1), rib (2)" in said(f"reconstruct {path} -o m.stl --select rib", 2, capsys)

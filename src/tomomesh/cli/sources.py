@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from .. import io
 from ..errors import UsageError
+from ..io.names import shown
 
 if TYPE_CHECKING:
     import numpy as np
@@ -64,24 +65,34 @@ def numbered(chosen: Namespace) -> Namespace:
     return Namespace(**vars(chosen) | {"select": tuple(_number_of(label, known, str(path)) for label in asked)})
 
 
-def _number_of(label: int | str, known: dict[str, int], path: str) -> int:
+def _number_of(label: int | str, known: dict[int, str], path: str) -> int:
     if isinstance(label, int):
         return label
-    plain = {name.lower().replace(" ", "_"): number for name, number in known.items()}
-    wanted = label.lower().replace(" ", "_")
-    if wanted in plain:
-        return plain[wanted]
-    near = get_close_matches(wanted, plain, 3, 0.5)
-    told = ", ".join(f"{name} ({plain[name]})" for name in near)
+    names = {number: _plain(name) for number, name in known.items()}
+    found = [number for number, name in names.items() if name == _plain(label)]
+    if len(found) == 1:
+        return found[0]
+    near = {*get_close_matches(_plain(label), names.values(), 3, 0.5)}
+    told = ", ".join(f"{name} ({number})" for number, name in names.items() if name in near)
+    what = "the label map names none of its labels" if not known else "the label map has no label of that name"
     raise UsageError(
-        "the label map has no label of that name" if known else "the label map names none of its labels",
-        file=path, found=f"--select {label}",
+        "several labels have that name" if found else what, file=path, found=f"--select {label}",
         hint=told or f"`tomomesh inspect {shlex.quote(path)}`, which counts its labels, and --select N",
     )  # fmt: skip
 
 
+def _plain(name: str) -> str:
+    """Return a name as it is compared: as it is shown, in small letters, and without spaces."""
+    return shown(name).lower().replace(" ", "_")
+
+
 def sources_of(chosen: Namespace, settings: Settings) -> list[str]:
-    """Return the files that are read; refuse a label map without labels, and a command without any."""
+    """Return the files that are read; refuse a label map without labels, and a command without any.
+
+    Raises
+    ------
+    UsageError
+    """
     study = chosen.study if isinstance(chosen.study, tuple) else (chosen.study,)
     sources = [path for path in (*study, chosen.labels_in) if path]
     if not sources:
