@@ -87,7 +87,7 @@ FAULTS: dict[str, tuple[bytes, type[TomomeshError], str]] = {
     "unit.nrrd": (nrrd(f'{NRRD}space units: "mm" "mm" "parsec"\n'), GeometryError, "unit"),
     "type.nrrd": (nrrd(NRRD.replace("short", "block")), FormatError, "type = block"),
     "endian.nrrd": (nrrd(NRRD.replace("little", "middle")), FormatError, "byte order"),
-    "encoding.nrrd": (nrrd(NRRD.replace("raw", "hex")), FormatError, "encoding = hex"),
+    "encoding.nrrd": (nrrd(NRRD.replace("raw", "lzma")), FormatError, "encoding = lzma"),
     "skip.nrrd": (nrrd(f"{NRRD}byte skip: -7\n"), FormatError, "byteskip"),
     "far.nrrd": (nrrd(f"{NRRD}byte skip: 999999999\n"), FormatError, "cut off"),
     "lines.nrrd": (nrrd(f"{NRRD}line skip: 9999\n"), FormatError, "fewer lines"),

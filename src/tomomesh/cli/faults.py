@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from difflib import get_close_matches
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import NO_ROOM, FormatError, InternalCheckError, OutputError, ResourceError, TomomeshError
-from ..io.files.source import suffix_of
+from ..io.files.source import existing, suffix_of
 from .formats import CHECKED_FORMATS, CLOUD_FORMATS, HEADER_FORMATS, STUDY_FORMATS
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def likely_option(word: str, known: Collection[str]) -> str:
 
 def likely_command(word: str, known: Collection[str]) -> str:
     """Return the command line that was likely meant by a word that is no command; "" where none is."""
-    if Path(word).exists():
+    if os.access(word, os.F_OK):
         suffix = suffix_of(word)
         command = "surface" if suffix in CLOUDS - STUDIES - MESHES else "check" if suffix in MESHES else "reconstruct"
         return f"tomomesh {command} {word}" + ("" if command == "check" else " -o mesh.stl")
@@ -79,16 +79,17 @@ def require_kind(chosen: Namespace) -> None:
     """
     argument, own = KINDS.get(chosen.command, ("", set()))
     path = getattr(chosen, argument, None)
-    if not isinstance(path, str) or not Path(path).exists():
+    if not isinstance(path, str):
         return
-    suffix = ".dcm" if chosen.command == "surface" and Path(path).is_dir() else suffix_of(path)
-    if suffix == ".dcm" and not Path(path).is_dir():
+    is_folder = existing(path).is_dir()
+    suffix = ".dcm" if chosen.command == "surface" and is_folder else suffix_of(path)
+    if suffix == ".dcm" and not is_folder:
         return  # it may hold contours
     other = _reading(suffix) if suffix not in own else ""
     if other:
         raise FormatError(
             f"`tomomesh {chosen.command}` does not read such a file", file=path,
-            found="a folder" if Path(path).is_dir() else f"suffix = {suffix}",
+            found="a folder" if is_folder else f"suffix = {suffix}",
             hint=f"tomomesh {other} {path}" + ("" if other == "check" else " -o mesh.stl"),
         )  # fmt: skip
 

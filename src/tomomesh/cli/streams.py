@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import OutputError, TomomeshError, UsageError, printable
 from ..io.files.private import private_folder
-from ..io.files.source import existing_file, suffix_of
+from ..io.files.source import existing, existing_file, suffix_of
 from .formats import TEXTS
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def _of_named_format(chosen: Namespace) -> str:
     if not named or not source:
         return ""
     path = getattr(chosen, source)
-    if not isinstance(path, str) or Path(path).is_dir():
+    if not isinstance(path, str) or existing(path).is_dir():
         raise UsageError("a format is that of one file", found=f"--input-format {named}", expected="a file, or -")
     return "" if suffix_of(path) == f".{named}" else source
 

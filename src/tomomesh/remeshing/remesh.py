@@ -224,7 +224,7 @@ def _ground(mesh: TriMesh, edge: float | None, most: int | None, threads: int) -
     if edge is not None and most is None:
         return ground.scaled(edge / even_edge(area, ground.forecast())).with_specks(SPECK, ROUND)
     fewest = min(len(mesh.faces), AIM * (most or np.inf))
-    ground = ground.scaled(max(ground.forecast() / fewest, 1.0) ** 0.5)
+    ground = ground.scaled((ground.forecast() / fewest) ** 0.5)
     return ground if most is not None else ground.with_specks(SPECK, ROUND)
 
 
