@@ -32,6 +32,26 @@ def ball() -> NDArray[np.uint8]:
     return found
 
 
+HEAD = b"NRRD0004\ntype: uint8\ndimension: 3\nencoding: raw\nspace: left-posterior-superior\n"
+
+
+def layered(folder: Path, names: list[str]) -> Path:
+    """Write cubes of 10, 6, ... voxels in layers of their own, all with the label 1, as Slicer does."""
+    layers = np.zeros((14, 14, 14, len(names)), np.uint8)
+    for layer in range(len(names)):
+        layers[
+            2 + 2 * layer : 12 - 2 * layer, 2 + 2 * layer : 12 - 2 * layer, 2 + 2 * layer : 12 - 2 * layer, layer
+        ] = 1
+    told = "".join(
+        f"Segment{n}_Name:={name}\nSegment{n}_LabelValue:=1\nSegment{n}_Layer:={n}\n" for n, name in enumerate(names)
+    )
+    axes = "space directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: list domain domain domain\n"
+    space = f"sizes: {len(names)} 14 14 14\n{axes}"
+    head = HEAD.replace(b"dimension: 3", b"dimension: 4") + space.encode() + told.encode() + b"\n"
+    (folder / "layers.seg.nrrd").write_bytes(head + layers.tobytes())
+    return folder / "layers.seg.nrrd"
+
+
 @pytest.fixture
 def named(tmp_path: Path) -> Path:
     image = nibabel.Nifti1Image(ball(), np.eye(4))
@@ -115,7 +135,7 @@ class TestOption:
 
 class TestLabels:
     def test_by_name(self, named: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        assert io.label_names(named) == {"spleen": 1, "liver": 5}
+        assert io.label_names(named) == {1: "spleen", 5: "liver"}
         for label in ("liver", "5", "Liver"):
             line = f"reconstruct --labels-in {named} --select {label} -o {tmp_path}/{label}.stl"
             assert main(line.split()) == 0
@@ -134,6 +154,19 @@ class TestLabels:
 
     def test_of_a_segmentation_by_slicer(self, tmp_path: Path) -> None:
         first = b"Segment0_LabelValue:=1\nSegment0_Name:=Segment one\n"
-        head = b"NRRD0004\n" + first + b"Segment1_LabelValue:=7\r\nSegment1_Name:=tumor\n\n"
+        head = HEAD + b"sizes: 2 2 2\n" + first + b"Segment1_LabelValue:=7\nSegment1_Name:=tumor\n\n"
         (tmp_path / "s.seg.nrrd").write_bytes(head + b"Segment2_Name:=no\nSegment2_LabelValue:=3\n")
-        assert io.label_names(tmp_path / "s.seg.nrrd") == {"Segment one": 1, "tumor": 7}
+        assert io.label_names(tmp_path / "s.seg.nrrd") == {1: "Segment one", 7: "tumor"}
+
+    def test_of_layers_is_that_of_its_layer(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        file = layered(tmp_path, ["Ball", "Core"])
+        assert io.label_names(file) == {1: "Ball", 2: "Core"}
+        line = f"reconstruct {file} --select core --network none --mask-out {tmp_path}/m.nii -o {tmp_path}/m.stl"
+        assert main(line.split()) == 0
+        assert "label(s) 2" in capsys.readouterr().out
+        assert np.count_nonzero(nibabel.load(tmp_path / "m.nii").get_fdata()) == pytest.approx(6**3, rel=0.2)
+
+    def test_a_name_of_two_is_refused(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        told = said(f"reconstruct {layered(tmp_path, ['Node', 'node'])} --select Node -o m.stl", 2, capsys)
+        assert "several labels of the label map have that name" in told
+        assert told.endswith("Try: node (1), node (2).")

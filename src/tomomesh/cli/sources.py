@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from .. import io
 from ..errors import UsageError
+from ..io.names import shown
 
 if TYPE_CHECKING:
     import numpy as np
@@ -54,7 +55,7 @@ def numbered(chosen: Namespace) -> Namespace:
     Raises
     ------
     UsageError
-        For a name that it does not have.
+        For a name that it does not have, or has twice.
     """
     asked = getattr(chosen, "select", ())
     if not any(isinstance(label, str) for label in asked):
@@ -64,20 +65,27 @@ def numbered(chosen: Namespace) -> Namespace:
     return Namespace(**vars(chosen) | {"select": tuple(_number_of(label, known, str(path)) for label in asked)})
 
 
-def _number_of(label: int | str, known: dict[str, int], path: str) -> int:
+def _number_of(label: int | str, known: dict[int, str], path: str) -> int:
     if isinstance(label, int):
         return label
-    plain = {name.lower().replace(" ", "_"): number for name, number in known.items()}
-    wanted = label.lower().replace(" ", "_")
-    if wanted in plain:
-        return plain[wanted]
-    near = get_close_matches(wanted, plain, 3, 0.5)
-    told = ", ".join(f"{name} ({plain[name]})" for name in near)
+    numbers: dict[str, list[int]] = {}
+    for number, name in known.items():
+        numbers.setdefault(_plain(name), []).append(number)
+    called = numbers.get(_plain(label), [])
+    if len(called) == 1:
+        return called[0]
+    near = [_plain(label)] if called else get_close_matches(_plain(label), numbers, 3, 0.5)
+    fault = "several labels of the label map have that name" if called else "the label map has no label of that name"
     raise UsageError(
-        "the label map has no label of that name" if known else "the label map names none of its labels",
+        fault if known else "the label map names none of its labels",
         file=path, found=f"--select {label}",
-        hint=told or f"`tomomesh inspect {shlex.quote(path)}`, which counts its labels, and --select N",
+        hint=", ".join(f"{name} ({number})" for name in near for number in numbers[name])
+        or f"`tomomesh inspect {shlex.quote(path)}`, which counts its labels, and --select N",
     )  # fmt: skip
+
+
+def _plain(name: str) -> str:
+    return shown(name).lower().replace(" ", "_")
 
 
 def sources_of(chosen: Namespace, settings: Settings) -> list[str]:

@@ -10,6 +10,7 @@ from ..dicom import is_dicom, is_segmentation
 from ..dicom.objects.segmentation import segments_of
 from ..files.source import existing, first_bytes, suffix_of
 from ..files.unpack import GZIP, unpacked
+from ..volumes.nrrd.nrrd import segment_names
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,25 +19,29 @@ MOST = 1 << 20
 """Bytes of a header that are looked at: names of thousands of labels."""
 IN_NIFTI = re.compile(rb'<Label\s[^>]*?Key="(\d+)"[^>]*>(?:<!\[CDATA\[)?([^<\]]+)')
 """A row of the label table that TotalSegmentator and Connectome Workbench write into a NIfTI extension."""
-IN_NRRD = re.compile(rb"^(Segment\d+)_(Name|LabelValue):=(.*?)\r?$", re.MULTILINE)
-"""What 3D Slicer writes into the header of a segmentation."""
 
 
-def label_names(path: str | Path) -> dict[str, int]:
-    """Return the names of a label map's labels with their numbers; none where its file names none.
+def label_names(path: str | Path) -> dict[int, str]:
+    """Return what a label map's labels are called, by their numbers; none where its file names none.
 
-    Names come from the label table in a NIfTI extension, the segments of a .seg.nrrd, and a DICOM segmentation.
+    Names come from the label table in a NIfTI extension, the segments of a .seg.nrrd, and a DICOM segmentation. The
+    numbers are those that a study of the file is read with.
+
+    Raises
+    ------
+    FormatError
+        For a broken header.
     """
     file, suffix = existing(path), suffix_of(path)
     if file.is_dir():
         return {}
     if suffix in (".nii", ".nii.gz"):
         table = IN_NIFTI.findall(_start(file, suffix == ".nii.gz"))
-        return {unescape(name.decode("utf-8", "replace")).strip(): int(number) for number, name in table}
+        return {int(number): unescape(name.decode("utf-8", "replace")).strip() for number, name in table}
     if suffix in (".nrrd", ".nhdr"):
-        return _segments(_start(file, packed=False).partition(b"\n\n")[0])
+        return segment_names(file)
     if is_dicom(file) and is_segmentation(file):
-        return {name: number for number, name in segments_of(file).items()}
+        return segments_of(file)
     return {}
 
 
@@ -45,11 +50,3 @@ def _start(file: Path, packed: bool) -> bytes:
         return first_bytes(file, MOST)
     with unpacked(file, GZIP, file=str(file)) as stream:
         return bytes(stream.read(MOST))
-
-
-def _segments(header: bytes) -> dict[str, int]:
-    found: dict[bytes, dict[bytes, bytes]] = {}
-    for segment, field, value in IN_NRRD.findall(header):
-        found.setdefault(segment, {})[field] = value.strip()
-    whole = [each for each in found.values() if {b"Name", b"LabelValue"} <= set(each) and each[b"LabelValue"].isdigit()]
-    return {each[b"Name"].decode("utf-8", "replace"): int(each[b"LabelValue"]) for each in whole}

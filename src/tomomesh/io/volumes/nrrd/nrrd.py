@@ -104,6 +104,19 @@ def read_nrrd(path: Path, settings: ReadSettings, select: Sequence[int] | None =
     return Volume.from_stored(voxels, affine, notes=notes + more)
 
 
+def segment_names(path: Path) -> dict[int, str]:
+    """Return what the segments of a file are called, by the numbers that `read_nrrd` gives their voxels.
+
+    Raises
+    ------
+    FormatError
+        For a broken header.
+    """
+    name = str(path)
+    fields, _ = _parse(header_bytes(path), name)
+    return {number: segment.name for number, segment in segments_in(fields, file=name).items()}
+
+
 def _parse(start: bytes, name: str) -> tuple[HeaderFields, int]:
     """Return the fields, their names without spaces, and the keys, as they are; with the bytes up to the voxels.
 
