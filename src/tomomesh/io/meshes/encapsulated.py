@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ... import __version__
-from ...errors import FormatError, UsageError
+from ...errors import FormatError, TomomeshError, UsageError
+from ..dicom.headers.kinds import storage_class
 from ..files.atomic import check_output, replacing
 from ..files.source import third_party
 from .attributes import MeshAttributes
@@ -14,13 +16,14 @@ from .stl import read_stl, stl_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
     from ...model.mesh import TriMesh
     from .through_trimesh import Arrays
 
 ARCHIVED = (".dcm",)
 """Suffixes of meshes for an archive."""
+LENGTHS = ("mm", "cm", "m")
+"""Codes of the units of length (UCUM) that tomomesh knows."""
 ENCAPSULATED_STL = "1.2.840.10008.5.1.4.1.1.104.3"
 MIME = "model/stl"
 PLACE = ("StudyInstanceUID", "FrameOfReferenceUID", "PositionReferenceIndicator")
@@ -135,6 +138,27 @@ def _series(identifier: str, sources: Sequence[tuple[str, str]]) -> Any:
     series = Dataset()
     series.SeriesInstanceUID, series.ReferencedInstanceSequence = identifier, [_reference(*one) for one in sources]
     return series
+
+
+def is_archived(path: str | Path) -> bool:
+    """Tell whether a file is a DICOM Encapsulated STL; one that cannot be read is none."""
+    try:
+        return storage_class(Path(path)) == ENCAPSULATED_STL
+    except TomomeshError:
+        return False
+
+
+def encapsulated_frame(data: bytes, file: str) -> dict[str, str]:
+    """Return the unit and the frame of a DICOM Encapsulated STL: the standard's, LPS, whatever wrote it.
+
+    The unit is one of `LENGTHS`; another, or none, is not named.
+    """
+    import pydicom
+
+    with third_party("pydicom", file):
+        found = pydicom.dcmread(io.BytesIO(data), force=True, specific_tags=["MeasurementUnitsCodeSequence"])
+        code = next((str(item.get("CodeValue")) for item in found.get("MeasurementUnitsCodeSequence") or []), "")
+    return {"frame": "LPS"} | ({"unit": code} if code in LENGTHS else {})
 
 
 def read_encapsulated(data: bytes, file: str) -> Arrays:
