@@ -268,7 +268,7 @@ class TestSharedStudies:
         assert (series.slices, series.size, series.refused) == (20, (512, 512), None)
 
 
-@pytest.mark.parametrize(("edge", "extent"), [(5e-7, "3e-06 x 3e-06 x 3e-06"), (4000.0, "24000 x 24000 x 24000")])
+@pytest.mark.parametrize(("edge", "extent"), [(5e-6, "3e-05 x 3e-05 x 3e-05"), (4000.0, "24000 x 24000 x 24000")])
 def test_the_extent_of_a_micrograph_is_not_nothing(
     tmp_path: Path, capsys: CaptureFixture[str], edge: float, extent: str
 ) -> None:
