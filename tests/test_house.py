@@ -49,7 +49,7 @@ GONE = {"tomomesh.io.stated", "QuadMesh.cubes"}
 FOREIGN = {
     "fastmath", "parallel",  # options of Numba
     "apply_rescale", "vtkContourFilter", "vtkFlyingEdges3D", "vtkMarchingCubes", "vtkSynchronizedTemplates3D",
-    "AnatomicalOrientation", "CenterOfRotation", "thicknesses",  # fields of formats
+    "AnatomicalOrientation", "CenterOfRotation", "thicknesses", "qfac",  # fields of formats
     "dev54_t1", "dev54_synth_t1", "visit2", "X_mm",  # of files
     "_deg", "_mm2", "_mm3", "_NAME",  # ends of names
     "wall_p1_mm", "changed",  # a key with a number in it; what findings/run prints

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import io
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ... import __version__
 from ...errors import FormatError, TomomeshError, UsageError
-from ..dicom.headers.kinds import storage_class
 from ..files.atomic import check_output, replacing
 from ..files.source import third_party
 from .attributes import MeshAttributes
@@ -16,6 +14,7 @@ from .stl import read_stl, stl_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from ...model.mesh import TriMesh
     from .through_trimesh import Arrays
@@ -142,9 +141,13 @@ def _series(identifier: str, sources: Sequence[tuple[str, str]]) -> Any:
 
 def is_archived(path: str | Path) -> bool:
     """Tell whether a file is a DICOM Encapsulated STL; one that cannot be read is none."""
+    import pydicom
+
     try:
-        return storage_class(Path(path)) == ENCAPSULATED_STL
-    except TomomeshError:
+        with third_party("pydicom", str(path)):
+            found = pydicom.dcmread(path, force=True, specific_tags=["SOPClassUID"], stop_before_pixels=True)
+            return str(found.get("SOPClassUID")) == ENCAPSULATED_STL
+    except (TomomeshError, OSError):
         return False
 
 
