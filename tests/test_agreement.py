@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -223,6 +224,11 @@ class TestCommand:
         mesh = read_mesh(made / "lps.stl")
         write_mesh(mesh.moved(mesh.vertices / 10), made / "cm.ply", unit="cm")
         assert checked(made, "cm.ply", "ras.stl", capsys)["max_mm"] < 1e-4
+        trimesh.Trimesh(mesh.vertices / 25.4, mesh.faces, process=False).export(made / "millimeters.3mf")
+        with zipfile.ZipFile(made / "millimeters.3mf") as old, zipfile.ZipFile(made / "in.3mf", "w") as new:
+            for name in old.namelist():
+                new.writestr(name, old.read(name).replace(b'unit="millimeter"', b'unit="inch"'))
+        assert checked(made, "in.3mf", "lps.stl", capsys)["max_mm"] < 1e-4
         fails(["check", str(made / "ras.stl"), "--against", str(made / "voxel.stl")], 5, capsys)
 
     def test_a_mesh_counted_from_a_corner_is_brought_back(self, made: Path, capsys: CaptureFixture[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import nibabel
@@ -19,6 +20,7 @@ from tomomesh.errors import GeometryError
 from tomomesh.io import read_points
 from tomomesh.settings import Settings
 from tomomesh.ways.points import take_points
+from writers import needed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,10 +35,6 @@ def sphere(radius: float = 3.0, count: int = 1500) -> NDArray[np.float64]:
     turn = np.arange(count) + 0.5
     z, angle = 1 - 2 * turn / count, 2.4 * turn
     return radius * np.column_stack([np.sqrt(1 - z**2) * np.cos(angle), np.sqrt(1 - z**2) * np.sin(angle), z])
-
-
-def package(name: str) -> Any:
-    return pytest.importorskip(name, reason=f"the package {name} is not installed", exc_type=ImportError)
 
 
 def unit_taken(cloud: PointSet, **changes: Any) -> tuple[str, NDArray[np.float64]]:
@@ -67,7 +65,7 @@ class TestStated:
         assert nearest.max() < 1e-6
 
     def test_by_an_e57(self, tmp_path: Path) -> None:
-        pye57 = package("pye57")
+        pye57 = needed("pye57")
         file = pye57.E57(str(tmp_path / "c.e57"), mode="w")
         file.write_scan_raw({f"cartesian{axis}": column for axis, column in zip("XYZ", sphere().T, strict=True)})
         file.close()
@@ -82,7 +80,7 @@ class TestStated:
     def test_by_a_las(
         self, tmp_path: Path, system: str, point_format: int, unit: str, meters: float, height: float
     ) -> None:
-        laspy, pyproj = package("laspy"), package("pyproj")
+        laspy, pyproj = needed("laspy"), needed("pyproj")
         header = laspy.LasHeader(point_format=point_format, version="1.4" if point_format > 5 else "1.2")
         header.scales = np.full(3, 1e-6)
         header.add_crs(pyproj.CRS.from_user_input(system))
@@ -98,7 +96,7 @@ class TestStated:
         np.testing.assert_array_equal(unit_taken(cloud, units="cm")[1], cloud.positions)
 
     def test_degrees_are_refused_unless_a_unit_is_given(self, tmp_path: Path) -> None:
-        laspy, pyproj = package("laspy"), package("pyproj")
+        laspy, pyproj = needed("laspy"), needed("pyproj")
         header = laspy.LasHeader(point_format=6, version="1.4")
         header.scales = np.full(3, 1e-6)
         header.add_crs(pyproj.CRS.from_epsg(4326))
@@ -112,10 +110,19 @@ class TestStated:
     @pytest.mark.parametrize(("head", "unit"), [
         ("X [m];Y [m];Z [m]", "m"), ("x_cm;y_cm;z_cm", "cm"), ("East (ft);North (ft);Height (ft)", "ft"),
         ("x;y;z", None), ("lon;lat;alt", "degree"), ("x_mm;y_mm;z_cm", None),
+        ("x (nm);y (nm);z (nm)", "nm"), ("X [Kilometres];Y [Kilometres];Z [Kilometres]", "km"),
     ])  # fmt: skip
     def test_by_the_names_of_columns(self, tmp_path: Path, head: str, unit: str | None) -> None:
         (tmp_path / "c.csv").write_text(f"{head}\n1;2;3\n")
-        assert read_points(tmp_path / "c.csv").unit == unit
+        cloud = read_points(tmp_path / "c.csv")
+        assert cloud.unit == unit
+        assert any("cm, mm: none was taken" in note for note in cloud.notes) == ("z_cm" in head and "y_mm" in head)
+
+    @pytest.mark.parametrize(("unit", "taken", "scale"), [("nm", "um", 1e-3), ("yd", "m", 0.9144), ("km", "m", 1e3)])
+    def test_lengths_that_no_mesh_is_written_in_become_the_next(self, unit: str, taken: str, scale: float) -> None:
+        told = unit_taken(replace(PointSet.from_positions(sphere()), unit=unit))
+        assert told[0] == taken
+        np.testing.assert_allclose(told[1], scale * sphere())
 
     def test_millimeters_where_nothing_is(self) -> None:
         assert unit_taken(PointSet.from_positions(sphere()))[0] == "mm"

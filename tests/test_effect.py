@@ -35,6 +35,7 @@ OTHER: dict[str, Any] = {
     "damping": 0.9, "step": 0.5, "springs": "triangles", "limit": "shorten", "allow_returns": True,
     "units": "cm", "local_origin": True, "allow_far": True,
     "largest": True, "surface": "outer", "divide": False, "seed": 99, "cell_from": "nearest", "tracking": "faces",
+    "thickness": 2.0,
 }  # fmt: skip
 """Another value of each parameter that may be without effect."""
 SOMETIMES = {*MATTERS, *(name for way in TABLE for name in way_of(way).reads)}
@@ -43,8 +44,8 @@ ALWAYS = {
     "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "nifti_form", "level", "fill_chunks",
     "structure", "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "fill_slices", "keep",
     "slices", "way", "network", "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow",
-    "drain", "least_wall", "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge", "thickness",
-    "precision",
+    "drain", "least_wall", "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge",
+    "precision", "one_piece", "fill_cavities", "thicken",
 }  # fmt: skip
 """Parameters that matter on every way, or that choose what is read, the way, or what becomes of the mesh."""
 STUDY: dict[str, dict[str, Any]] = {
@@ -65,7 +66,12 @@ STUDY: dict[str, dict[str, Any]] = {
     "space": {"network": "sphere", "neurons": 42},
     "nearest in space": {"network": "sphere", "neurons": 42, "attraction": "nearest"},
 }
-CLOUD: dict[str, dict[str, Any]] = {"cloud": {}, "nearest": {"attraction": "nearest"}, "sheet": {"open": True}}
+CLOUD: dict[str, dict[str, Any]] = {
+    "cloud": {},
+    "nearest": {"attraction": "nearest"},
+    "sheet": {"open": True},
+    "filled": {"filled": True},
+}
 POWERS = {"training": "online", "alpha_fall": "power", "radius_fall": "power"}
 WAYS = [*(("gray", asked) for asked in STUDY.values()), *(("cloud", asked) for asked in CLOUD.values()), ("stack", {})]
 """What is read, and what is asked for, on each way to a mesh."""

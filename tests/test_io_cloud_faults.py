@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from test_io_clouds import CLOUD, COUNT, RGB, e57_scan, package
+from test_io_clouds import CLOUD, COUNT, RGB, e57_scan
 from test_io_damage import damaged
 from tomomesh.errors import EmptyError, FormatError, ResourceError, TomomeshError
 from tomomesh.io import read_points
+from writers import needed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -145,8 +146,8 @@ class TestLas:
     @pytest.mark.parametrize("suffix", [".las", ".laz"])
     @pytest.mark.parametrize(("version", "kind"), [("1.2", 0), ("1.4", 6)])
     def test_lies_and_cut_ends(self, tmp_path: Path, suffix: str, version: str, kind: int) -> None:
-        laspy = package("laspy")
-        package("lazrs")
+        laspy = needed("laspy")
+        needed("lazrs")
         study = laspy.LasData(laspy.LasHeader(point_format=kind, version=version))
         study.x, study.y, study.z = CLOUD.T
         study.write(tmp_path / f"c{suffix}")
@@ -167,7 +168,7 @@ class TestLas:
                 read_points(tmp_path / f"c{suffix}")
 
     def test_no_points_is_empty(self, tmp_path: Path) -> None:
-        laspy = package("laspy")
+        laspy = needed("laspy")
         laspy.LasData(laspy.LasHeader(point_format=0, version="1.2")).write(tmp_path / "c.las")
         with pytest.raises(EmptyError):
             read_points(tmp_path / "c.las")
@@ -175,7 +176,7 @@ class TestLas:
 
 class TestE57:
     def test_what_is_no_whole_e57_is_refused(self, tmp_path: Path) -> None:
-        pye57 = package("pye57")
+        pye57 = needed("pye57")
         with pye57.E57(str(tmp_path / "c.e57"), "w") as file:
             file.write_scan_raw(e57_scan(CLOUD))
         raw = (tmp_path / "c.e57").read_bytes()
@@ -185,7 +186,7 @@ class TestE57:
                 read_points(tmp_path / "c.e57")
 
     def test_no_scans_are_empty(self, tmp_path: Path) -> None:
-        with package("pye57").E57(str(tmp_path / "c.e57"), "w"):
+        with needed("pye57").E57(str(tmp_path / "c.e57"), "w"):
             pass
         with pytest.raises(EmptyError):
             read_points(tmp_path / "c.e57")
@@ -195,13 +196,13 @@ def written(folder: Path, name: str) -> bytes:
     """Return the bytes of a good cloud."""
     path, suffix = folder / name, name.partition(".")[2]
     if suffix in ("las", "laz"):
-        package("lazrs")
-        laspy: Any = package("laspy")
+        needed("lazrs")
+        laspy: Any = needed("laspy")
         study = laspy.LasData(laspy.LasHeader(point_format=7, version="1.4"))
         study.x, study.y, study.z = CLOUD.T
         study.write(path)
     elif suffix == "e57":
-        with package("pye57").E57(str(path), "w") as file:
+        with needed("pye57").E57(str(path), "w") as file:
             file.write_scan_raw(e57_scan(CLOUD))
     elif suffix == "pcd":
         path.write_bytes(PCD.format(COUNT, 1, COUNT, "binary").encode() + CLOUD.astype("<f4").tobytes())

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from conftest import law
 from tomomesh.errors import FormatError
 from tomomesh.io import read_points
+from writers import needed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,10 +29,6 @@ CLOUD = RNG.normal(scale=40, size=(COUNT, 3))
 RGB = RNG.integers(0, 256, (COUNT, 3)).astype(np.uint8)
 INTENSITY = RNG.random(COUNT).astype(np.float32)
 LABELS = RNG.integers(0, 9, COUNT)
-
-
-def package(name: str) -> Any:
-    return pytest.importorskip(name, reason=f"the package {name} is not installed", exc_type=ImportError)
 
 
 def check_colors(attributes: Any, colors: NDArray[np.uint8] = RGB) -> None:
@@ -77,7 +74,7 @@ class TestArrays:
 class TestPcd:
     @pytest.mark.parametrize("encoding", ["ascii", "binary", "binary_compressed"])
     def test_what_pypcd4_wrote(self, tmp_path: Path, encoding: str) -> None:
-        pypcd4 = package("pypcd4")
+        pypcd4 = needed("pypcd4")
         packed = pypcd4.PointCloud.encode_rgb(RGB)
         single = CLOUD.astype(np.float32)
         rows = [*single.T, packed, INTENSITY, LABELS.astype(np.uint16), *single.T]
@@ -121,7 +118,7 @@ class TestPcd:
         self, tmp_path_factory: pytest.TempPathFactory, counts: list[int], names: list[str], packed: bool, points: int
     ) -> None:
         """The twin follows PCL: packed, one field after the other, in it all values of one point after the other's."""
-        package("pypcd4")
+        needed("pypcd4")
         fields = {name: (points, count) for name, count in zip(names, counts, strict=False)}
         shapes = {**fields, "x": (points, 1), "y": (points, 1), "z": (points, 1)}
         rng = np.random.default_rng(points)
@@ -159,8 +156,8 @@ class TestLas:
     @pytest.mark.parametrize("suffix", [".las", ".laz"])
     @pytest.mark.parametrize(("version", "kind"), [("1.2", 2), ("1.4", 7), ("1.4", 8)])
     def test_what_laspy_wrote(self, tmp_path: Path, suffix: str, version: str, kind: int) -> None:
-        laspy = package("laspy")
-        package("lazrs")
+        laspy = needed("laspy")
+        needed("lazrs")
         header = laspy.LasHeader(point_format=kind, version=version)
         header.scales, header.offsets = [1e-3] * 3, [1e6, 0, -5]
         header.add_extra_dim(laspy.ExtraBytesParams("height", "f4"))
@@ -180,7 +177,7 @@ class TestLas:
         np.testing.assert_array_equal(points.attributes["slope"], np.stack([LABELS, -LABELS], axis=1))
 
     def test_colors_of_8_bits_in_16_are_not_scaled(self, tmp_path: Path) -> None:
-        laspy = package("laspy")
+        laspy = needed("laspy")
         study = laspy.LasData(laspy.LasHeader(point_format=2, version="1.2"))
         study.x, study.y, study.z = CLOUD.T
         study.red, study.green, study.blue = RGB.T
@@ -199,7 +196,7 @@ def e57_scan(cloud: NDArray[np.float64], **fields: NDArray[Any]) -> dict[str, ND
 
 class TestE57:
     def test_all_scans_at_their_poses_without_invalid_points(self, tmp_path: Path) -> None:
-        pye57 = package("pye57")
+        pye57 = needed("pye57")
         colors = dict(zip(("colorRed", "colorGreen", "colorBlue"), RGB.T, strict=True))
         single = CLOUD.astype(np.float32).astype(np.float64)
         with pye57.E57(str(tmp_path / "c.e57"), "w") as file:
@@ -217,7 +214,7 @@ class TestE57:
         check_colors(points.attributes, np.concatenate([RGB[valid], RGB]))
 
     def test_intensity(self, tmp_path: Path) -> None:
-        pye57 = package("pye57")
+        pye57 = needed("pye57")
         with pye57.E57(str(tmp_path / "c.e57"), "w") as file:
             file.write_scan_raw(e57_scan(CLOUD, intensity=INTENSITY))
         attributes = read_points(tmp_path / "c.e57").attributes
@@ -225,7 +222,7 @@ class TestE57:
         assert attributes["intensity"].dtype == np.float32
 
     def test_spherical_coordinates(self, tmp_path: Path) -> None:
-        pye57 = package("pye57")
+        pye57 = needed("pye57")
         write_spherical(pye57, str(tmp_path / "c.e57"), [2.0, 3.0, 4.0], [0.0, np.pi / 2, 0.0], [0.0, 0.0, np.pi / 2])
         positions = read_points(tmp_path / "c.e57").positions
         np.testing.assert_allclose(positions, [[2, 0, 0], [0, 3, 0], [0, 0, 4]], atol=1e-12)
@@ -284,7 +281,7 @@ class TestMissingPackages:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, missing: str
     ) -> None:
         if missing == "lazrs":
-            package("laspy")
+            needed("laspy")
         monkeypatch.setitem(sys.modules, missing, None)
         pcd = b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA binary_compressed\n"
         head = pcd + struct.pack("<II", 12, 12) if suffix == ".pcd" else b"LASF"

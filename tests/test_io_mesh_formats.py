@@ -204,7 +204,7 @@ class TestVtp:
 
 
 class Test3mf:
-    @pytest.mark.parametrize(("unit", "mm"), [("um", 0.001), ("mm", 1), ("cm", 10), ("m", 1000)])
+    @pytest.mark.parametrize(("unit", "mm"), [("um", 0.001), ("mm", 1), ("cm", 10), ("m", 1000), ("in", 25.4)])
     def test_lib3mf_reads_it_without_a_warning_in_millimeters(self, tmp_path: Path, unit: str, mm: float) -> None:
         lib3mf = pytest.importorskip("lib3mf", reason="the package lib3mf is not installed")
         mesh = lopsided()

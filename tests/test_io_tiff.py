@@ -11,7 +11,7 @@ from PIL import Image
 from studies import assert_in_place, sampled
 from tomomesh.errors import FormatError, GeometryError
 from tomomesh.io import read_volume
-from tomomesh.io.volumes.units import millimeters
+from tomomesh.model.units import millimeters
 from tomomesh.settings import ReadSettings
 from writers import needed
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import json
 import shlex
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import nibabel
 import numpy as np
 import pytest
 
+from test_io_nrrd import BALL, CORE, SHELL, layered, segment
 from tomomesh import io
 from tomomesh.cli import main
 from tomomesh.cli.faults import COMMANDS, USUAL
@@ -30,26 +32,6 @@ def ball() -> NDArray[np.uint8]:
     found[2:10, 2:10, 2:10] = 5
     found[0, 0, 0] = 1
     return found
-
-
-HEAD = b"NRRD0004\ntype: uint8\ndimension: 3\nencoding: raw\nspace: left-posterior-superior\n"
-
-
-def layered(folder: Path, names: list[str]) -> Path:
-    """Write cubes of 10, 6, ... voxels in layers of their own, all with the label 1, as Slicer does."""
-    layers = np.zeros((14, 14, 14, len(names)), np.uint8)
-    for layer in range(len(names)):
-        layers[
-            2 + 2 * layer : 12 - 2 * layer, 2 + 2 * layer : 12 - 2 * layer, 2 + 2 * layer : 12 - 2 * layer, layer
-        ] = 1
-    told = "".join(
-        f"Segment{n}_Name:={name}\nSegment{n}_LabelValue:=1\nSegment{n}_Layer:={n}\n" for n, name in enumerate(names)
-    )
-    axes = "space directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: list domain domain domain\n"
-    space = f"sizes: {len(names)} 14 14 14\n{axes}"
-    head = HEAD.replace(b"dimension: 3", b"dimension: 4") + space.encode() + told.encode() + b"\n"
-    (folder / "layers.seg.nrrd").write_bytes(head + layers.tobytes())
-    return folder / "layers.seg.nrrd"
 
 
 @pytest.fixture
@@ -152,21 +134,21 @@ class TestLabels:
         assert "names none of its labels" in told
         assert "tomomesh inspect" in told
 
-    def test_of_a_segmentation_by_slicer(self, tmp_path: Path) -> None:
-        first = b"Segment0_LabelValue:=1\nSegment0_Name:=Segment one\n"
-        head = HEAD + b"sizes: 2 2 2\n" + first + b"Segment1_LabelValue:=7\nSegment1_Name:=tumor\n\n"
-        (tmp_path / "s.seg.nrrd").write_bytes(head + b"Segment2_Name:=no\nSegment2_LabelValue:=3\n")
-        assert io.label_names(tmp_path / "s.seg.nrrd") == {1: "Segment one", 7: "tumor"}
+    @pytest.mark.parametrize("labels", [(1, 7), (1, 1)])
+    def test_of_a_segmentation_by_slicer_whose_layers_share_labels(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str], labels: tuple[int, int]
+    ) -> None:
+        told = segment(0, "Whole ball", labels[0], 0) | segment(1, "core", labels[1], 1)
+        path = layered(tmp_path / "s.seg.nrrd", [BALL * labels[0], CORE * labels[1]], **told)
+        number = labels[1] if labels[1] > 1 else 2
+        assert io.label_names(path) == {1: "Whole ball", number: "core"}
+        for name, mask in (("whole_ball", BALL), ("CORE", CORE)):
+            line = f"reconstruct {path} --select {name} -o {tmp_path}/m.stl --report {tmp_path}/r.json --way voxels"
+            assert main(line.split()) == 0
+            report = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
+            assert report["window"]["window_voxels"] == np.count_nonzero(mask)
 
-    def test_of_layers_is_that_of_its_layer(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        file = layered(tmp_path, ["Ball", "Core"])
-        assert io.label_names(file) == {1: "Ball", 2: "Core"}
-        line = f"reconstruct {file} --select core --network none --mask-out {tmp_path}/m.nii -o {tmp_path}/m.stl"
-        assert main(line.split()) == 0
-        assert "label(s) 2" in capsys.readouterr().out
-        assert np.count_nonzero(nibabel.load(tmp_path / "m.nii").get_fdata()) == pytest.approx(6**3, rel=0.2)
-
-    def test_a_name_of_two_is_refused(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-        told = said(f"reconstruct {layered(tmp_path, ['Node', 'node'])} --select Node -o m.stl", 2, capsys)
-        assert "several labels of the label map have that name" in told
-        assert told.endswith("Try: node (1), node (2).")
+    def test_that_two_have_is_no_label(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        told = segment(0, "rib", 1, 0) | segment(1, "rib", 2, 0)
+        path = layered(tmp_path / "s.seg.nrrd", [SHELL + 2 * CORE], **told)
+        assert "rib (1), rib (2)" in said(f"reconstruct {path} -o m.stl --select rib", 2, capsys)

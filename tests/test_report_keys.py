@@ -29,6 +29,9 @@ CLOUDS: dict[str, dict[str, Any]] = {
     "stack": {},
     "sheet": {"open": True},
     "flat": {},
+    "filled": {"filled": True},
+    "fill_holes": {"fill_holes": True},
+    "half planes": {},
 }
 
 
@@ -39,7 +42,10 @@ def ball() -> Volume:
 
 
 def cloud(name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Return a sphere's samples, half of them, contours of them, or their shadow on a plane."""
+    """Return a sphere's samples, some of them, contours of them, their shadow on a plane, or points that fill it."""
+    if name == "filled":
+        lattice = np.indices((11, 11, 11)).reshape(3, -1).T - 5.0
+        return np.asarray(lattice[(lattice**2).sum(axis=1) < 25])
     points = np.random.default_rng(0).normal(size=(1200, 3))
     points /= np.sqrt((points**2).sum(axis=1))[:, None]
     if name == "stack":
@@ -48,7 +54,12 @@ def cloud(name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
         return np.concatenate(
             [np.column_stack([*ring, np.full(60, z)]) for ring, z in zip(rings, heights, strict=True)]
         )
-    return points[points[:, 2] > 0] if name == "sheet" else points * [1, 1, name != "flat"]
+    if name == "half planes":
+        turn, angle = np.meshgrid(np.arange(12) * np.pi / 12, np.linspace(0, 2 * np.pi, 60, endpoint=False))
+        away = np.sin(angle)
+        return np.stack([away * np.cos(turn), away * np.sin(turn), np.cos(angle)], axis=-1).reshape(-1, 3)
+    kept = points[:, 2] > {"sheet": 0, "fill_holes": -0.8}.get(name, -np.inf)
+    return points[kept] * [1, 1, name != "flat"]
 
 
 def keys_of(report: dict[str, Any]) -> dict[str, Any]:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 def needed(name: str) -> Any:
     """Return a package; skip the test where it is not installed."""
-    return pytest.importorskip(name, reason=f"the package {name} is not installed")
+    return pytest.importorskip(name, reason=f"the package {name} is not installed", exc_type=ImportError)
 
 
 def as_image(stored: NDArray[Any], affine: NDArray[np.float64]) -> Any:

@@ -201,12 +201,12 @@ def _check(chosen: Namespace) -> None:
         report |= {key: found.pop(key) for key in [*found] if key == "dice" or key.endswith("_mm")}
         report["against"] = found
     if chosen.print_check:
-        from ..printing.part import MM, resized, turned
+        from ..printing.part import PRINTED_MM, resized, turned
         from ..printing.verdict import verdict
 
         named = frame_of_mesh(chosen.mesh)
         asked = turned(settings.printing, named["frame"])
-        report["print"] = verdict(resized(mesh, MM[named["unit"]]), asked)
+        report["print"] = verdict(resized(mesh, PRINTED_MM[named["unit"]]), asked)
     if chosen.report:
         io.write_document(report, chosen.report)
     _say(report, None if chosen.json else summary.of_check(report))

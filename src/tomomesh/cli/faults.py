@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import NO_ROOM, FormatError, InternalCheckError, OutputError, ResourceError, TomomeshError
+from ..io.files.source import suffix_of
 from .formats import CHECKED_FORMATS, CLOUD_FORMATS, HEADER_FORMATS, STUDY_FORMATS
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def likely_option(word: str, known: Collection[str]) -> str:
 def likely_command(word: str, known: Collection[str]) -> str:
     """Return the command line that was likely meant by a word that is no command; "" where none is."""
     if Path(word).exists():
-        suffix = _suffix(word)
+        suffix = suffix_of(word)
         command = "surface" if suffix in CLOUDS - STUDIES - MESHES else "check" if suffix in MESHES else "reconstruct"
         return f"tomomesh {command} {word}" + ("" if command == "check" else " -o mesh.stl")
     usual = [command for command, others in COMMANDS.items() if word.lower() in others]
@@ -80,7 +81,7 @@ def require_kind(chosen: Namespace) -> None:
     path = getattr(chosen, argument, None)
     if not isinstance(path, str) or not Path(path).exists():
         return
-    suffix = ".dcm" if chosen.command == "surface" and Path(path).is_dir() else _suffix(path)
+    suffix = ".dcm" if chosen.command == "surface" and Path(path).is_dir() else suffix_of(path)
     if suffix == ".dcm" and not Path(path).is_dir():
         return  # it may hold contours
     other = _reading(suffix) if suffix not in own else ""
@@ -95,11 +96,6 @@ def require_kind(chosen: Namespace) -> None:
 def _reading(suffix: str) -> str:
     """Return the command that reads a kind of file; "" where none does."""
     return next((name for name in ("reconstruct", "surface", "check") if suffix in KINDS[name][1]), "")
-
-
-def _suffix(path: str) -> str:
-    name = Path(path).name.lower()
-    return next((f".{end}" for end in ("nii.gz", "hdr.gz", "img.gz") if name.endswith(f".{end}")), Path(name).suffix)
 
 
 def as_error(fault: Exception) -> TomomeshError:

@@ -35,7 +35,12 @@ OF_STUDIES = (*io.MESH_WRITERS, *io.ARCHIVED)
 
 
 def check_folder(path: str | Path) -> Path:
-    """Refuse a folder that could not be made, before any work is done."""
+    """Refuse a folder that could not be made, before any work is done.
+
+    Raises
+    ------
+    OutputError
+    """
     folder = Path(path)
     there = folder if folder.exists() else Path(os.path.realpath(folder)).parent
     if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
@@ -44,7 +49,12 @@ def check_folder(path: str | Path) -> Path:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, if it is not there."""
+    """Make a folder, if it is not there.
+
+    Raises
+    ------
+    OutputError
+    """
     try:
         folder.mkdir(exist_ok=True)
     except OSError as fault:
@@ -76,7 +86,12 @@ def check_files(chosen: Namespace, *taken: str) -> None:
 
 
 def check_frame(output: str | Path, settings: Settings) -> None:
-    """Refuse voxel indices of a part to print and in a format of lengths, before any work is done."""
+    """Refuse voxel indices of a part to print and in a format of lengths, before any work is done.
+
+    Raises
+    ------
+    UsageError
+    """
     if settings.run.frame == "voxel" and settings.printing.asked:
         raise UsageError("a part to print has no voxels", found="--frame = voxel", expected="--frame lps or ras")
     if settings.printing.asked and suffix_of(output) in io.ARCHIVED:
@@ -89,7 +104,12 @@ def check_frame(output: str | Path, settings: Settings) -> None:
 
 
 def check_archive(chosen: Namespace, volume: Volume) -> None:
-    """Refuse a mesh for the archive of what is no DICOM study, and personal fields in any other file."""
+    """Refuse a mesh for the archive of what is no DICOM study, and personal fields in any other file.
+
+    Raises
+    ------
+    UsageError
+    """
     archived = suffix_of(chosen.output) in io.ARCHIVED
     if chosen.patient and not archived:
         raise UsageError("only a mesh for the archive names its patient", found="--patient", expected="-o MESH.dcm")

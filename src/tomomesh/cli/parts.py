@@ -17,13 +17,13 @@ def frame_of_mesh(path: str, unit: str | None = None) -> dict[str, str]:
     GeometryError
         For a unit that has no length, as voxels.
     """
-    from ..printing.part import MM
+    from ..printing.part import PRINTED_MM
 
     named = {"unit": "mm", "frame": "unknown"} | io.frame_of_file(path) | ({"unit": unit} if unit else {})
-    if named["unit"] not in MM:
+    if named["unit"] not in PRINTED_MM:
         raise GeometryError(
             "the mesh's unit has no known length", file=path, found=f"unit = {named['unit']}",
-            expected=" | ".join(MM), hint="--frame lps where the mesh is made",
+            expected="a unit of length, as mm", hint="--frame lps where the mesh is made",
         )  # fmt: skip
     return named
 

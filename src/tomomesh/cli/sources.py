@@ -55,7 +55,7 @@ def numbered(chosen: Namespace) -> Namespace:
     Raises
     ------
     UsageError
-        For a name that it does not have, or has twice.
+        For a name that it does not have.
     """
     asked = getattr(chosen, "select", ())
     if not any(isinstance(label, str) for label in asked):
@@ -68,28 +68,31 @@ def numbered(chosen: Namespace) -> Namespace:
 def _number_of(label: int | str, known: dict[int, str], path: str) -> int:
     if isinstance(label, int):
         return label
-    numbers: dict[str, list[int]] = {}
-    for number, name in known.items():
-        numbers.setdefault(_plain(name), []).append(number)
-    called = numbers.get(_plain(label), [])
-    if len(called) == 1:
-        return called[0]
-    near = [_plain(label)] if called else get_close_matches(_plain(label), numbers, 3, 0.5)
-    fault = "several labels of the label map have that name" if called else "the label map has no label of that name"
+    names = {number: _plain(name) for number, name in known.items()}
+    found = [number for number, name in names.items() if name == _plain(label)]
+    if len(found) == 1:
+        return found[0]
+    near = {*get_close_matches(_plain(label), names.values(), 3, 0.5)}
+    told = ", ".join(f"{name} ({number})" for number, name in names.items() if name in near)
+    what = "the label map names none of its labels" if not known else "the label map has no label of that name"
     raise UsageError(
-        fault if known else "the label map names none of its labels",
-        file=path, found=f"--select {label}",
-        hint=", ".join(f"{name} ({number})" for name in near for number in numbers[name])
-        or f"`tomomesh inspect {shlex.quote(path)}`, which counts its labels, and --select N",
+        "several labels have that name" if found else what, file=path, found=f"--select {label}",
+        hint=told or f"`tomomesh inspect {shlex.quote(path)}`, which counts its labels, and --select N",
     )  # fmt: skip
 
 
 def _plain(name: str) -> str:
+    """Return a name as it is compared: as it is shown, in small letters, and without spaces."""
     return shown(name).lower().replace(" ", "_")
 
 
 def sources_of(chosen: Namespace, settings: Settings) -> list[str]:
-    """Return the files that are read; refuse a label map without labels, and a command without any."""
+    """Return the files that are read; refuse a label map without labels, and a command without any.
+
+    Raises
+    ------
+    UsageError
+    """
     study = chosen.study if isinstance(chosen.study, tuple) else (chosen.study,)
     sources = [path for path in (*study, chosen.labels_in) if path]
     if not sources:

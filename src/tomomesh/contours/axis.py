@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..measure.polygon import along, area, evenly
 from .direction import FEWEST, axes_across, some_of
 from .rings import outline
 from .slices import APART, PARTED, SLICES, STRAYS
@@ -178,9 +179,9 @@ def _outlines(
         if curves is None:
             return None
         found += [(angle, curves[0]), (angle + np.pi, curves[1])]
-    count = max(8, int(np.ceil(max(float(_lengths(curve)[-1]) for _, curve in found) / spacing)))
+    count = max(8, int(np.ceil(max(float(along(curve)[-1]) for _, curve in found) / spacing)))
     found.sort(key=lambda one: one[0])
-    return np.array([angle for angle, _ in found]), np.stack([_even(curve, count) for _, curve in found])
+    return np.array([angle for angle, _ in found]), np.stack([evenly(curve, count) for _, curve in found])
 
 
 def _caps(points: Floats, near: float, spacing: float) -> list[Floats] | None:
@@ -241,21 +242,8 @@ def _cut(ring: Floats) -> tuple[Floats, Floats] | None:
 
 def _begun(ring: Floats) -> Floats:
     """Turn a ring so that it runs around from its outer side, and close it."""
-    following = np.roll(ring, -1, axis=0)
-    area = float((ring[:, 0] * following[:, 1] - ring[:, 1] * following[:, 0]).sum())
-    turned = ring if area > 0 else ring[::-1]
+    turned = ring if area(ring) > 0 else ring[::-1]
     center = turned.mean(axis=0)
     away = np.abs(np.arctan2(turned[:, 1] - center[1], turned[:, 0] - center[0]))
     begun = np.roll(turned, -int(np.argmin(away)), axis=0)
     return np.concatenate([begun, begun[:1]])
-
-
-def _lengths(curve: Floats) -> Floats:
-    return np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(curve, axis=0) ** 2).sum(axis=1)))])
-
-
-def _even(curve: Floats, count: int) -> Floats:
-    """Return places evenly along a curve (c, 2), its ends among them."""
-    lengths = _lengths(curve)
-    at = np.linspace(0, lengths[-1], count)
-    return np.column_stack([np.interp(at, lengths, column) for column in curve.T])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..model.mesh import TriMesh
-from .meshes.attributes import MM
+from ..model.units import MM
 from .volumes.nifti_frame import FLIP
 
 if TYPE_CHECKING:

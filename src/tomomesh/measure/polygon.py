@@ -1,4 +1,4 @@
-"""Closed polygons in a plane: what they enclose, how long their sides are, what lies inside."""
+"""Polygons: what closed ones enclose, how long their sides are, what lies inside, places evenly along open ones."""
 
 from __future__ import annotations
 
@@ -66,3 +66,15 @@ def side_lengths(line: NDArray[np.float64], *, closed: bool = True) -> NDArray[n
     """Return the lengths of the sides of a line (u, 2), the first from point 0 to point 1."""
     onward = np.roll(line, -1, axis=0) if closed else line[1:]
     return np.asarray(np.sqrt(((onward - line[: len(onward)]) ** 2).sum(axis=1)))
+
+
+def evenly(line: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Place points at equal steps along a line, its ends kept; one point alone takes the middle."""
+    way = along(line)
+    wanted = np.linspace(0.0, way[-1], count) if count > 1 else way[-1:] / 2
+    return np.stack([np.interp(wanted, way, axis) for axis in line.T], axis=1)
+
+
+def along(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance of each point of a line (p, d) from its first, along the line."""
+    return np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(line, axis=0) ** 2).sum(axis=1)))])

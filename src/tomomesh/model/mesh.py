@@ -47,6 +47,12 @@ class TriMesh:
         """Return the same faces over other positions."""
         return replace(self, vertices=vertices)
 
+    def only(self, kept: NDArray[np.bool_]) -> TriMesh:
+        """Return some of the faces (m,), and the vertices that they use, in the order that they had."""
+        faces, used = self.faces[kept], np.zeros(len(self.vertices), np.bool_)
+        used[faces] = True
+        return TriMesh(self.vertices[used], (np.cumsum(used) - 1)[faces])
+
     @property
     def corners(self) -> NDArray[np.float64]:
         """Positions of the three corners of every face, (m, 3, 3); not kept, for they are four times the mesh."""

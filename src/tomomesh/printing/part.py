@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import GeometryError, UsageError
 from ..measure.topology import check_promise, topology
 from ..measure.winding import linings
+from ..model.units import MM
 from ..progress import Progress, silent
 from .cavity import hollowed
 from .drains import drained
@@ -23,9 +24,7 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..settings.printing import PrintSettings
 
-MM = {
-    "um": 0.001, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8, "unknown": 1.0,
-}  # fmt: skip
+PRINTED_MM = {**MM, "unknown": 1.0}
 """Millimeters in the unit of a cloud or a mesh; one that is unknown is taken for them."""
 
 
@@ -90,7 +89,7 @@ def make_part(mesh: TriMesh, settings: Settings, *, unit: str = "mm", progress: 
     mesh : TriMesh
     settings : Settings
     unit : str
-        A key of `MM`, of the mesh's coordinates; those of the part are millimeters.
+        A key of `PRINTED_MM`, of the mesh's coordinates; those of the part are millimeters.
     progress : callable
 
     Returns
@@ -113,12 +112,12 @@ def make_part(mesh: TriMesh, settings: Settings, *, unit: str = "mm", progress: 
             "the mesh encloses no solid", found=faults, expected="a closed, outward 2-manifold", hint="`tomomesh check`"
         )
     asked, threads = settings.printing, settings.run.threads
-    if unit not in MM:
+    if unit not in PRINTED_MM:
         raise GeometryError(
             "the unit of what is to be printed has no known length", found=f"unit = {unit}",
-            expected=" | ".join(MM), hint="--units",
+            expected="a unit of length, as mm", hint="--units",
         )  # fmt: skip
-    per_unit = asked.scale * MM[unit]
+    per_unit = asked.scale * PRINTED_MM[unit]
     made = resized(mesh, per_unit)
     if asked.one_piece:
         made = largest_piece(made)

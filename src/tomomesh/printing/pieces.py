@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..measure.winding import pieces_of, winding_number
-from ..model.mesh import TriMesh
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from ..model.mesh import TriMesh
 
 
 def largest_piece(mesh: TriMesh) -> TriMesh:
@@ -20,9 +21,8 @@ def largest_piece(mesh: TriMesh) -> TriMesh:
     """
     piece, volumes = pieces_of(mesh)
     largest = int(np.argmax(volumes))
-    kept = TriMesh(mesh.vertices, mesh.faces[piece == largest])
-    inside = _inside(kept, mesh, piece, np.flatnonzero(volumes < 0))
-    return _of(mesh, np.isin(piece, [largest, *inside]))
+    inside = _inside(mesh.only(piece == largest), mesh, piece, np.flatnonzero(volumes < 0))
+    return mesh.only(np.isin(piece, [largest, *inside]))
 
 
 def without_cavities(mesh: TriMesh) -> TriMesh:
@@ -31,13 +31,13 @@ def without_cavities(mesh: TriMesh) -> TriMesh:
     linings = np.flatnonzero(volumes < 0)
     if not len(linings):
         return mesh
-    filled = _of(mesh, ~np.isin(piece, linings))
+    filled = mesh.only(~np.isin(piece, linings))
     piece, volumes = pieces_of(filled)
     floating = [
         number for number in range(len(volumes))
-        if _inside(_of(filled, piece != number), filled, piece, np.array([number]))
+        if _inside(filled.only(piece != number), filled, piece, np.array([number]))
     ]  # fmt: skip
-    return _of(filled, ~np.isin(piece, floating))
+    return filled.only(~np.isin(piece, floating))
 
 
 def _inside(solid: TriMesh, mesh: TriMesh, piece: NDArray[np.int32], numbers: NDArray[np.int64]) -> list[int]:
@@ -46,9 +46,3 @@ def _inside(solid: TriMesh, mesh: TriMesh, piece: NDArray[np.int32], numbers: ND
         return []
     first = [mesh.vertices[mesh.faces[np.argmax(piece == number), 0]] for number in numbers]
     return [int(n) for n, place in zip(numbers, first, strict=True) if winding_number(solid, place) > 0.5]
-
-
-def _of(mesh: TriMesh, kept: NDArray[np.bool_]) -> TriMesh:
-    """Return some faces of a mesh, and the vertices that they use."""
-    used, faces = np.unique(mesh.faces[kept], return_inverse=True)
-    return TriMesh(mesh.vertices[used], faces.reshape(-1, 3))

@@ -104,8 +104,7 @@ def _tiles(mesh: TriMesh, side: float) -> Iterator[TriMesh]:
     _, owner = np.unique(cube, axis=0, return_inverse=True)
     owner = owner.reshape(-1)
     for number in range(int(owner.max()) + 1):
-        used, faces = np.unique(mesh.faces[owner == number], return_inverse=True)
-        yield TriMesh(mesh.vertices[used], faces.reshape(-1, 3))
+        yield mesh.only(owner == number)
 
 
 def _around(tile: TriMesh, radius: float, threads: int) -> TriMesh:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..measure.winding import pieces_of
-from ..model.mesh import TriMesh
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from ..model.mesh import TriMesh
 
 FEWEST = 12
 """Faces that a component has at least, about, those of a cube: with fewer it would turn inside out. Of the bone of a
@@ -69,11 +70,7 @@ def without_specks(mesh: TriMesh, most: int) -> tuple[TriMesh, LeftOut]:
         kept &= ~((low >= low[small]) & (high <= high[small])).all(axis=1)
     dropped = volumes[~kept]
     share = float(np.abs(dropped).sum() / max(float(np.abs(volumes.sum())), 1e-300))
-    faces = mesh.faces[kept[piece]]
-    used = np.unique(faces)
-    number = np.zeros(len(mesh.vertices), np.int64)
-    number[used] = np.arange(len(used))
-    return TriMesh(mesh.vertices[used], number[faces]), LeftOut(len(dropped), int((dropped < 0).sum()), share)
+    return mesh.only(kept[piece]), LeftOut(len(dropped), int((dropped < 0).sum()), share)
 
 
 def _boxes(mesh: TriMesh, piece: NDArray[np.int32], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -25,6 +25,7 @@ MATTERS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "filled": POINTS,
     "units": POINTS,
     "local_origin": POINTS,
+    "thickness": {"input": ("stack",)},
     "allow_far": {"input": ("gray", "color", "stack")},
 }
 """Parameter to the values of others, or the inputs (gray or color study, cloud or stack), beside which it changes

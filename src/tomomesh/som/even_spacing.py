@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..measure.polygon import along, evenly
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -89,15 +91,3 @@ def even_arcs(arcs: Sequence[NDArray[np.float64]], count: int) -> tuple[NDArray[
     gaps = np.zeros(count - 1, bool)
     gaps[np.cumsum(counts + 1)[:-1] - 1] = True
     return np.concatenate([evenly(arc, n + 1) for arc, n in zip(arcs, counts, strict=True)]), gaps
-
-
-def evenly(line: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Place points at equal steps along a line, its ends kept; one point alone takes the middle."""
-    way = along(line)
-    wanted = np.linspace(0.0, way[-1], count) if count > 1 else way[-1:] / 2
-    return np.stack([np.interp(wanted, way, axis) for axis in line.T], axis=1)
-
-
-def along(line: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the distance of each point of a line (p, d) from its first, along the line."""
-    return np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(line, axis=0) ** 2).sum(axis=1)))])

@@ -66,6 +66,9 @@ depends on it."""
 MADE_UP = 0.2
 """Share of a surface without samples from which it is refused, unless holes are to be filled: a third of a hemisphere's
 is, and a scan from four sides leaves a sixth."""
+OPEN = 0.4
+"""Width of a border over that of all samples, from which they are of an open surface: .48 and more at the ends of tubes
+and of a bowl, .31 and less in scans of closed objects."""
 THIN = 0.5
 """Share of the cubes that lie at the surface of what is thin: .65 of a plate's in noise, .27 of a solid's of 20."""
 BOTH_SIDES = (
@@ -156,7 +159,9 @@ def _interpolated(mesh: TriMesh, points: Points) -> NDArray[np.bool_]:
 def _close(points: Points, samples: Samples, settings: Settings, progress: Progress) -> Stage[Shell]:
     shell = _tightest(len(points.cloud), samples, settings, progress)
     unsure = not shell.leak_test.tight or shell.leak_test.shell.closing >= WIDE
-    if unsure and settings.cubes.closing is None and not _is_wide(shell, samples) and not _is_flat(samples):
+    merged = len(samples.positions) + samples.strays < len(points.places)  # which says little of where they end
+    asked = settings.cubes.closing is None and (settings.cubes.fill_holes or merged or not _is_open(shell, samples))
+    if unsure and asked and not _is_wide(shell, samples) and not _is_flat(samples):
         other = _by_normals(shell, samples, lowest_corner(points), settings, progress)
         shell = other if other.leak_test.is_better_than(shell.leak_test) else shell
     told = shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
@@ -215,6 +220,14 @@ def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settin
     return Shell(np.full(3, found.cell), found.lowest, found.cubes, shell.spanned, found.leak_test, doubt)
 
 
+def _is_open(shell: Shell, samples: Samples) -> bool:
+    """Tell whether the samples end at a border as wide as a part of the object."""
+    if _is_wide(shell, samples):
+        return False
+    found = gaps(samples, min(float(shell.cell.min()), float(np.median(samples.spacing))))
+    return bool(found) and found[0].size > OPEN * float(np.linalg.norm(np.ptp(samples.positions, axis=0)))
+
+
 def _is_wide(shell: Shell, samples: Samples) -> bool:
     """Tell whether the cubes are so much wider than the points lie apart that these have no say."""
     return float(shell.cell.min()) > ACROSS * float(np.median(samples.spacing))
@@ -237,17 +250,17 @@ def _walls(shell: Shell, samples: Samples, points: Points, origin: Floats, setti
     walls = count_walls(settings, tight=tight, flat=flat)
     if walls is not None:
         return walls
+    if _is_wide(shell, samples):
+        raise too_wide(shell.cell)
+    cell = float(shell.cell.min())
+    found = gaps(samples, cell, threads=settings.run.threads)
+    if shell.is_thin and not _is_open(shell, samples):
+        return walls_found(1, BOTH_SIDES)
     if fills_solid(points.places):
         raise GeometryError(
             "the points fill a solid, and do not lie on its surface", found=f"{len(points.cloud)} points",
             expected="points on the surface of the object", hint="--filled, for the boundary of what they fill",
         )  # fmt: skip
-    if _is_wide(shell, samples):
-        raise too_wide(shell.cell)
-    cell = float(shell.cell.min())
-    found = gaps(samples, cell, threads=settings.run.threads)
-    if not found and shell.is_thin:
-        return walls_found(1, BOTH_SIDES)
     where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]
     raise GeometryError(
         ("the points look like an open surface: " if found else "")

@@ -13,6 +13,7 @@ from ..contours.slices import find_slices, one_slice
 from ..contours.turning import between_half_planes
 from ..errors import EmptyError, GeometryError
 from ..model.columns import box
+from ..model.units import MM
 from ..results import Place
 from ..stage import Stage, timed
 
@@ -26,11 +27,8 @@ if TYPE_CHECKING:
 
 OWN = ("um", "mm", "cm", "m", "voxel", "unknown")
 """Units that files of tomomesh name."""
-METERS = {
-    "in": (0.0254, "inches"), "ft": (0.3048, "feet"), "us-ft": (1200 / 3937, "US survey feet"),
-    "km": (1000.0, "kilometers"),
-}  # fmt: skip
-"""Units that other files state, to meters and words."""
+WORDS = {"in": "inches", "ft": "feet", "us-ft": "US survey feet"}
+"""What others are called in a sentence."""
 
 
 @dataclass(frozen=True)
@@ -112,14 +110,16 @@ def in_unit(cloud: PointSet, asked: str | None) -> tuple[PointSet, str]:
     unit = asked or cloud.unit or "mm"
     if unit in OWN:
         return cloud, unit
-    if unit not in METERS:
+    if unit not in MM:
         raise GeometryError(
             "the coordinates are no lengths that are known", found=f"unit = {unit}",
             expected="meters, feet or another length, as of a projected coordinate system",
             hint="--units, to take the numbers as lengths",
         )  # fmt: skip
-    told = f"coordinates in {METERS[unit][1]} were converted to meters"
-    return replace(cloud, positions=cloud.positions * METERS[unit][0], notes=(*cloud.notes, told), unit="m"), "m"
+    near = "m" if MM[unit] > MM["um"] else "um"
+    told = f"coordinates in {WORDS.get(unit, unit)} were converted to {near}"
+    positions = cloud.positions * (MM[unit] / MM[near])
+    return replace(cloud, positions=positions, notes=(*cloud.notes, told), unit=near), near
 
 
 def place_found(points: Points) -> Stage[None]:

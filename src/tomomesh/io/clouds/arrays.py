@@ -38,7 +38,12 @@ def read_npy(path: Path) -> Cloud:
 
 
 def read_npz(path: Path) -> Cloud:
-    """Read positions under a name of `POSITIONS`, or as x, y and z; arrays of as many rows are fields."""
+    """Read positions under a name of `POSITIONS`, or as x, y and z; arrays of as many rows are fields.
+
+    Raises
+    ------
+    FormatError
+    """
     arrays = _members(path)
     if set(AXES) <= set(arrays):
         return split_fields(_as_long(arrays, arrays["x"]), file=str(path))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ...errors import FormatError
+from ...model.units import unit_named
 from ..fields import AXES
 
 if TYPE_CHECKING:
@@ -27,14 +28,11 @@ TRIPLES: tuple[tuple[frozenset[str], ...], ...] = (
 )
 """What the three are called together: coordinates, a patient's axes, ParaView's columns, a surveyor's."""
 
-UNIT_WORDS = {
-    **{word: word for word in ("mm", "cm", "m", "um", "km", "in", "ft")},
-    **{"µm": "um", "μm": "um", "inch": "in", "inches": "in", "feet": "ft", "us-ft": "us-ft", "ftus": "us-ft"},
-    **{"meter": "m", "meters": "m", "metre": "m", "metres": "m", "millimeter": "mm", "millimeters": "mm"},
+NO_LENGTHS = {
     **dict.fromkeys(("deg", "degree", "degrees", "°"), "degree"),
     **dict.fromkeys(("px", "pixel", "pixels", "voxel", "voxels"), "voxel"),
 }
-"""Words for units to their names."""
+"""Words for units that are no lengths, to their names."""
 
 NAME = re.compile(r"(?P<name>.*?)[\s_]*(?:[\[(/]\s*(?P<marked>[^\])]*?)\s*[\])]?|_(?P<behind>[a-zµμ]+))?")
 """A column's name and unit: ``x``, ``X_mm``, ``x [m]``, ``East (ft)``."""
@@ -77,8 +75,12 @@ def named_positions(names: Sequence[str]) -> PositionColumns | None:
         places = [next((n for n, name in enumerate(plain) if name in words), -1) for words in triple]
         if min(places) >= 0 and len(set(places)) == 3:
             named = {units[place] for place in places}
-            degrees = triple[0] is LONGITUDE
-            return PositionColumns(tuple(places), "degree" if degrees else named.pop() if len(named) == 1 else None)
+            if triple[0] is LONGITUDE:
+                return PositionColumns(tuple(places), "degree")
+            if len(named) == 1:
+                return PositionColumns(tuple(places), named.pop())
+            told = ", ".join(sorted(unit or "none" for unit in named))
+            return PositionColumns(tuple(places), notes=(f"the columns name several units, {told}: none was taken",))
     return None
 
 
@@ -86,8 +88,8 @@ def _parted(name: str) -> tuple[str, str | None]:
     """Return a name in small letters without marks, a coordinate's as its letter, and the unit behind it."""
     word = name.strip().lower()
     found = NAME.fullmatch(word)
-    marked = found and (found["marked"] or found["behind"] or "")
-    unit = UNIT_WORDS.get(marked or "")
+    marked = (found and (found["marked"] or found["behind"])) or ""
+    unit = NO_LENGTHS.get(marked) or unit_named(marked)
     base = found["name"] if found and (unit or found["marked"] is not None) else word
     plain = re.sub(r"[\s_.:-]+", "", base)
     letter = LETTER.fullmatch(plain)

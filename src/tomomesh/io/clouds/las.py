@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import FormatError
+from ...model.units import MM
 from ..files.extras import required
 from ..files.limits import require_bytes, require_memory, require_rows
 from ..files.source import first_bytes, third_party
@@ -30,7 +31,7 @@ RECORD_BYTES = 54
 PROJECTION, SYSTEMS = "LASF_Projection", (2112, 34735)
 """Who the records of the coordinate system are of, and their numbers: as text (WKT), and as keys of GeoTIFF."""
 
-UNITS = {1.0: "m", 0.3048: "ft", round(1200 / 3937, 9): "us-ft"}
+UNITS = {round(MM[name] / MM["m"], 9): name for name in ("m", "ft", "us-ft")}
 """Meters to the names of units."""
 
 POINTS_AT_ONCE = 1 << 18

@@ -35,7 +35,12 @@ def read_ply(path: Path) -> Cloud:
 
 
 def vertices_of(data: bytes, header: PlyHeader, file: str) -> Cloud:
-    """Read the vertices behind a header."""
+    """Read the vertices behind a header.
+
+    Raises
+    ------
+    FormatError
+    """
     before, vertex = header.before("vertex")
     if vertex.count == 0:
         return np.empty((0, 3)), {}

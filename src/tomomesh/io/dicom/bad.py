@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ...errors import FormatError
+from ...errors import FormatError, printable
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -58,5 +58,5 @@ def leave_out(bad: Mapping[Path, TomomeshError], good: int, *, skip: bool, study
 
 def listed(paths: Collection[PurePath]) -> str:
     """Put the bare names of files into words, without characters that could write to a terminal."""
-    names = ["".join(c if c.isprintable() else "?" for c in path.name) for path in list(paths)[:SHOWN]]
+    names = [printable(path.name) for path in list(paths)[:SHOWN]]
     return ", ".join(names) + (", ..." if len(paths) > SHOWN else "")

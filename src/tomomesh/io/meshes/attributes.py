@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from ..fields import Fields
 
 
-MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
-"""Millimeters in a unit that a file may name."""
-
-
 @dataclass(frozen=True)
 class MeshAttributes:
     """Unit, frame and fields of a mesh that is written.

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import FormatError
+from ...model.units import MM
 from ..colors import named_colors
 from ..files.atomic import replacing
 from ..files.source import third_party
 from ..volumes.nifti_frame import FLIP
-from .attributes import MM, single_precision
+from .attributes import single_precision
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -79,7 +80,12 @@ def _arrays(fields: Fields) -> list[tuple[str, str, NDArray[np.float32]]]:
 
 
 def read_gifti(data: bytes, file: str) -> Arrays:
-    """Read the vertices and faces of a surface, in its own millimeters; positions are not moved by its matrix."""
+    """Read the vertices and faces of a surface, in its own millimeters; positions are not moved by its matrix.
+
+    Raises
+    ------
+    FormatError
+    """
     from nibabel.gifti import GiftiImage
 
     with third_party("nibabel", file):

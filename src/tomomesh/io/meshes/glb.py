@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...model.units import MM
 from ..colors import linear, named_colors
 from ..files.atomic import replacing
 from ..files.source import third_party
-from .attributes import MM, single_precision
+from .attributes import single_precision
 from .weld import weld
 
 if TYPE_CHECKING:

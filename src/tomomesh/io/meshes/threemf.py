@@ -18,12 +18,12 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ...errors import FormatError, OutputError
+from ...model.units import MM, unit_named
 from ..colors import named_colors
 from ..files.atomic import replacing
 from ..files.limits import require_memory
 from ..files.markup import parsed_xml
 from ..files.source import third_party
-from .attributes import MM
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -59,9 +59,6 @@ FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 COLORS_ID, MESH_ID = 1, 2
 """Numbers of the two resources of a file; any will do."""
 
-UNITS = {"micron": "um", "millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"}
-"""The names that 3MF has for units to ours."""
-
 MOST_PIECES = 1 << 16
 """Objects that a file may build, those within others counted each time: they could double from object to object."""
 
@@ -82,7 +79,7 @@ def write_3mf(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
             "a 3MF file names a unit, and that of the coordinates is unknown",
             file=str(path),
             found=f"unit = {beside.unit}",
-            expected=" | ".join(MM),
+            expected="a unit of length, as mm",
             hint="--units",
         )
     sized = mesh.moved(MM[beside.unit] * mesh.vertices)
@@ -150,7 +147,7 @@ def threemf_frame(data: bytes, file: str) -> dict[str, str]:
     root = _root(data, file)
     told = next((one.text or "" for one in root.iter(f"{{{CORE}}}metadata") if one.get("name") == "Description"), "")
     frame = [word.removeprefix("frame=") for word in told.split() if word.startswith("frame=")]
-    unit = {"unit": UNITS.get(root.get("unit", "millimeter"), "mm")}
+    unit = {"unit": unit_named(root.get("unit", "")) or "mm"}
     return unit | ({"frame": frame[0]} if told.startswith("tomomesh") and frame else {})
 
 

@@ -71,7 +71,12 @@ def read_vtp_mesh(data: bytes, file: str) -> Arrays:
 
 
 def read_vtp(path: Path) -> Cloud:
-    """Read the points of a file of anybody's, and what it says of each."""
+    """Read the points of a file of anybody's, and what it says of each.
+
+    Raises
+    ------
+    FormatError
+    """
     parsed = PolyData.parsed(whole(path), str(path))
     pieces = [(_positions(parsed, piece), parsed.arrays(piece, "PointData")) for piece in parsed.pieces]
     if not pieces:

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ...errors import FormatError
+from ...model.units import millimeters
 from ...model.volume import Volume
 from ..files.extras import required
 from ..files.limits import require_bytes, require_memory
@@ -23,7 +24,6 @@ from .affine import GIVEN, UNTURNED, check_spacing, passed_over, required_spacin
 from .gray import WHITE_IS_ZERO, bright_is_high, native
 from .raster import gray_or_color
 from .tiff_pages import check_chain
-from .units import millimeters
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

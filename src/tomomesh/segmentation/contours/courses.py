@@ -10,8 +10,8 @@ import numpy as np
 
 from ...kernels.contours.between import match_rings
 from ...kernels.threads import in_blocks
+from ...measure.polygon import along, evenly
 from ...model.cubics import cubic, limited
-from ...som.even_spacing import along, evenly
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

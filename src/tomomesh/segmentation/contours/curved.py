@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from ...som.even_spacing import along, even_arcs, evenly
+from ...measure.polygon import along, evenly
+from ...som.even_spacing import even_arcs
 from ...som.fit import fit
 
 if TYPE_CHECKING:

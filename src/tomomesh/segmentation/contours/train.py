@@ -11,11 +11,12 @@ from scipy import ndimage
 
 from ...errors import EmptyError
 from ...kernels.threads import in_blocks
+from ...measure.polygon import evenly
 from ...model.contours import Contour, Contours
 from ...model.lattice import lattice
 from ...progress import Progress, silent
 from ...settings import MOST_NEURONS
-from ...som.even_spacing import bridged_edges, evenly
+from ...som.even_spacing import bridged_edges
 from ...som.fit import fit, radii
 from ..signal import is_stepped
 from .curved import evened, unshrunk

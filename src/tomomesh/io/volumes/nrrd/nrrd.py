@@ -18,7 +18,7 @@ from ...files.source import first_bytes
 from ...files.unpack import BZIP2, GZIP, PLAIN
 from ..raster import HEX, LONGEST_HEADER, TEXT, Raster, gray_or_color, header_bytes, read_raster, sizes_of
 from .nrrd_frame import frame_of, is_spatial
-from .segments import label_map, segments_in
+from .segments import Segment, label_map, segments_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -95,26 +95,23 @@ def read_nrrd(path: Path, settings: ReadSettings, select: Sequence[int] | None =
     affine, notes = frame_of(fields, spatial, settings, file=name)
     segments = segments_in(fields, file=name)
     stored = _channels_last(read_raster(_raster(fields, sizes, path, length, name), file=name), spatial)
-    if not segments:
-        _check_kinds(fields, sizes, spatial, stored, name)
     if segments:
         voxels, more = label_map(stored, segments, select, file=name)
     else:
+        _check_kinds(fields, sizes, spatial, stored, name)
         voxels, more = gray_or_color(stored, stored.shape[3], file=name)
     return Volume.from_stored(voxels, affine, notes=notes + more)
 
 
-def segment_names(path: Path) -> dict[int, str]:
-    """Return what the segments of a file are called, by the numbers that `read_nrrd` gives their voxels.
+def nrrd_segments(path: Path) -> dict[int, Segment]:
+    """Return the segments that a file's header names, by the numbers that they are chosen by.
 
     Raises
     ------
-    FormatError
-        For a broken header.
+    UnreadableError, FormatError
+        As the header demands.
     """
-    name = str(path)
-    fields, _ = _parse(header_bytes(path), name)
-    return {number: segment.name for number, segment in segments_in(fields, file=name).items()}
+    return segments_in(_parse(header_bytes(path), str(path))[0], file=str(path))
 
 
 def _parse(start: bytes, name: str) -> tuple[HeaderFields, int]:

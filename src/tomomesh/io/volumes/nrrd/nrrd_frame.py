@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ....errors import FormatError, GeometryError
+from ....model.units import millimeters
 from ..affine import (
     GIVEN,
     SPACING_HINT,
@@ -20,7 +21,6 @@ from ..affine import (
     upright,
 )
 from ..raster import floats_of
-from ..units import millimeters
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

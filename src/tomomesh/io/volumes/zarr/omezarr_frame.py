@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....errors import FormatError, GeometryError
+from ....model.units import millimeters
 from ..affine import UNTURNED, brought_to_mm, check_affine, check_spacing, passed_over, required_spacing
-from ..units import millimeters
 from .origins import AlongAxes, origin_of
 
 if TYPE_CHECKING:

@@ -15,6 +15,7 @@ from conftest import law
 from tomomesh import PointSet, TriMesh, io
 from tomomesh.errors import FormatError
 from tomomesh.io import read_mesh, read_points
+from writers import needed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,10 +27,6 @@ BOX = trimesh.creation.box((2, 3, 4))
 TORUS = trimesh.creation.torus(10, 4, major_sections=24, minor_sections=12)
 QUADS = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
 CORNERS = np.array([[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], float)
-
-
-def package(name: str) -> Any:
-    return pytest.importorskip(name, reason=f"the package {name} is not installed", exc_type=ImportError)
 
 
 def volume_of(path: Path) -> float:
@@ -263,7 +260,7 @@ class TestVtk:
     @pytest.mark.parametrize("encoded", [True, False])
     @pytest.mark.parametrize("big", [True, False])
     def test_what_it_writes(self, tmp_path: Path, mode: str, packed: bool, encoded: bool, big: bool) -> None:
-        vtk = package("vtk")
+        vtk = needed("vtk")
         source = vtk.vtkSphereSource()
         source.SetThetaResolution(40)
         source.SetPhiResolution(40)
@@ -295,7 +292,7 @@ class TestVtk:
         assert io.frame_of_file(tmp_path / "m.glb") == {"unit": "m"}
 
     def test_3mf_of_lib3mf_with_components(self, tmp_path: Path) -> None:
-        lib3mf = package("lib3mf")
+        lib3mf = needed("lib3mf")
         wrapper = lib3mf.get_wrapper()
         model = wrapper.CreateModel()
         model.SetUnit(lib3mf.ModelUnit.Inch)

@@ -1,4 +1,4 @@
-"""Files as other programs write them, by those programs: what docs/formats.md says of packages from PyPI."""
+"""Arrays as other programs write them: rows of docs/writers.md, made by the writer itself."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from studies import AFFINES, assert_in_place, gray_at, indices_of, sampled
+from tomomesh.errors import FormatError
 from tomomesh.io import read_volume
+from tomomesh.model.volume import Volume
 from tomomesh.settings import ReadSettings
 from writers import as_image, needed
 
@@ -19,8 +21,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
-
-    from tomomesh.model.volume import Volume
 
 PERMUTED = np.array([[0, 0, 0.5, -10], [-0.7, 0, 0, 25], [0, -2.0, 0, 40], [0, 0, 0, 1.0]])
 ALONG_AXES = {
@@ -163,11 +163,19 @@ class TestSimpleItk:
         needed("SimpleITK").WriteImage(as_image(sampled(affine), affine), str(path), packed)
         in_place_at(read_volume(path), affine)
 
-    def test_a_vector_of_three_bytes_is_no_color(self, tmp_path: Path) -> None:
-        sitk = needed("SimpleITK")
-        image = sitk.GetImageFromArray(np.zeros((5, 6, 7, 3), np.uint8), isVector=True)
-        sitk.WriteImage(image, str(tmp_path / "s.nrrd"))
+    @pytest.mark.parametrize("levels", [2, 200])
+    def test_a_vector_of_three_bytes_is_a_color_where_it_is_no_mask(self, tmp_path: Path, levels: int) -> None:
+        sitk, voxels = needed("SimpleITK"), np.arange(630, dtype=np.int64).reshape(5, 6, 7, 3) % levels
+        sitk.WriteImage(
+            sitk.GetImageFromArray(voxels.astype(np.uint8), isVector=True), path := str(tmp_path / "s.nrrd")
+        )
         assert "kinds: vector" in (tmp_path / "s.nrrd").read_bytes()[:600].decode("ascii", "replace")
+        if levels == 2:
+            with pytest.raises(FormatError, match=r"several values a voxel.*3 of kind vector"):
+                read_volume(path)
+        else:
+            expected = Volume.from_stored(voxels, np.eye(4)).voxels
+            np.testing.assert_array_equal(read_volume(path).voxels, expected)
 
 
 class TestZarr:
