@@ -72,6 +72,16 @@ class TestSolid:
         assert 2 * (inside & body).sum() / (inside.sum() + body.sum()) > 0.9
         assert told.startswith(f"{np.ptp(np.flatnonzero(sparse.any((1, 2)))) + 1 - sparse.any((1, 2)).sum()} slices")
 
+    @pytest.mark.parametrize("step", [3, 4, 6])
+    def test_a_last_slice_of_one_pixel_makes_no_bulge(self, step: int) -> None:
+        k, j, i = np.indices((30, 30, 30)) - 15
+        body = k**2 + j**2 + i**2 <= 12**2  # its poles, a pixel each, lie on labelled slices
+        sparse = thinned(body, step, 3)
+        areas = np.count_nonzero(filled_slices(sparse, volume_of(sparse))[0].voxels > 0, axis=(1, 2))
+        assert (np.diff(areas[: 15 + 1]) >= 0).all()
+        assert (np.diff(areas[15:]) <= 0).all()
+        assert areas.sum() == pytest.approx(body.sum(), rel=0.03)
+
     @pytest.mark.parametrize("axis", [0, 1, 2])
     def test_slices_lie_across_any_axis(self, axis: int) -> None:
         body = BODIES["ball"][0]

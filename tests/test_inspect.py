@@ -268,6 +268,14 @@ class TestSharedStudies:
         assert (series.slices, series.size, series.refused) == (20, (512, 512), None)
 
 
+@pytest.mark.parametrize(("edge", "extent"), [(5e-6, "3e-05 x 3e-05 x 3e-05"), (4000.0, "24000 x 24000 x 24000")])
+def test_the_extent_of_a_micrograph_is_not_nothing(
+    tmp_path: Path, capsys: CaptureFixture[str], edge: float, extent: str
+) -> None:
+    path = write_nifti(tmp_path / "s.nii", np.arange(216, dtype=np.int16).reshape(6, 6, 6), np.diag([edge] * 3 + [1]))
+    assert f"extent    {extent} mm, first voxel at (0, 0, 0) mm LPS" in told(path, capsys)
+
+
 def test_a_study_of_a_stream_is_named_as_typed(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "study.zip", "w") as target:
         for path in write_series(tmp_path / "s", STORED, AXIAL, slices=[0, 1, 3]).iterdir():

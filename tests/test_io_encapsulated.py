@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import shutil
 import subprocess
 from typing import TYPE_CHECKING, Any
@@ -12,12 +13,13 @@ import pydicom
 import pytest
 import trimesh
 
+from segmentations import segmentation
 from structure_sets import circle, structure_set
 from studies import AFFINES, as_ct, save, write_nifti, write_series
 from tomomesh import TriMesh, read_mesh
 from tomomesh.cli import main
 from tomomesh.errors import FormatError, UsageError
-from tomomesh.io import read_volume, write_encapsulated
+from tomomesh.io import frame_of_file, read_volume, write_encapsulated
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -114,6 +116,28 @@ class TestWritten:
         assert main(["check", str(tmp_path / "m.dcm")]) == 0
         assert "closed, manifold, outward" in capsys.readouterr().out
 
+    def test_it_is_in_the_frame_of_its_study(
+        self, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert made(study, tmp_path / "m.dcm", "--frame", "ras") == 0
+        assert frame_of_file(tmp_path / "m.dcm") == {"unit": "mm", "frame": "LPS"}
+        assert main(["check", str(tmp_path / "m.dcm"), "--against", str(study), "--lower", "700", "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["dice"] > 0.99
+        assert found["against"]["notes"] == []
+
+    def test_a_lone_file_of_a_study_is_no_mesh_to_compare_with(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        mask = ball() > 700
+        save(segmentation({1: mask}, AFFINE), tmp_path / "seg.dcm")
+        line = f"reconstruct {tmp_path}/seg.dcm --select 1 --network none --quiet -o {tmp_path}/m.ply"
+        assert main(line.split()) == 0
+        assert main(f"check {tmp_path}/m.ply --against {tmp_path}/seg.dcm --select liver --json".split()) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["against"]["against"] == "labels"
+        assert found["dice"] > 0.95
+
     def test_it_is_no_slice_of_its_study(self, study: Path, tmp_path: Path) -> None:
         assert made(study, tmp_path / "m.dcm") == 0
         shutil.copy(tmp_path / "m.dcm", study / "m.dcm")
@@ -136,6 +160,7 @@ class TestRefused:
     def test_what_does_not_go_with_it(self, study: Path, tmp_path: Path) -> None:
         assert made(study, tmp_path / "m.stl", "--patient") == UsageError.exit_code
         assert made(study, tmp_path / "m.dcm", "--scale", "0.5") == UsageError.exit_code
+        assert made(study, tmp_path / "m.dcm", "--frame", "voxel") == UsageError.exit_code
         assert list(tmp_path.iterdir()) == [study]
         save(structure_set({"Bone": [circle(5.0, z) for z in (0.0, 1, 2)]}), tmp_path / "rt.dcm")
         assert main(["surface", str(tmp_path / "rt.dcm"), "-o", str(tmp_path / "m.dcm")]) == UsageError.exit_code

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 
 def is_mesh(path: str) -> bool:
-    """Whether a file is a mesh, by its suffix, and no study."""
-    return suffix_of(path) in io.MESH_READERS
+    """Whether a file is a mesh and no study: by its suffix, and DICOM by what it says that it holds."""
+    return suffix_of(path) in io.MESH_READERS and (suffix_of(path) not in io.ARCHIVED or io.is_archived(path))
 
 
 def compared(chosen: Namespace, mesh: TriMesh, settings: Settings) -> dict[str, Any]:

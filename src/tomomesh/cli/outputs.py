@@ -96,9 +96,9 @@ def check_frame(output: str | Path, settings: Settings) -> None:
         raise UsageError("a part to print has no voxels", found="--frame = voxel", expected="--frame lps or ras")
     if settings.printing.asked and suffix_of(output) in io.ARCHIVED:
         raise UsageError("a part to print lies in no patient", file=str(output), expected="a mesh, or another format")
-    if settings.run.frame == "voxel" and suffix_of(output) in LENGTHS:
+    if settings.run.frame == "voxel" and suffix_of(output) in (*LENGTHS, *io.ARCHIVED):
         raise UsageError(
-            "3MF and GIFTI hold lengths, not voxel indices", found=f"--frame = voxel, --output = {output}",
+            "3MF, GIFTI and DICOM hold lengths, not voxel indices", found=f"--frame = voxel, --output = {output}",
             expected="--frame lps or ras, or another format",
         )  # fmt: skip
 

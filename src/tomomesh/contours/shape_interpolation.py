@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.threads import in_blocks
-from ..model.cubics import cubic, limited, parabolic
+from ..model.cubics import LIMIT, cubic, limited, parabolic
 from ..progress import Progress, silent
 from .assembly import MARGIN
 from .curves import Field, field_of
@@ -152,10 +152,10 @@ class _Span:
         before, after = self.stack.before.get(self.link.below), self.stack.after.get(self.link.above)
         slopes, ways = [change, change], [way, way]
         if not before:
-            fall = self._toward_end(self.link.below, one, upward=False)
+            fall = self._toward_end(self.link.below, one, change, upward=False)
             slopes[0] = (change - fall) / 2
         if not after:
-            fall = self._toward_end(self.link.above, other, upward=True)
+            fall = self._toward_end(self.link.above, other, change, upward=True)
             slopes[1] = (change + fall) / 2
         if before:
             last = self.shapes[before]
@@ -175,10 +175,14 @@ class _Span:
             center = cubic(t, step, one.center, other.center, *ways)
             self._lay(volume[layer], values, low, center)
 
-    def _toward_end(self, key: Key, shape: Shape, *, upward: bool) -> np.float32:
-        """Return how fast the outline of a part closes where its end begins, in voxels."""
+    def _toward_end(self, key: Key, shape: Shape, change: Values, *, upward: bool) -> np.float32:
+        """Return how fast the outline of a part closes where its end begins, in voxels.
+
+        A part of a pixel ends at once, so steeply that what is before it would bulge: at most `LIMIT` changes.
+        """
         end = self.stack.ending(key, upward)[0]
-        return np.float32(shape.depth * end.fall * self.stack.edge / (2 * end.reach))
+        fall = shape.depth * end.fall * self.stack.edge / (2 * end.reach)
+        return np.float32(min(fall, LIMIT * float(np.abs(change).max())))
 
     def _fill_end(self, volume: Values) -> None:
         shape, reach = self.shapes[self.link.below or self.link.above], self.end.reach / self.stack.edge

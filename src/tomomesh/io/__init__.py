@@ -12,7 +12,7 @@ from .dicom import Listing, Series
 from .documents import read_settings, write_document, write_settings, write_table
 from .files.atomic import check_output, replacing
 from .frames import Frame, frame_of_study, in_lps
-from .meshes.encapsulated import ARCHIVED, check_archived, write_encapsulated
+from .meshes.encapsulated import ARCHIVED, check_archived, is_archived, write_encapsulated
 from .meshes.frame import frame_of_file
 from .meshes.read import MESH_READERS, read_mesh
 from .meshes.write import MESH_WRITERS, keeps, write_mesh
@@ -41,6 +41,7 @@ __all__ = [
     "frame_of_file",
     "frame_of_study",
     "in_lps",
+    "is_archived",
     "keeps",
     "label_names",
     "list_series",

@@ -80,8 +80,8 @@ def _of_voxels(found: dict[str, Any]) -> list[str]:
         f"size      {slices} slices x {rows} rows x {columns} columns (S x P x L), "
         f"{found['layers']} layer(s) of {found['type']}",
         f"spacing   {x:g} x {y:g} x {z:g} mm (L, P, S){tilt}",
-        f"extent    {' x '.join(f'{side:.1f}' for side in found['size_mm'])} mm, first voxel at "
-        f"({', '.join(f'{c:.1f}' for c in found['corner_mm'])}) mm LPS",
+        f"extent    {' x '.join(f'{side:g}' for side in found['size_mm'])} mm, first voxel at "
+        f"({', '.join(f'{round(c, 9) + 0.0:g}' for c in found['corner_mm'])}) mm LPS",
         f"slices    stored {found['stored_plane']}, columns-rows-slices run {found['stored_axes']}; "
         f"taken {found['default_plane']} by default",
         f"levels    {found['lowest']:g} to {found['highest']:g} ({found['gray_unit']}){_drawn(found)}",

@@ -6,7 +6,7 @@ import io
 from typing import TYPE_CHECKING, Any
 
 from ... import __version__
-from ...errors import FormatError, UsageError
+from ...errors import FormatError, TomomeshError, UsageError
 from ..files.atomic import check_output, replacing
 from ..files.source import third_party
 from .attributes import MeshAttributes
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 ARCHIVED = (".dcm",)
 """Suffixes of meshes for an archive."""
+LENGTHS = ("mm", "cm", "m")
+"""Codes of the units of length (UCUM) that tomomesh knows."""
 ENCAPSULATED_STL = "1.2.840.10008.5.1.4.1.1.104.3"
 MIME = "model/stl"
 PLACE = ("StudyInstanceUID", "FrameOfReferenceUID", "PositionReferenceIndicator")
@@ -135,6 +137,31 @@ def _series(identifier: str, sources: Sequence[tuple[str, str]]) -> Any:
     series = Dataset()
     series.SeriesInstanceUID, series.ReferencedInstanceSequence = identifier, [_reference(*one) for one in sources]
     return series
+
+
+def is_archived(path: str | Path) -> bool:
+    """Tell whether a file is a DICOM Encapsulated STL; one that cannot be read is none."""
+    import pydicom
+
+    try:
+        with third_party("pydicom", str(path)):
+            found = pydicom.dcmread(path, force=True, specific_tags=["SOPClassUID"], stop_before_pixels=True)
+            return str(found.get("SOPClassUID")) == ENCAPSULATED_STL
+    except (TomomeshError, OSError):
+        return False
+
+
+def encapsulated_frame(data: bytes, file: str) -> dict[str, str]:
+    """Return the unit and the frame of a DICOM Encapsulated STL: the standard's, LPS, whatever wrote it.
+
+    The unit is one of `LENGTHS`; another, or none, is not named.
+    """
+    import pydicom
+
+    with third_party("pydicom", file):
+        found = pydicom.dcmread(io.BytesIO(data), force=True, specific_tags=["MeasurementUnitsCodeSequence"])
+        code = next((str(item.get("CodeValue")) for item in found.get("MeasurementUnitsCodeSequence") or []), "")
+    return {"frame": "LPS"} | ({"unit": code} if code in LENGTHS else {})
 
 
 def read_encapsulated(data: bytes, file: str) -> Arrays:

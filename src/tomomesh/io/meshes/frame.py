@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..files.source import suffix_of, whole
+from .encapsulated import encapsulated_frame
 from .gifti import gifti_frame
 from .glb import glb_frame
 from .stl import STL_HEADER_BYTES
@@ -27,6 +28,7 @@ FRAMES: dict[str, Callable[[bytes, str], dict[str, str]]] = {
     ".3mf": threemf_frame,
     ".glb": glb_frame,
     ".gii": gifti_frame,
+    ".dcm": encapsulated_frame,
 }
 """Suffix to what a file's own fields state."""
 
