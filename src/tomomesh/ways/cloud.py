@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..cuberille.leak_test import SURE, close_leaks
 from ..cuberille.neighbors import once_each
+from ..cuberille.parting import joint
 from ..cuberille.partition import cubes_over, is_flat
 from ..dynamics.low_pass import OneRing
 from ..dynamics.membrane import capped
@@ -60,9 +61,6 @@ closing of two joins what lies nearer than four cubes, about what the shorter br
 MET = 0.8
 """Share of the samples that must lie at a surface for it to be theirs: .97 and more do on the
 scans that were measured."""
-FEW = 8
-"""Cubes with points deep inside of a surface from which that is warned of. A warning's threshold, chosen: no mesh
-depends on it."""
 MADE_UP = 0.2
 """Share of a surface without samples from which it is refused, unless holes are to be filled: a third of a hemisphere's
 is, and a scan from four sides leaves a sixth."""
@@ -166,10 +164,10 @@ def _close(points: Points, samples: Samples, settings: Settings, progress: Progr
 
 def _joined(shell: Shell, origin: Floats) -> str:
     """Say where points lie deep inside of the surface; nothing where none do."""
-    buried = shell.leak_test.shell.buried() if shell.leak_test.tight and not shell.doubt else ()
-    if len(buried) < FEW:
+    place = joint(shell.leak_test.shell) if shell.leak_test.tight and not shell.doubt else None
+    if place is None:
         return ""
-    where = _place(shell.lowest + shell.cell * (buried[len(buried) // 2] + 0.5) + origin)
+    where = _place(shell.lowest + shell.cell * (place + 0.5) + origin)
     return f"points lie deep inside of the surface around {where}: what is nearer than the cubes can part was joined"
 
 
