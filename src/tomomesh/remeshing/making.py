@@ -91,15 +91,15 @@ class Making:
         self.sizes = ground.sizes[ground.faces[under]].mean(axis=1)
 
     @contextmanager
-    def only_around(self, some: NDArray[np.bool_]) -> Iterator[Callable[[], NDArray[np.bool_]]]:
-        """Want edges half as long at some faces (m,), and let nothing change but there and a few rings around.
+    def only_around(self, some: NDArray[np.bool_], share: float) -> Iterator[Callable[[], NDArray[np.bool_]]]:
+        """Want other edges at some faces (m,), by a share, and let nothing change but there and a few rings around.
 
         What is yielded tells, after that, which faces have changed.
         """
         near = self._corners_of(some)
         near[self.faces[any_of(near[self.faces])]] = True
-        self.sizes[near] *= 0.5
-        self._ground = self._ground.finer_at(self.under[near])
+        self.sizes[near] *= share
+        self._ground = self._ground.scaled_at(self.under[near], share)
         for _ in range(RINGS):
             near[self.faces[any_of(near[self.faces])]] = True
         kinds = self.kinds

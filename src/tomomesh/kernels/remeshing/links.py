@@ -40,10 +40,10 @@ if TYPE_CHECKING:
 FREE, CREASE, FIXED, KEPT = 0, 1, 2, 3
 """Vertices that go anywhere on the surface, along a crease, or nowhere; and those whose edges to each other stay too,
 as at a border."""
-LONG, SHORT = 1.45, 4 / 5
+LONG, SHORT = 1.4, 4 / 5
 """Shares of its wanted length over and under which an edge is split or collapsed. Botsch & Kobbelt (2004) split from
-4/3: then more of the halves are too short at once, and collapse. Chosen: 4/3 takes a tenth more time for the same
-angles, 1.6 costs a degree of the smallest ones."""
+4/3: then more of the halves are too short at once, and collapse. Chosen: 4/3 lies 3 % farther from the surface before
+with as many faces; with 1.45 a ball has 3 % more faces on its one side."""
 TINY = 1e-300
 """Least divisor: a face without area has no angle."""
 UPRIGHT = 0.5
