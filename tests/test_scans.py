@@ -122,15 +122,35 @@ class TestHoles:
 
 
 class TestNearSheets:
-    def test_that_were_joined_are_told_of_with_the_place(self) -> None:
-        apart = 1.5 * np.sqrt(4 * np.pi / 10_000)
-        other = on_sphere(10_000, seed=2) + np.array([2 + apart, 0, 0])
-        both = np.concatenate([on_sphere(10_000), other])
-        surface = reconstruct_points(both)
-        told = [one for one in surface.report["warnings"] if "nearer than the cubes can part" in one]
-        assert surface.report["quality"]["components"] == 2 or told
-        place = json.loads("[" + told[0].split("(")[1].split(")")[0] + "]")
-        assert np.abs(np.array(place) - [1 + apart / 2, 0, 0]).max() < 0.3
+    @pytest.mark.parametrize("gap", [1.0, 1.5, 2.0, 3.0])
+    @pytest.mark.parametrize("radius", [1.0, 0.25])
+    def test_are_two_objects_or_told_of_with_the_place(self, radius: float, gap: float) -> None:
+        spacing = np.sqrt(4 * np.pi / 30_000)
+        other = on_sphere(int(30_000 * radius**2), radius, seed=2) + np.array([1 + gap * spacing + radius, 0, 0])
+        surface = reconstruct_points(np.concatenate([on_sphere(30_000), other]))
+        if surface.report["quality"]["components"] == 2:
+            assert quality_of(surface, components=2)["volume_mm3"] == pytest.approx(
+                4 / 3 * np.pi * (1 + radius**3), rel=1e-3
+            )
+            return
+        assert gap < 2
+        told = next(one for one in surface.report["warnings"] if "nearer than the cubes can part" in one)
+        place = json.loads("[" + told.split("(")[1].split(")")[0] + "]")
+        assert np.abs(np.array(place) - [1 + gap * spacing / 2, 0, 0]).max() < 0.3
+
+    def test_of_boxes_three_spacings_apart_stay_apart(self) -> None:
+        gap = 3 * np.sqrt(6 / 10_000)
+        other = on_box(10_000, (1.0, 1.0, 1.0), seed=2) + np.array([1 + gap, 0.3, 0.2])
+        surface = reconstruct_points(np.concatenate([on_box(10_000, (1.0, 1.0, 1.0)), other]))
+        assert quality_of(surface, components=2)["volume_mm3"] == pytest.approx(2, rel=0.01)
+
+    def test_that_were_parted_are_the_same_on_any_threads(self) -> None:
+        gap = 2.5 * np.sqrt(4 * np.pi / 4_000)
+        points = np.concatenate([on_sphere(4_000), on_sphere(4_000, seed=2) + np.array([2 + gap, 0, 0])])
+        one = reconstruct_points(points, threads=1).mesh
+        other = reconstruct_points(np.random.default_rng(0).permutation(points), threads=3).mesh
+        assert np.array_equal(one.vertices, other.vertices)
+        assert np.array_equal(one.faces, other.faces)
 
     def test_one_inside_the_other_is_a_cavity(self) -> None:
         surface = reconstruct_points(np.concatenate([on_sphere(10_000), on_sphere(8_000, 0.8, seed=2)]))

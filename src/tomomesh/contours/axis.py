@@ -22,7 +22,9 @@ MOST = 200_000
 """Points among which planes about an axis are looked for: contours that somebody draws have fewer."""
 ROUNDS, KEPT = 12, 0.8
 """Rounds of the fit of the axis, and the share of the steps that each goes by: near the axis, where the planes meet,
-the nearest point may be of another plane."""
+the nearest point may be of another plane. Chosen, on ellipsoids in 3 to 12 planes with noise of 0 to .23 sampling
+distances: half and twice of the rounds change nothing; half of the share finds two more of the noisy,
+all steps lose one."""
 TWINS = 1e-6
 """Sampling distances within which two points count as one, as where planes meet: the step between tells nothing."""
 MEET = 0.35
@@ -31,12 +33,13 @@ noise of a quarter of the sampling distance leaves .2 (measured), lines in all d
 SLANTED = 0.1
 """Least length of the axis beside its moment, in extents of the cloud: planes that are parallel meet at infinity."""
 NEAR = 2.0
-"""Sampling distances from the axis within which nobody can tell of which plane a point is, at least."""
+"""Sampling distances from the axis within which nobody can tell of which plane a point is, at least. Chosen: half of
+it changes none of these ellipsoids, twice moves them by .0001 of the radius."""
 DOUBT = 4.0
 """Deviations that the points have from their planes, beside the distance of two planes: nearer to the axis than that
-they are mixed up."""
+they are mixed up. Chosen: half of it refuses one of these ellipsoids, twice nothing."""
 WIDEST = np.pi / 2
-"""Widest angle between two half planes that is spanned."""
+"""Widest angle between two half planes that is spanned. Chosen: half of it refuses three planes, twice nothing."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from ..model.cubes import SIDE, cells_of, keys_of
 from .neighbors import FACE_COLUMNS, dilate, neighbor_table, once_each
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -122,6 +122,16 @@ class Blocks:
     def each(self, work: Callable[[int, int], None]) -> None:
         """Share the blocks among threads."""
         in_blocks(work, len(self), block=SHARE, threads=self.threads)
+
+    def united(self, sets: Sequence[tuple[Blocks, Bitmask]], beyond: Bitmask) -> Bitmask:
+        """Unite sets that lie in blocks of their own; space without blocks is as in another set of these blocks."""
+        whole = self.empty()
+        for blocks, bitmask in sets:
+            rows = np.searchsorted(self.keys, blocks.keys)
+            there = self.keys[np.minimum(rows, len(self) - 1)] == blocks.keys
+            whole[rows[there]] |= bitmask[: len(blocks)][there]
+        whole[len(self) :] = beyond[len(self) :]
+        return whole
 
     def count(self, bitmask: Bitmask) -> NDArray[np.int64]:
         """Return how many cubes each word holds, (b, 8)."""

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 NEAR = 2
 """Steps, beyond twice the dilation, from enclosed space within which an occupied cube counts as near it: noise may
 make a shell two cubes thick, and a dilation leaves little of what is enclosed."""
-DEEP = 3
-"""Cubes below the outside where no points of a surface lie: of the clouds of docs/clouds.md at most one cube does, 117
-and more where two spheres are joined."""
+DEEP = 2
+"""Cubes below the outside where few points of a surface lie: half of it takes noise for joints, and 3 misses a joint
+with a sphere of a quarter of the radius (measured, see `parting.FEW`)."""
 ROOM = 0.005
 """Cubes of a piece of enclosed space, over the occupied ones, under which it is a pocket: a sphere of radius 2 encloses
 8 % of its own cubes, a wider one more."""

@@ -10,6 +10,7 @@ import numpy as np
 from ..progress import Progress, silent
 from .closing import close_shell
 from .faces import TIGHT, Faces, exposed_faces
+from .parting import close_apart
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -104,7 +105,18 @@ def close_leaks(
     if best is None:
         shell = close_shell(cells, LEAKING, threads=threads)
         best = LeakTest(shell, exposed_faces(shell, tracking=tracking), 0.0)
+    best = _parted(best, cells, tracking) if best.tight else best
     return replace(best, faces=_with_cavities(best.shell, best.faces, tracking)) if cavities else best
+
+
+def _parted(test: LeakTest, cells: NDArray[np.int64], tracking: str) -> LeakTest:
+    """Part what the closing joined, where every part is surely tight by itself."""
+    shell = close_apart(test.shell, cells)
+    if shell is None:
+        return test
+    faces = exposed_faces(shell, tracking=tracking)
+    more = int((~faces.debris).sum()) > int((~test.faces.debris).sum())
+    return LeakTest(shell, faces, faces.least_two_sided) if more and faces.least_two_sided >= SURE else test
 
 
 def _share(shell: Shell) -> float:

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 FINE = 0.5
 """Edge of the cubes, sampling distances: a sphere of 60 points is 6 % too large, and with 1.4 times of it 7 %."""
 ROOM = 600_000
-"""Cubes that the box around the samples is divided into at most: some seconds of work. Chosen, not measured."""
+"""Cubes that the box around the samples is divided into at most: some seconds of work. Chosen: half of it
+changes the volume of a bowl by .04 %, twice nothing."""
 EACH = 8
 """The same for each sample, in a large cloud."""
 NEIGHBORS = 5
@@ -37,7 +38,8 @@ REACH = 2.5
 """Distance from all samples over which a face is made up, sampling distances: points thrown at random leave holes as
 wide, once in 10 million."""
 BORDER = 1.0
-"""The same from which a vertex belongs to such a hole; a cap stands above its border by as much. Chosen."""
+"""The same from which a vertex belongs to such a hole; a cap stands above its border by as much. Chosen: half
+of it changes the volume of a bowl by -3.6 %, twice by +6.1 %."""
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..cuberille.leak_test import SURE, close_leaks
 from ..cuberille.neighbors import once_each
+from ..cuberille.parting import joint
 from ..cuberille.partition import cubes_over, is_flat
 from ..dynamics.low_pass import OneRing
 from ..dynamics.membrane import capped
@@ -28,7 +28,7 @@ from ..pointcloud.forecast import require_room
 from ..pointcloud.solid import fills_solid
 from ..results import Surface
 from ..stage import Stage, folded, measured, timed
-from .points import place_found
+from .points import interpolated, place_found
 from .samples import ACROSS, cell_edges, lowest_corner, require_parts, settle, too_wide
 from .sections import WIDE, body_of_cubes, count_walls, fit_found, hollow, shell_found, walls_found
 from .way import CUBES, POINTS, Way, on_input, parameters
@@ -55,22 +55,19 @@ change no case of benchmarks/constants.py."""
 TRIED = ((0, 1, 2), (3, 4, 5, 6, 7, 8))
 """Closings that are tried before and after longer bridges, cubes: all that the leak test tries by itself. Chosen: a
 closing of two joins what lies nearer than four cubes, about what the shorter bridges span."""
-
-
 MET = 0.8
-"""Share of the samples that must lie at a surface for it to be theirs: .97 and more do on the
-scans that were measured."""
-FEW = 8
-"""Cubes with points deep inside of a surface from which that is warned of. A warning's threshold, chosen: no mesh
-depends on it."""
+"""Share of the samples that must lie at a surface for it to be theirs: .96 and more do on the scans
+that were measured. Chosen: half of it changes no case of few points, thin parts and holes; 1 refuses a bowl."""
 MADE_UP = 0.2
 """Share of a surface without samples from which it is refused, unless holes are to be filled: a third of a hemisphere's
-is, and a scan from four sides leaves a sixth."""
+is, and a scan from four sides leaves a sixth. Half of it refuses nothing more of what was tried, twice takes a
+hemisphere."""
 OPEN = 0.4
 """Width of a border over that of all samples, from which they are of an open surface: .48 and more at the ends of tubes
 and of a bowl, .31 and less in scans of closed objects."""
 THIN = 0.5
-"""Share of the cubes that lie at the surface of what is thin: .65 of a plate's in noise, .27 of a solid's of 20."""
+"""Share of the cubes that lie at the surface of what is thin: .65 of a plate's in noise, .27 of a solid's of 20. Half
+and twice change no case of few points, thin parts and holes."""
 BOTH_SIDES = (
     "the points lie on both sides of a part so thin that they cannot be told apart: the surface was laid around them, "
     "and may be wrong there"
@@ -135,7 +132,7 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     mesh, taken_back, crossing = apart.value
     cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64))
     trace = None if rest.value.fitted is None else rest.value.fitted.trace
-    filled = rest.value.filled | _interpolated(mesh.moved(mesh.vertices + origin), points)
+    filled = rest.value.filled | interpolated(mesh.moved(mesh.vertices + origin), points)
     enclosed = hollow(shell.value.leak_test, shell.value.taken(settings), shell.value.cubes, shell.value.cell)
     surface = Surface(
         points.cloud, cuberille, smoothed.moved(smoothed.vertices + origin),
@@ -147,21 +144,13 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     return folded(surface, settled, shell, walls, rough, rest, apart, fitted, place_found(points))
 
 
-def _interpolated(mesh: TriMesh, points: Points) -> NDArray[np.bool_]:
-    """Tell which faces (m,) are nearer to what was interpolated between the points than to these."""
-    if len(points.between) == 0:
-        return np.zeros(len(mesh.faces), np.bool_)
-    nearest = np.asarray(cKDTree(points.places).query(mesh.corners.mean(axis=1))[1])
-    return nearest >= len(points.cloud)
-
-
 @timed("cubes")
 def _close(points: Points, samples: Samples, settings: Settings, progress: Progress) -> Stage[Shell]:
     shell = _tightest(len(points.cloud), samples, settings, progress)
-    unsure = not shell.leak_test.tight or shell.leak_test.shell.closing >= WIDE
+    doubted = not shell.leak_test.tight or shell.leak_test.shell.closing >= WIDE
+    unsure = doubted and settings.cubes.closing is None and not _is_wide(shell, samples) and not _is_flat(samples)
     merged = len(samples.positions) + samples.strays < len(points.places)  # which says little of where they end
-    asked = settings.cubes.closing is None and (settings.cubes.fill_holes or merged or not _is_open(shell, samples))
-    if unsure and asked and not _is_wide(shell, samples) and not _is_flat(samples):
+    if unsure and (settings.cubes.fill_holes or merged or not _is_open(shell, samples)):
         other = _by_normals(shell, samples, lowest_corner(points), settings, progress)
         shell = other if other.leak_test.is_better_than(shell.leak_test) else shell
     told = shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
@@ -171,10 +160,10 @@ def _close(points: Points, samples: Samples, settings: Settings, progress: Progr
 
 def _joined(shell: Shell, origin: Floats) -> str:
     """Say where points lie deep inside of the surface; nothing where none do."""
-    buried = shell.leak_test.shell.buried() if shell.leak_test.tight and not shell.doubt else ()
-    if len(buried) < FEW:
+    place = joint(shell.leak_test.shell) if shell.leak_test.tight and not shell.doubt else None
+    if place is None:
         return ""
-    where = _place(shell.lowest + shell.cell * (buried[len(buried) // 2] + 0.5) + origin)
+    where = _place(shell.lowest + shell.cell * (place + 0.5) + origin)
     return f"points lie deep inside of the surface around {where}: what is nearer than the cubes can part was joined"
 
 
@@ -222,8 +211,6 @@ def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settin
 
 def _is_open(shell: Shell, samples: Samples) -> bool:
     """Tell whether the samples end at a border as wide as a part of the object."""
-    if _is_wide(shell, samples):
-        return False
     found = gaps(samples, min(float(shell.cell.min()), float(np.median(samples.spacing))))
     return bool(found) and found[0].size > OPEN * float(np.linalg.norm(np.ptp(samples.positions, axis=0)))
 
@@ -280,12 +267,7 @@ def _smoothed(shell: Shell, settings: Settings) -> Rough:
     ring = OneRing.of_quads(faces.quads, len(faces.corners), settings.run.threads)
     lattice = shell.lowest + faces.corners * shell.cell
     vertices = ring.smoothed(lattice, settings.cubes.low_pass)
-    return Rough(faces, lattice, ring, TriMesh(vertices, _halves(faces.quads)))
-
-
-def _halves(quads: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Split each square by its diagonal 0-2 (the paper's systematic triangulation, Fig. 8b)."""
-    return quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int64)
+    return Rough(faces, lattice, ring, QuadMesh(vertices, faces.quads.astype(np.int64)).triangulated())
 
 
 def _fitted(

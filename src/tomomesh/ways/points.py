@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..contours.axis import half_planes
 from ..contours.known import known_slices
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..contours.slices import Slices
+    from ..model.mesh import TriMesh
     from ..model.points import PointSet
     from ..settings import Settings
 
@@ -126,3 +128,11 @@ def place_found(points: Points) -> Stage[None]:
     """Tell where the lowest corner of a cloud is, and what its reader says of it."""
     known = {"origin": list(points.place.origin), "frame": points.place.frame, "notes": list(points.cloud.notes)}
     return Stage(None, {"points": known})
+
+
+def interpolated(mesh: TriMesh, points: Points) -> NDArray[np.bool_]:
+    """Tell which faces (m,) are nearer to what was interpolated between the points than to these."""
+    if len(points.between) == 0:
+        return np.zeros(len(mesh.faces), np.bool_)
+    nearest = np.asarray(cKDTree(points.places).query(mesh.corners.mean(axis=1))[1])
+    return nearest >= len(points.cloud)
