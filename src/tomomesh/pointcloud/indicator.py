@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
 
 ROUNDS = 16
-"""Times that all normals are turned. Chosen: half and twice of it change no volume (a torus of 300 points, a sphere of 60, a
-thin box, a bowl, half a sphere)."""
+"""Times that all normals are turned. Chosen: half and twice of it change no volume (a torus of 300 points, a sphere of
+60, a thin box, a bowl, half a sphere)."""
 WIDTH = 0.7
 """Width of the smoothing, sampling distances: with 1.4 times of it the hole of a torus of 300 points closes."""
 LEAST_WIDTH = 1.1
