@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 LOOKED_AT, AROUND = 500, 30
 """Points that are looked at, and neighbors of each. Chosen: half and twice of them tell the same of a ball, a
-cube, a lattice and spheres in noise up to .6 sampling distances; in noise of 1.6 a sphere fills a shell, but for twice
-of the second."""
+cube, a lattice and spheres in noise up to .6 sampling distances; in noise of 1.6 a sphere fills a shell, but for
+twice of the second."""
 THICK = 0.15
 """Least share of the spread around most points that is across their flattest direction: 1/3 in a solid, .22 to .31 at
 random points and a lattice with its border, .01 on surfaces with a noise of .3 % (measured). Half
