@@ -57,7 +57,7 @@ TRIED = ((0, 1, 2), (3, 4, 5, 6, 7, 8))
 closing of two joins what lies nearer than four cubes, about what the shorter bridges span."""
 MET = 0.8
 """Share of the samples that must lie at a surface for it to be theirs: .96 and more do on the scans
-that were measured. Chosen: half of it changes no case of few points, thin parts and holes; 1 refuses a bowl."""
+that were measured. Chosen: half of it changes no case of few points, thin parts and holes; over 1 none is theirs."""
 MADE_UP = 0.2
 """Share of a surface without samples from which it is refused, unless holes are to be filled: a third of a hemisphere's
 is, and a scan from four sides leaves a sixth. Half of it refuses nothing more of what was tried, twice takes a
@@ -67,7 +67,7 @@ OPEN = 0.4
 and of a bowl, .31 and less in scans of closed objects."""
 THIN = 0.5
 """Share of the cubes that lie at the surface of what is thin: .65 of a plate's in noise, .27 of a solid's of 20. Half
-and twice change no case of few points, thin parts and holes."""
+and twice change no case of few points and holes, none of which is laid around."""
 BOTH_SIDES = (
     "the points lie on both sides of a part so thin that they cannot be told apart: the surface was laid around them, "
     "and may be wrong there"
