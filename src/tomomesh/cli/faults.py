@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from difflib import get_close_matches
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import NO_ROOM, FormatError, InternalCheckError, OutputError, ResourceError, TomomeshError
-from ..io.files.source import existing, suffix_of
 from .formats import CHECKED_FORMATS, CLOUD_FORMATS, HEADER_FORMATS, STUDY_FORMATS
 
 if TYPE_CHECKING:
@@ -61,8 +60,8 @@ def likely_option(word: str, known: Collection[str]) -> str:
 
 def likely_command(word: str, known: Collection[str]) -> str:
     """Return the command line that was likely meant by a word that is no command; "" where none is."""
-    if os.access(word, os.F_OK):
-        suffix = suffix_of(word)
+    if _is_there(word):
+        suffix = _suffix_of(word)
         command = "surface" if suffix in CLOUDS - STUDIES - MESHES else "check" if suffix in MESHES else "reconstruct"
         return f"tomomesh {command} {word}" + ("" if command == "check" else " -o mesh.stl")
     usual = [command for command, others in COMMANDS.items() if word.lower() in others]
@@ -79,10 +78,10 @@ def require_kind(chosen: Namespace) -> None:
     """
     argument, own = KINDS.get(chosen.command, ("", set()))
     path = getattr(chosen, argument, None)
-    if not isinstance(path, str):
+    if not isinstance(path, str) or not _is_there(path):
         return
-    is_folder = existing(path).is_dir()
-    suffix = ".dcm" if chosen.command == "surface" and is_folder else suffix_of(path)
+    is_folder = Path(path).is_dir()
+    suffix = ".dcm" if chosen.command == "surface" and is_folder else _suffix_of(path)
     if suffix == ".dcm" and not is_folder:
         return  # it may hold contours
     other = _reading(suffix) if suffix not in own else ""
@@ -92,6 +91,21 @@ def require_kind(chosen: Namespace) -> None:
             found="a folder" if is_folder else f"suffix = {suffix}",
             hint=f"tomomesh {other} {path}" + ("" if other == "check" else " -o mesh.stl"),
         )  # fmt: skip
+
+
+def _is_there(path: str) -> bool:
+    """Tell whether a path leads to something that may be looked at."""
+    try:
+        Path(path).stat()
+    except (OSError, ValueError):
+        return False
+    return True
+
+
+def _suffix_of(path: str) -> str:
+    from ..io.files.source import suffix_of  # which NumPy comes with: `--help` has no need of it
+
+    return suffix_of(path)
 
 
 def _reading(suffix: str) -> str:

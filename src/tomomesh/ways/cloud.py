@@ -241,13 +241,13 @@ def _walls(shell: Shell, samples: Samples, points: Points, origin: Floats, setti
         raise too_wide(shell.cell)
     cell = float(shell.cell.min())
     found = gaps(samples, cell, threads=settings.run.threads)
-    if shell.is_thin and not _is_open(shell, samples):
-        return walls_found(1, BOTH_SIDES)
     if fills_solid(points.places):
         raise GeometryError(
             "the points fill a solid, and do not lie on its surface", found=f"{len(points.cloud)} points",
             expected="points on the surface of the object", hint="--filled, for the boundary of what they fill",
         )  # fmt: skip
+    if shell.is_thin and not _is_open(shell, samples):
+        return walls_found(1, BOTH_SIDES)
     where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]
     raise GeometryError(
         ("the points look like an open surface: " if found else "")

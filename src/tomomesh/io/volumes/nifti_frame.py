@@ -36,8 +36,9 @@ FORMS = ("sform", "qform")
 APART = 0.1
 """Part of a voxel by which the two forms may differ at the corners of the volume without a word: interpolation would
 not show it. A form in 32 bits is off by a ten-thousandth of that."""
-LONGEST = 1.01
-"""A quaternion's three numbers may be so long: what rounding makes longer than 1 is brought back to 1."""
+SHORTEST, LONGEST = 1 - 5e-8, 1.01
+"""A quaternion's three numbers that are so long are brought to a length of 1, where the fourth is 0: rounding makes
+them longer, and from the shortest on the standard's code takes the rest for rounding, too."""
 
 
 def frame_of(
@@ -87,7 +88,7 @@ def _form(header: Any, form: str, name: str) -> Affine:
     header = header.copy()
     header["pixdim"][0] = -1 if header["pixdim"][0] < 0 else 1
     turn = np.array([float(header[f"quatern_{letter}"]) for letter in "bcd"])
-    if 1 < (length := float(np.linalg.norm(turn))) <= LONGEST:
+    if SHORTEST < (length := float(np.linalg.norm(turn))) <= LONGEST:
         for letter, value in zip("bcd", turn / np.nextafter(np.float32(length), np.float32(2)), strict=True):
             header[f"quatern_{letter}"] = value
     with third_party("nibabel", name):
