@@ -1,6 +1,6 @@
 """Draw the skull of a label head made into thick slabs: as 3D Slicer's pipeline makes its surface, and as ours does.
 
-``python benchmarks/slab_picture.py docs/images/slabs.png [--study 01] [--thick 4] [--data labels] [--way defaults]``
+``python benchmarks/slab_picture.py FILE.png [--study 01] [--thick 4] [--data labels] [--way defaults]``
 """
 
 from __future__ import annotations

@@ -36,10 +36,10 @@ def executed(tmp_path_factory: pytest.TempPathFactory) -> NotebookNode:
     return found
 
 
-def told(notebook: NotebookNode) -> list[tuple[list[str], list[str]]]:
-    """Return what each cell printed, and which kinds of picture it drew."""
+def told(notebook: NotebookNode) -> list[tuple[str, list[str]]]:
+    """Return what each cell printed, in however many pieces, and which kinds of picture it drew."""
     code = [cell.outputs for cell in notebook.cells if cell.cell_type == "code"]
-    words = [[output.text for output in outputs if output.output_type == "stream"] for outputs in code]
+    words = ["".join(output.text for output in outputs if output.output_type == "stream") for outputs in code]
     drawn = [[kind for output in outputs for kind in output.get("data", {})] for outputs in code]
     return list(zip(words, drawn, strict=True))
 

@@ -89,7 +89,8 @@ def _form(header: Any, form: str, name: str) -> Affine:
     header["pixdim"][0] = -1 if header["pixdim"][0] < 0 else 1
     turn = np.array([float(header[f"quatern_{letter}"]) for letter in "bcd"])
     if SHORTEST < (length := float(np.linalg.norm(turn))) <= LONGEST:
-        for letter, value in zip("bcd", turn / np.nextafter(np.float32(length), np.float32(2)), strict=True):
+        longer = 1 + 7.5e-8  # by no more than nibabel takes for rounding, whatever 32 bits make of each
+        for letter, value in zip("bcd", longer * turn / length, strict=True):
             header[f"quatern_{letter}"] = value
     with third_party("nibabel", name):
         return np.asarray(getattr(header, f"get_{form}")(), np.float64)
