@@ -142,7 +142,9 @@ def _draw_cells(
     cells = PolyCollection(list(centers[:, None] + corners), facecolors=scale.to_rgba(values), edgecolors="face")
     cells.set_linewidth(0.3)
     ax.add_collection(cells)
-    bar = ax.get_figure(root=True).colorbar(scale, ax=ax, location="bottom", shrink=0.75, aspect=30, pad=0.02)  # type: ignore[union-attr]
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    bar = figure.colorbar(scale, ax=ax, location="bottom", shrink=0.75, aspect=30, pad=0.02)
     bar.outline.set_visible(False)
     bar.set_label(name)
     bar.ax.xaxis.set_major_locator(MaxNLocator(nbins=6, integer=np.issubdtype(values.dtype, np.integer)))
