@@ -79,7 +79,7 @@ class TestRead:
     @pytest.mark.parametrize("zarr_format", [2, 3])
     def test_a_zarr_store_is_read_as_from_its_folder(self, tmp_path: Path, inside: str, zarr_format: int) -> None:
         pytest.importorskip("zarr", reason="the package zarr is not installed")
-        from test_io_omezarr import write
+        from stores import write
 
         store = write(tmp_path / "s.zarr", zarr_format=zarr_format)
         files = [path for path in store.rglob("*") if path.is_file()]
