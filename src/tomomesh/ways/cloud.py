@@ -21,7 +21,7 @@ from ..measure.intersections import CrossingFaces
 from ..model.columns import any_of
 from ..model.cubes import cells_of
 from ..model.mesh import QuadMesh, TriMesh
-from ..opensurface.gaps import gaps
+from ..opensurface.gaps import Gap, gaps
 from ..pointcloud.bridges import bridges
 from ..pointcloud.filling import fill_inside, holes, made_up
 from ..pointcloud.forecast import require_room
@@ -150,7 +150,7 @@ def _close(points: Points, samples: Samples, settings: Settings, progress: Progr
     doubted = not shell.leak_test.tight or shell.leak_test.shell.closing >= WIDE
     unsure = doubted and settings.cubes.closing is None and not _is_wide(shell, samples) and not _is_flat(samples)
     merged = len(samples.positions) + samples.strays < len(points.places)  # which says little of where they end
-    if unsure and (settings.cubes.fill_holes or merged or not _is_open(shell, samples)):
+    if unsure and (settings.cubes.fill_holes or merged or not _is_open(_borders(shell, samples, settings), samples)):
         other = _by_normals(shell, samples, lowest_corner(points), settings, progress)
         shell = other if other.leak_test.is_better_than(shell.leak_test) else shell
     told = shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
@@ -209,10 +209,15 @@ def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settin
     return Shell(np.full(3, found.cell), found.lowest, found.cubes, shell.spanned, found.leak_test, doubt)
 
 
-def _is_open(shell: Shell, samples: Samples) -> bool:
-    """Tell whether the samples end at a border as wide as a part of the object."""
-    found = gaps(samples, min(float(shell.cell.min()), float(np.median(samples.spacing))))
-    return bool(found) and found[0].size > OPEN * float(np.linalg.norm(np.ptp(samples.positions, axis=0)))
+def _borders(shell: Shell, samples: Samples, settings: Settings) -> list[Gap]:
+    """Find what the samples end at, the widest first; cubes wider than they lie apart would hide it."""
+    edge = min(float(shell.cell.min()), float(np.median(samples.spacing)))
+    return gaps(samples, edge, threads=settings.run.threads)
+
+
+def _is_open(borders: list[Gap], samples: Samples) -> bool:
+    """Tell whether a border is as wide as a part of the object."""
+    return bool(borders) and borders[0].size > OPEN * float(np.linalg.norm(np.ptp(samples.positions, axis=0)))
 
 
 def _is_wide(shell: Shell, samples: Samples) -> bool:
@@ -239,20 +244,19 @@ def _walls(shell: Shell, samples: Samples, points: Points, origin: Floats, setti
         return walls
     if _is_wide(shell, samples):
         raise too_wide(shell.cell)
-    cell = float(shell.cell.min())
-    found = gaps(samples, cell, threads=settings.run.threads)
+    found = _borders(shell, samples, settings)
     if fills_solid(points.places):
         raise GeometryError(
             "the points fill a solid, and do not lie on its surface", found=f"{len(points.cloud)} points",
             expected="points on the surface of the object", hint="--filled, for the boundary of what they fill",
         )  # fmt: skip
-    if shell.is_thin and not _is_open(shell, samples):
+    if shell.is_thin and not _is_open(found, samples):
         return walls_found(1, BOTH_SIDES)
     where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]
     raise GeometryError(
         ("the points look like an open surface: " if found else "")
         + "the outside leaks into the shell of cubes, so its surface would have two walls",
-        found=f"{len(found)} border(s), the widest {where[0]}" if found else f"cell = {cell:.4g}",
+        found=f"{len(found)} border(s), the widest {where[0]}" if found else f"cell = {shell.cell.min():.4g}",
         expected="points all around the object, without gaps as wide as its holes",
         hint="--fill-holes to cap what is open, --open for a sheet with borders, or --allow-leaks",
     )
