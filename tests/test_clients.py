@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -17,7 +18,7 @@ import trimesh
 from conftest import sphere
 from test_io_mesh_formats import colors_of, lopsided, volume_of
 from tomomesh.cli import main
-from tomomesh.io import write_mesh, write_points
+from tomomesh.io import keeps, write_mesh, write_points
 from tomomesh.io.colors import linear
 from tomomesh.model.points import PointSet
 
@@ -41,8 +42,9 @@ def asked_of_node(client: str, *files: Path) -> list[dict[str, Any]]:
     """Return what a client on Node.js says of some files."""
     if NODE is None:
         pytest.skip("Node.js is not installed")
-    known = [NODE, "--eval", f"require.resolve('{client}')"]
-    if subprocess.run(known, capture_output=True, check=False).returncode:
+    asked = [NODE, "--print", "require.resolve.paths('it').join('\\n')"]
+    folders = subprocess.run(asked, capture_output=True, check=True, text=True).stdout.splitlines()
+    if not any(Path(folder, client).is_dir() for folder in folders):
         pytest.skip(f"Node.js finds no package {client}: npm install {client}, and NODE_PATH where it went")
     command = [NODE, str(SCRIPT), client, *map(str, files)]
     told = subprocess.run(command, capture_output=True, check=True, text=True).stdout
@@ -63,6 +65,13 @@ def of_three(path: Path) -> Read:
     faces = np.array(found["index"] or range(len(places))).reshape(-1, 3)
     shown = np.array(found["shown"]) if found.get("shown") and path.suffix != ".ply" else None
     return places, faces, None if shown is None else np.stack([shown >> n & 255 for n in (16, 8, 0)], axis=1)
+
+
+def of_niivue(path: Path) -> Read:
+    (found,) = asked_of_node("@niivue/niivue", path)
+    places, faces = (np.array(found[name]).reshape(-1, 3) for name in ("places", "index"))
+    colors = found.get("fractions")
+    return places, faces, None if colors is None else np.rint(255 * np.array(colors).reshape(-1, 3)).astype(np.uint8)
 
 
 def of_meshio(path: Path) -> Read:
@@ -113,17 +122,16 @@ def of_nibabel(path: Path) -> Read:
 
 
 CLIENTS: dict[str, tuple[Callable[[Path], Read], ...]] = {
-    ".stl": (of_trimesh, of_vtk, of_meshio, of_three),
-    ".ply": (of_trimesh, of_vtk, of_meshio, of_three),
-    ".obj": (of_trimesh, of_vtk, of_three),
-    ".off": (of_trimesh, of_vtk, of_meshio),
+    ".stl": (of_trimesh, of_vtk, of_meshio, of_three, of_niivue),
+    ".ply": (of_trimesh, of_vtk, of_meshio, of_three, of_niivue),
+    ".obj": (of_trimesh, of_vtk, of_three, of_niivue),
+    ".off": (of_trimesh, of_vtk, of_meshio, of_niivue),
     ".vtp": (of_vtk,),
     ".3mf": (of_trimesh, of_lib3mf),
     ".glb": (of_trimesh, of_three),
-    ".gii": (of_nibabel,),
+    ".gii": (of_nibabel, of_niivue),
 }
-"""Suffix to what opens it. Of packages for Python, VTK alone opens .vtp, which 3D Slicer, ParaView and PyVista use,
-and nibabel alone .gii."""
+"""Suffix to what opens it. Of packages for Python, VTK alone opens .vtp, which 3D Slicer, ParaView and PyVista use."""
 PAIRS: Iterable[tuple[str, Callable[[Path], Read]]] = [
     (suffix, one) for suffix, all_ in CLIENTS.items() for one in all_
 ]
@@ -186,6 +194,12 @@ class TestGlb:
         assert set(found["shown"]) == {20 << 16 | 60 << 8 | 180}
         assert (found["metalness"], found["roughness"]) == (0, 1)
 
+    def test_trimesh_has_a_color_for_it(self, tmp_path: Path) -> None:
+        """Its `to_color`, which its viewer asks, knows no material but one that names its color."""
+        write_mesh(lopsided(), tmp_path / "m.glb")
+        (found,) = trimesh.load(tmp_path / "m.glb").geometry.values()
+        assert (np.asarray(found.visual.to_color().vertex_colors) == 255).all()
+
     def test_colors_are_light(self) -> None:
         """IEC 61966-2-1's own inverse brings each back."""
         levels = np.arange(256)
@@ -210,6 +224,15 @@ class TestGlb:
 def _cloud_of_a_pole(tmp_path: Path) -> Path:
     np.savetxt(tmp_path / "pole.xyz", sphere(600) * [1, 1, 3])
     return tmp_path / "pole.xyz"
+
+
+@pytest.fixture(name="cloud_of_colors")
+def _cloud_of_colors(tmp_path: Path) -> Path:
+    """Return a ball whose points have colors and a field."""
+    places = sphere(600)
+    fields = {name: np.full(len(places), 90, np.uint8) for name in ("red", "green", "blue")} | {"conf": places[:, 0]}
+    write_points(replace(PointSet.from_positions(places), attributes=fields), tmp_path / "colors.ply")
+    return tmp_path / "colors.ply"
 
 
 class TestPly:
@@ -257,13 +280,34 @@ def of_vtk_points(path: Path) -> NDArray[Any]:
 class TestGifti:
     def test_positions_alone_have_a_coordinate_system(self, tmp_path: Path) -> None:
         mesh = lopsided()
-        write_mesh(mesh, tmp_path / "m.surf.gii", vertex_fields={**colors_of(mesh), "depth": mesh.vertices[:, 2]})
-        arrays = ElementTree.parse(tmp_path / "m.surf.gii").getroot().findall("DataArray")
+        write_mesh(mesh, tmp_path / "m.gii", vertex_fields={**colors_of(mesh), "depth": mesh.vertices[:, 2]})
+        arrays = ElementTree.parse(tmp_path / "m.gii").getroot().findall("DataArray")
         systems = {one.get("Intent"): len(one.findall("CoordinateSystemTransformMatrix")) for one in arrays}
         assert systems == {
             "NIFTI_INTENT_POINTSET": 1, "NIFTI_INTENT_TRIANGLE": 0, "NIFTI_INTENT_RGB_VECTOR": 0,
             "NIFTI_INTENT_NONE": 0,
         }  # fmt: skip
+
+    def test_a_surface_for_workbench_holds_positions_and_triangles_alone(self, tmp_path: Path) -> None:
+        """Workbench opens no .surf.gii with another array."""
+        mesh, path = lopsided(), tmp_path / "M.Surf.GII"
+        write_mesh(mesh, path, vertex_fields={**colors_of(mesh), "depth": mesh.vertices[:, 2]})
+        assert not keeps(path, "depth")
+        arrays = ElementTree.parse(path).getroot().findall("DataArray")
+        assert [one.get("Intent") for one in arrays] == ["NIFTI_INTENT_POINTSET", "NIFTI_INTENT_TRIANGLE"]
+        write_mesh(mesh, tmp_path / "bare.gii")
+        assert path.read_bytes() == (tmp_path / "bare.gii").read_bytes()
+
+    def test_workbench_opens_it(self, tmp_path: Path, cloud_of_colors: Path) -> None:
+        tool = shutil.which("wb_command")
+        if tool is None:
+            pytest.skip("wb_command is not installed (Debian's connectome-workbench)")
+        assert main(["surface", str(cloud_of_colors), "-o", str(tmp_path / "m.surf.gii"), "--quiet"]) == 0
+        command = [tool, "-file-information", str(tmp_path / "m.surf.gii")]
+        told = subprocess.run(command, capture_output=True, check=True, text=True).stdout
+        said = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in told.splitlines())}
+        assert (said["Type"], said["Normal Vectors Correct"]) == ("Surface", "true")
+        assert int(said["Number of Vertices"]) == len(of_nibabel(tmp_path / "m.surf.gii")[0])
 
     def test_gifti_tool_calls_it_valid(self, tmp_path: Path) -> None:
         tool = shutil.which("gifti_tool")

@@ -28,8 +28,19 @@ if TYPE_CHECKING:
 SCANNER, UNKNOWN = "NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_UNKNOWN"
 
 
+SURFACE = ".surf.gii"
+"""Ending of a surface for Connectome Workbench, which opens none that holds more than positions and triangles."""
+
+
+def is_bare(path: str | Path) -> bool:
+    """Whether a file holds positions and triangles alone by its ending, and no fields."""
+    return str(path).lower().endswith(SURFACE)
+
+
 def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write 32-bit coordinates in millimeters, RAS where the mesh has a patient frame, and the fields at vertices.
+
+    A ``.surf.gii`` has no fields: Connectome Workbench would not open it.
 
     The array of positions says which: ``NIFTI_XFORM_SCANNER_ANAT``, else ``NIFTI_XFORM_UNKNOWN``. No other array has a
     frame (GIFTI 1.0, 2.3.4), though nibabel gives one to each; ITK and gifti_tool complain of them.
@@ -54,7 +65,7 @@ def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None
     others = [GiftiDataArray(mesh.faces.astype(np.int32), "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32")]
     others += [
         GiftiDataArray(values, intent, "NIFTI_TYPE_FLOAT32", meta=GiftiMetaData(Name=name))
-        for name, intent, values in _arrays(beside.vertex_fields)
+        for name, intent, values in _arrays({} if is_bare(path) else beside.vertex_fields)
     ]
     for array in others:
         array.coordsys = None
