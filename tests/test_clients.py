@@ -92,15 +92,24 @@ def of_vtk(path: Path) -> Read:
 
     readers = {
         ".stl": geometry.vtkSTLReader, ".ply": ply.vtkPLYReader, ".vtp": xml.vtkXMLPolyDataReader,
-        ".obj": obj.vtkOBJReader, ".off": geometry.vtkOFFReader,
+        ".obj": obj.vtkOBJReader, ".off": geometry.vtkOFFReader, ".glb": geometry.vtkGLTFReader,
     }  # fmt: skip
     reader = readers[path.suffix]()
     reader.SetFileName(str(path))
     reader.Update()
-    found = reader.GetOutput()
+    found = _placed_by_nodes(reader.GetOutput()) if path.suffix == ".glb" else reader.GetOutput()
     colors = found.GetPointData().GetArray("RGB")
     faces = vtk_to_numpy(found.GetPolys().GetConnectivityArray()).reshape(-1, 3)
     return vtk_to_numpy(found.GetPoints().GetData()), faces, None if colors is None else vtk_to_numpy(colors)
+
+
+def _placed_by_nodes(scene: Any) -> Any:
+    """Return the one mesh of VTK's blocks."""
+    filters = pytest.importorskip("vtkmodules.vtkFiltersGeometry", reason="the package vtk is not installed")
+    one = filters.vtkCompositeDataGeometryFilter()
+    one.SetInputData(scene)
+    one.Update()
+    return one.GetOutput()
 
 
 def of_lib3mf(path: Path) -> Read:
@@ -128,7 +137,7 @@ CLIENTS: dict[str, tuple[Callable[[Path], Read], ...]] = {
     ".off": (of_trimesh, of_vtk, of_meshio, of_niivue),
     ".vtp": (of_vtk,),
     ".3mf": (of_trimesh, of_lib3mf),
-    ".glb": (of_trimesh, of_three),
+    ".glb": (of_trimesh, of_vtk, of_three),
     ".gii": (of_nibabel, of_niivue),
 }
 """Suffix to what opens it. Of packages for Python, VTK alone opens .vtp, which 3D Slicer, ParaView and PyVista use."""

@@ -24,6 +24,7 @@ from ..files.atomic import replacing
 from ..files.limits import require_memory
 from ..files.markup import parsed_xml
 from ..files.source import third_party
+from ..frames import frame_in_file
 from .attributes import single_precision
 
 if TYPE_CHECKING:
@@ -88,9 +89,10 @@ def write_3mf(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
             expected="a unit of length, as mm",
             hint="--units",
         )
-    sized = mesh.moved(MM[beside.unit] * mesh.vertices)
+    frame = frame_in_file(path, unit=beside.unit, frame=beside.frame)
+    sized = mesh.moved(frame.place(mesh.vertices))
     _check_readable(sized.vertices, path)
-    members = {**COMPANIONS, "3D/3dmodel.model": "".join(_model(sized, replace(beside, unit="mm")))}
+    members = {**COMPANIONS, "3D/3dmodel.model": "".join(_model(sized, replace(beside, unit=frame.unit)))}
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in members.items():
             entry = zipfile.ZipInfo(name, FIRST_DAY)
