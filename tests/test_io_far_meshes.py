@@ -39,7 +39,7 @@ def far_off(far: float, seed: int = 0) -> TriMesh:
 def normals(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[np.float64]:
     a, b, c = (vertices.astype(np.float64)[faces[:, n]] for n in range(3))
     across = np.cross(b - a, c - a)
-    return across / np.linalg.norm(across, axis=1, keepdims=True)
+    return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True))
 
 
 @law(60)
