@@ -126,6 +126,29 @@ class TestWritten:
         assert found["dice"] > 0.99
         assert found["against"]["notes"] == []
 
+    @pytest.mark.parametrize(("code", "size"), [("um", 1e-3), ("[in_i]", 25.4), ("cm", 10.0), ("furlong", 1.0)])
+    def test_the_unit_is_the_one_that_it_states(self, study: Path, tmp_path: Path, code: str, size: float) -> None:
+        assert made(study, tmp_path / "m.dcm") == 0
+        data = pydicom.dcmread(tmp_path / "m.dcm")
+        data.MeasurementUnitsCodeSequence[0].CodeValue = code
+        data.save_as(tmp_path / "other.dcm")
+        assert main(["print", str(tmp_path / "other.dcm"), "-o", str(tmp_path / "part.stl"), "--quiet"]) == 0
+        one, other = read_mesh(tmp_path / "m.dcm"), read_mesh(tmp_path / "part.stl")
+        np.testing.assert_allclose(np.ptp(other.vertices, axis=0), size * np.ptp(one.vertices, axis=0), rtol=1e-5)
+
+    def test_dcmtk_makes_one_that_we_read(self, study: Path, tmp_path: Path) -> None:
+        """It states micrometers where it is not told."""
+        tool = shutil.which("stl2dcm")
+        if tool is None:
+            pytest.skip("dcmtk is not installed")
+        assert made(study, tmp_path / "m.stl") == 0
+        for name, told in (("um", []), ("mm", ["--measurement-units", "UCUM", "mm", "mm"])):
+            path = tmp_path / f"{name}.dcm"
+            source = ["--study-from", str(next(study.iterdir()))]
+            subprocess.run([tool, *source, *told, str(tmp_path / "m.stl"), str(path)], capture_output=True, check=True)
+            assert frame_of_file(path) == {"unit": name, "frame": "LPS"}
+            np.testing.assert_array_equal(read_mesh(path).vertices, read_mesh(tmp_path / "m.stl").vertices)
+
     def test_a_lone_file_of_a_study_is_no_mesh_to_compare_with(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:

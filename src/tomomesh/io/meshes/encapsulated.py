@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 ARCHIVED = (".dcm",)
 """Suffixes of meshes for an archive."""
-LENGTHS = ("mm", "cm", "m")
-"""Codes of the units of length (UCUM) that tomomesh knows."""
+UCUM = {name: name for name in ("nm", "um", "mm", "cm", "dm", "m", "km")} | {
+    "[in_i]": "in", "[ft_i]": "ft", "[ft_us]": "us-ft", "[yd_i]": "yd",
+}  # fmt: skip
+"""Code of a unit of length to its name here (The Unified Code for Units of Measure, tables 1, 6 and 7)."""
 ENCAPSULATED_STL = "1.2.840.10008.5.1.4.1.1.104.3"
 MIME = "model/stl"
 PLACE = ("StudyInstanceUID", "FrameOfReferenceUID", "PositionReferenceIndicator")
@@ -154,14 +156,14 @@ def is_archived(path: str | Path) -> bool:
 def encapsulated_frame(data: bytes, file: str) -> dict[str, str]:
     """Return the unit and the frame of a DICOM Encapsulated STL: the standard's, LPS, whatever wrote it.
 
-    The unit is one of `LENGTHS`; another, or none, is not named.
+    The unit is one of `UCUM`, as micrometers, which dcmtk writes where it is not told; another, or none, is not named.
     """
     import pydicom
 
     with third_party("pydicom", file):
         found = pydicom.dcmread(io.BytesIO(data), force=True, specific_tags=["MeasurementUnitsCodeSequence"])
         code = next((str(item.get("CodeValue")) for item in found.get("MeasurementUnitsCodeSequence") or []), "")
-    return {"frame": "LPS"} | ({"unit": code} if code in LENGTHS else {})
+    return {"frame": "LPS"} | ({"unit": UCUM[code]} if code in UCUM else {})
 
 
 def read_encapsulated(data: bytes, file: str) -> Arrays:
