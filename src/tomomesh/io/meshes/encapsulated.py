@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ... import __version__
 from ...errors import FormatError, TomomeshError, UsageError
 from ..files.atomic import check_output, replacing
-from ..files.source import third_party
+from ..files.source import third_party, unheard
 from .attributes import MeshAttributes
 from .stl import read_stl, stl_bytes
 
@@ -49,13 +49,14 @@ def check_archived(study: Mapping[str, Any], *, file: str) -> None:
     Raises
     ------
     UsageError
-        Where it is no DICOM, or names no frame of reference.
+        Where it is no DICOM, or names no frame of reference, or several.
     """
     lost = next((keyword for keyword in PLACE[:2] if not study.get(keyword)), "")
     if lost:
+        told = "several" if lost in study else "missing"
         raise UsageError(
-            "a mesh in the archive belongs to a DICOM study", file=file, found=f"{lost} = missing",
-            expected="a study of DICOM files that names its frame of reference", hint="another format, as .stl",
+            "a mesh in the archive belongs to a DICOM study", file=file, found=f"{lost} = {told}",
+            expected="a study of DICOM files that names its one frame of reference", hint="another format, as .stl",
         )  # fmt: skip
 
 
@@ -83,10 +84,10 @@ def write_encapsulated(mesh: TriMesh, path: str | Path, study: Mapping[str, Any]
     check_output(path, ARCHIVED)
     check_archived(study, file=str(path))
     document = stl_bytes(mesh, path, MeshAttributes("mm", "LPS", {}, {}))
-    data = _described(document, study, "named" if patient else "not named")
-    for keyword in PERSONAL:
-        setattr(data, keyword, study.get(keyword, "") if patient else "")
-    with replacing(path) as file:
+    with replacing(path) as file, unheard("pydicom"):  # which tells of a patient's fields that break its rules
+        data = _described(document, study, "named" if patient else "not named")
+        for keyword in PERSONAL:
+            setattr(data, keyword, study.get(keyword, "") if patient else "")
         data.save_as(file, enforce_file_format=True)
 
 
