@@ -121,7 +121,22 @@ def of_lib3mf(path: Path) -> Read:
     assert items.MoveNext()
     body = model.GetMeshObjectByID(items.GetCurrent().GetObjectResource().GetResourceID())
     vertices = np.array([list(one.Coordinates) for one in body.GetVertices()])
-    return vertices, np.array([list(one.Indices) for one in body.GetTriangleIndices()]), None
+    faces = np.array([list(one.Indices) for one in body.GetTriangleIndices()])
+    assert body.IsManifoldAndOriented()
+    return vertices, faces, _colors_of_3mf(model, body, faces)
+
+
+def _colors_of_3mf(model: Any, body: Any, faces: NDArray[np.int64]) -> NDArray[np.uint8] | None:
+    """Return what lib3mf has for the corners, which is one color a vertex where we wrote it."""
+    if not body.GetObjectLevelProperty()[2]:
+        return None
+    found = np.zeros((faces.max() + 1, 3), np.uint8)
+    for corners, told in zip(faces, body.GetAllTriangleProperties(), strict=True):
+        group = model.GetColorGroupByID(told.ResourceID)
+        for corner, number in zip(corners, told.PropertyIDs, strict=True):
+            color = group.GetColor(number)
+            found[corner] = color.Red, color.Green, color.Blue
+    return found
 
 
 def of_nibabel(path: Path) -> Read:
