@@ -283,6 +283,18 @@ class TestPly:
         assert meshio.read(tmp_path / "p.ply").points.dtype == np.float32
         np.testing.assert_array_equal(of_vtk_points(tmp_path / "p.vtp"), points.positions.astype(np.float32))
 
+    @pytest.mark.parametrize("kind", ["i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8", "?"])
+    def test_meshio_and_vtk_read_a_field_of_any_kind(self, tmp_path: Path, kind: str) -> None:
+        """Such as the 16-bit intensity of a LAS file; meshio's names of types are fewer, and its bytes have a sign."""
+        meshio = pytest.importorskip("meshio", reason="the package meshio is not installed")
+        mesh = lopsided()
+        field = (np.arange(len(mesh.vertices)) % 120).astype(kind)
+        write_mesh(mesh, tmp_path / "m.ply", vertex_fields={"f": field})
+        write_points(replace(PointSet.from_positions(mesh.vertices), attributes={"f": field}), tmp_path / "p.ply")
+        for name in ("m", "p"):
+            np.testing.assert_array_equal(meshio.read(tmp_path / f"{name}.ply").point_data["f"], field)
+        np.testing.assert_allclose(of_vtk(tmp_path / "m.ply")[0], mesh.vertices, rtol=1e-5)
+
     def test_meshio_opens_a_surface_without_filled_faces(self, tmp_path: Path, cloud_of_a_pole: Path) -> None:
         """It knows no property of faces."""
         assert main(["surface", str(cloud_of_a_pole), "-o", str(tmp_path / "m.ply"), "--quiet"]) == 0

@@ -148,7 +148,7 @@ class TestWrite:
         for name, values in expected.items():
             np.testing.assert_array_equal(back.attributes[name], values)
             if suffix == ".ply":
-                stored = {"return": np.int32, "valid": np.uint8}
+                stored = {"return": np.int32, "gray_level": np.int32, "valid": np.uint8}
                 assert back.attributes[name].dtype == stored.get(name, values.dtype)
 
     def test_trimesh_sees_the_colors(self, tmp_path: Path) -> None:
