@@ -103,12 +103,13 @@ class TestPlaces:
             assert json.loads(report.read_text())["written"].keys() == {"unit", "frame"}
 
 
-def test_ftetwild_leaves_them_empty(study: Path, tmp_path: Path) -> None:
+def test_ftetwild_leaves_them_empty(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It needs no hole points; its envelope, a thousandth of the box, is what its volume may be off."""
     wildmeshing = pytest.importorskip("wildmeshing", reason="the package wildmeshing is not installed")
     line = ["reconstruct", str(study), "--select", "1", "--network", "none", "--target-faces", "600"]
     places = told_of(line, tmp_path, "m.stl")
     vertices, faces, _ = of_meshio(tmp_path / "m.stl")
+    monkeypatch.chdir(tmp_path)  # where it leaves a file
     mesher = wildmeshing.Tetrahedralizer(stop_quality=20)
     mesher.set_mesh(np.asarray(vertices, np.float64), np.asarray(faces, np.int32))
     mesher.tetrahedralize()
