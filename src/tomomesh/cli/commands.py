@@ -16,23 +16,25 @@ from . import summary
 from .against import compared, is_mesh
 from .bars import Bars
 from .batch import reconstruct_each
-from .faults import require_kind
-from .outputs import (
+from .options.likely import require_kind
+from .outputs.checks import (
     OF_STUDIES,
     check_archive,
     check_files,
     check_folder,
     check_frame,
     check_outputs,
-    draw,
     make_folder,
+)
+from .outputs.parts import frame_of_mesh, frame_of_part
+from .outputs.write import (
+    draw,
     write_documents,
     write_picture,
     write_points,
     write_stage_one,
     write_surface,
 )
-from .parts import frame_of_mesh, frame_of_part
 from .sources import gathered, numbered, read_study, sources_of, window_of_picture
 from .streams import streamed
 
@@ -152,7 +154,7 @@ def _network(chosen: Namespace) -> None:
     from ..effect import without_effect
     from ..som.region import train_region
     from ..som.shapes import SHAPES, shape
-    from .pictures import film_of_network, pictures_of_network
+    from .outputs.pictures import film_of_network, pictures_of_network
 
     given = chosen.region in SHAPES
     if not given and not Path(chosen.region).exists():
