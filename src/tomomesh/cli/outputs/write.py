@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ...model.points import PointSet
     from ...results import Place, Segmentation, Surface
     from ...settings import Settings
+    from ...som.region import TrainedNetwork
     from ..bars import Bars
 
 RAS_ALONE = (".gii",)
@@ -161,6 +162,23 @@ def draw(
         progress("pictures", done - 1, max(expected, done))
         write_picture(figure, where / f"{name}.png")
     progress("pictures", done, done)
+
+
+def draw_network(
+    folder: Path, chosen: Namespace, trained: TrainedNetwork, settings: Settings, pixel_area: float
+) -> None:
+    """Draw a network over its region, and its training as a film where that was asked for."""
+    from ...som.shapes import SHAPES
+    from .pictures import film_of_network, pictures_of_network
+
+    given = chosen.region in SHAPES
+    title = f"A network over a {chosen.region if given else 'picture'}"
+    axes = slice(None if given else 2)  # a neuron's place in a picture is its column and row
+    for name, figure in pictures_of_network(trained, title, axes):
+        write_picture(figure, folder / f"{name}.png")
+    if chosen.film:
+        with io.replacing(folder / "02-film.gif") as file:
+            file.write(film_of_network(trained, settings, pixel_area, title, axes))
 
 
 def write_picture(figure: Figure, path: Path) -> None:
