@@ -39,6 +39,9 @@ TYPE_CODES = {
 }
 """Every name of a type to NumPy's code."""
 
+WRITTEN = ("u1", "i4", "u4", "f4", "f8")
+"""Codes of the types that are written: meshio's reader of binary files knows no other names of ours."""
+
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 """The formats to their byte orders."""
 
@@ -168,7 +171,8 @@ def write_ply(
     comment : str
         Goes into the header.
     vertices : mapping of str to (n,) array
-        One column a property; integers that PLY has no type for become doubles.
+        One column a property; other small integers than bytes become ``int``, which every reader
+        knows, and integers that PLY has no type for doubles.
     faces : (m, 3) int array, optional
         Vertex numbers.
     face_fields : mapping of str to (m,) array, optional
@@ -189,8 +193,8 @@ def write_ply(
 
 
 def _storable(column: NDArray[Any]) -> NDArray[Any]:
-    """Return a column in a type that PLY has."""
-    if column.dtype.str[1:] in TYPE_NAMES:
+    """Return a column in a type that every reader of PLY knows."""
+    if column.dtype.str[1:] in WRITTEN:
         return column
     if column.dtype.kind == "f":
         return column.astype(np.float32 if column.dtype.itemsize < 4 else np.float64)
