@@ -190,16 +190,21 @@ class TestStl:
         lambda text: text.replace("\n", "\r\n"), lambda text: text.replace("endfacet", "end facet"),
         lambda text: text.replace("solid part\n", "solid a facet of vertex 1 2 3\n", 1),
         lambda text: "  " + text, lambda text: text.replace("endsolid part", "endsolid"),
+        lambda text: text.replace("\n", "\r"), lambda text: text.replace("\n", " "), lambda text: "\ufeff" + text,
+        lambda text: text.replace("\n", "\t").replace(" ", "\t"), lambda text: text.replace("\n", "\n\n"),
+        lambda text: text.replace("part\n", "\n"), lambda text: text.replace("\n", " ").replace("part", ""),
+        lambda text: text.replace("part\n", "part of a solid\r"),
     ])  # fmt: skip
     def test_text(self, tmp_path: Path, change: Any) -> None:
         (tmp_path / "m.stl").write_bytes(change(self.text()).encode())
         assert volume_of(tmp_path / "m.stl") == pytest.approx(24)
 
-    def test_text_of_several_solids(self, tmp_path: Path) -> None:
+    @pytest.mark.parametrize("end", ["\n", "\r\n", "\r", " "])
+    def test_text_of_several_solids(self, tmp_path: Path, end: str) -> None:
         moved = self.text("b", "endsolid b").split("\n")
         moved = [f"  vertex {float(line.split()[1]) + 10} {' '.join(line.split()[2:])}" if "vertex" in line else line
                  for line in moved]  # fmt: skip
-        (tmp_path / "m.stl").write_text(self.text() + "\n".join(moved))
+        (tmp_path / "m.stl").write_bytes((self.text() + "\n".join(moved)).replace("\n", end).encode())
         assert volume_of(tmp_path / "m.stl") == pytest.approx(48)
 
     @pytest.mark.parametrize("head", [b"anything", b"solid of some program", b"solid facet outer loop vertex"])

@@ -33,10 +33,16 @@ BEFORE_FACES = STL_HEADER_BYTES + 4
 """Bytes before the first face: the text, and the count of faces."""
 
 
-BEGIN, CORNER = re.compile(rb"\s*solid\b", re.IGNORECASE), re.compile(rb"\svertex\s+(\S+\s+\S+\s+\S+)", re.IGNORECASE)
-NAMES = re.compile(rb"^[ \t]*(end[ \t]*)?solid\b[^\r\n]*", re.IGNORECASE | re.MULTILINE)
+BEGIN = re.compile(rb"(\xef\xbb\xbf)?\s*solid\b", re.IGNORECASE)
+"""How a text begins, behind the mark of UTF-8 that some editors put there."""
+
+CORNER = re.compile(rb"\svertex\s+(\S+\s+\S+\s+\S+)", re.IGNORECASE)
+NAMES = re.compile(
+    rb"(?:\A\xef\xbb\xbf|(?<!\S))(end[ \t]*)?solid\b[^\r\n]*?(?=[\r\n]|\Z|\bfacet\s+normal\b)", re.IGNORECASE
+)
 FACET, CLOSED = re.compile(rb"\bfacet\b", re.IGNORECASE), re.compile(rb"\bend\s*facet\b", re.IGNORECASE)
-"""What a text is made of: its begin, the three numbers behind a corner, the names of solids, facets and their ends."""
+"""What a text is made of: the three numbers behind a corner, the names of solids, facets and their ends. A name goes to
+the end of its line, or to the next facet where all is on one line."""
 
 
 def read_stl(data: bytes, file: str) -> Arrays:

@@ -25,7 +25,7 @@ FAMILIES = {".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF", ".jpg": "JPEG", ".jp
 """Suffixes of slices, and the format behind each."""
 
 CONVERTED_MODES = {"RGB": "RGB", "RGBA": "RGB", "P": "RGB", "1": "L", "LA": "L"}
-"""Pillow's modes that are turned into another before they are read."""
+"""Pillow's modes that are turned into another before they are read; but for TIFF's bits."""
 
 PHOTOMETRIC, BITS = 262, 258
 """Numbers of TIFF's fields that say which numbers are bright, and how many bits one has."""
@@ -77,7 +77,7 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
         pixels, more = _pixels(path)
         _check_same_kind(pixels, first, path.name, ordered[0].name)
         stack[k], turned = pixels, turned or more
-    voxels, notes = without_holes(stack, file=folder)
+    voxels, notes = without_holes(stack.view(np.uint8) if stack.dtype == np.bool_ else stack, file=folder)
     note = f"{len(ordered)} {kinds[0]} slices in the order of their names: columns left, rows back, slices up"
     return Volume.from_stored(voxels, upright(spacing), notes=(note, *told, *turned, *notes))
 
@@ -113,7 +113,9 @@ def _pixels(path: Path) -> tuple[NDArray[Any], tuple[str, ...]]:
             if getattr(image, "n_frames", 1) > 1:
                 raise FormatError("the file holds several pages", file=path.name, expected="one slice a file")
             image.load()
-            pixels = np.asarray(image.convert(CONVERTED_MODES[image.mode]) if image.mode in CONVERTED_MODES else image)
+            mask = image.mode == "1" and image.format == "TIFF"
+            convert = image.mode in CONVERTED_MODES and not mask
+            pixels = np.asarray(image.convert(CONVERTED_MODES[image.mode]) if convert else image)
             if image.mode not in CONVERTED_MODES and image.mode not in GRAY_MODES:
                 raise FormatError(
                     "the slice's colors cannot be read",
@@ -123,6 +125,8 @@ def _pixels(path: Path) -> tuple[NDArray[Any], tuple[str, ...]]:
                 )
             fields = getattr(image, "tag_v2", {})
             bits = fields.get(BITS, (1,))[0] if fields.get(PHOTOMETRIC) == WHITE_IS_ZERO else 0
+    if mask:
+        return bright_is_high(pixels ^ bool(bits), 1)  # Pillow has turned over what is WhiteIsZero
     pixels = native(pixels, file=path.name)
     if bits and pixels.dtype == np.uint8:
         pixels = 255 - pixels  # Pillow has turned them over
