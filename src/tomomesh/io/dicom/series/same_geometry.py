@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,8 +15,13 @@ if TYPE_CHECKING:
 PARALLEL = 1e-3
 """Directions whose components differ by less are the same: over a slice of 300 mm they are .3 mm."""
 
-SAME_SPACING = 1e-4
-"""Spacings that differ by less than this part are the same: over 1,000 pixels they are a tenth of one."""
+SAME_SPACING, NEAR_SPACING = 1e-4, 1e-3
+"""Spacings that differ by less than the first part are the same: over 1,000 pixels they are a tenth of one. Up to the
+second they are told: a number with three decimals in some slices and all in others, half a pixel over 500."""
+
+ROUNDED = 2e-3
+"""Products of the directions that are off those of unit vectors at right angles by more are told: rounding to three
+decimals moves them by up to .0017."""
 
 
 def check_same_geometry(frames: list[ImageFrame]) -> None:
@@ -31,7 +37,7 @@ def check_same_geometry(frames: list[ImageFrame]) -> None:
     for frame in frames[1:]:
         fields = [
             ("Rows, Columns", frame.size, first.size, 0.0),
-            ("PixelSpacing", frame.spacing, first.spacing, SAME_SPACING * least),
+            ("PixelSpacing", frame.spacing, first.spacing, NEAR_SPACING * least),
             ("ImageOrientationPatient", frame.axes, first.axes, PARALLEL),
         ]
         for field, found, expected, tolerance in fields:
@@ -43,6 +49,30 @@ def check_same_geometry(frames: list[ImageFrame]) -> None:
                     expected=f"{in_words(expected)}, as in {first.path.name}",
                     hint="a folder with the slices of one stack",
                 )
+
+
+def middle_of(frames: list[ImageFrame]) -> tuple[ImageFrame, tuple[str, ...]]:
+    """Return the first of frames of the same geometry, with the median spacing and directions of all, and notes.
+
+    So it does not matter which of them is the first.
+    """
+    first, notes = frames[0], tuple[str, ...]()
+    if first.axes is not None:
+        axes = np.median([frame.axes for frame in frames if frame.axes is not None], axis=0)
+        first = replace(first, axes=axes)
+        off = float(np.abs(axes @ axes.T - np.eye(2)).max())
+        if off > ROUNDED:
+            notes = (
+                f"ImageOrientationPatient is no pair of unit vectors at right angles, by {off:.2g}: made straight",
+            )
+    if first.spacing is not None:
+        spacings = np.array([frame.spacing for frame in frames])
+        with np.errstate(invalid="ignore"):  # of infinite ones, which are refused later
+            off = float(np.ptp(spacings, axis=0).max())
+        if off > SAME_SPACING * float(np.abs(spacings).min()):
+            notes += (f"PixelSpacing differs by up to {off:.2g} mm from slice to slice: its median was taken",)
+        first = replace(first, spacing=np.median(spacings, axis=0))
+    return first, notes
 
 
 def _same(found: object, expected: object, tolerance: float) -> bool:
