@@ -154,7 +154,9 @@ class TestMillimeters:
         noise = rng.uniform(-1e-4, 1e-4, (5, 6))
 
         def jittered(data: Dataset, k: int) -> None:
-            data.ImageOrientationPatient = [float(a) + e for a, e in zip(data.ImageOrientationPatient, noise[k])]
+            data.ImageOrientationPatient = [
+                float(a) + e for a, e in zip(data.ImageOrientationPatient, noise[k], strict=True)
+            ]
 
         one = read_volume(write_series(tmp_path / "s", STORED, AXIAL, jittered))
         for path, name in zip(sorted((tmp_path / "s").iterdir()), "cbeda", strict=True):

@@ -11,10 +11,10 @@ MM = {
 """Millimeters in a unit, by the name that it has here; a US survey foot is 1200/3937 m (NIST SP 811, B.6)."""
 
 SPELLED = {
-    "picometer": "pm", "ångström": "angstrom", "å": "angstrom", "A": "angstrom", "nanometer": "nm", "micrometer": "um", "µm": "um",
-    "micron": "um", "µ": "um", "millimeter": "mm", "centimeter": "cm", "decimeter": "dm", "meter": "m", "kilometer": "km",
-    "inch": "in", "inches": "in", '"': "in", "foot": "ft", "feet": "ft", "ftus": "us-ft", "mil": "thou",
-    "yard": "yd",
+    "picometer": "pm", "ångström": "angstrom", "å": "angstrom", "A": "angstrom", "nanometer": "nm",
+    "micrometer": "um", "µm": "um", "micron": "um", "µ": "um", "millimeter": "mm", "centimeter": "cm",
+    "decimeter": "dm", "meter": "m", "kilometer": "km", "inch": "in", "inches": "in", '"': "in", "foot": "ft",
+    "feet": "ft", "ftus": "us-ft", "mil": "thou", "yard": "yd",
 }  # fmt: skip
 """What else a unit is called: singular, in small letters, with American spelling and the micro sign."""
 

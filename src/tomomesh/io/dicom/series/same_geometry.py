@@ -62,9 +62,7 @@ def middle_of(frames: list[ImageFrame]) -> tuple[ImageFrame, tuple[str, ...]]:
         first = replace(first, axes=axes)
         off = float(np.abs(axes @ axes.T - np.eye(2)).max())
         if off > ROUNDED:
-            notes = (
-                f"ImageOrientationPatient is no pair of unit vectors at right angles, by {off:.2g}: made straight",
-            )
+            notes = (f"ImageOrientationPatient is {off:.2g} off unit vectors at right angles: it was made straight",)
     if first.spacing is not None:
         spacings = np.array([frame.spacing for frame in frames])
         with np.errstate(invalid="ignore"):  # of infinite ones, which are refused later
