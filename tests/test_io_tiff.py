@@ -183,6 +183,53 @@ def test_planar_colors_are_colors(tmp_path: Path, told: Any) -> None:
     np.testing.assert_array_equal(volume.voxels, np.moveaxis(colors, 1, -1))
 
 
+class TestPages:
+    """As tifffile's users write them: one by one, with previews, and with axes of one."""
+
+    def pages(self, folder: Path, stored: Any, **told: Any) -> Path:
+        with needed("tifffile").TiffWriter(folder / "s.tif", **told) as file:
+            for pixels in stored:
+                file.write(pixels, photometric="minisblack")
+        return folder / "s.tif"
+
+    def test_that_were_written_one_by_one(self, tmp_path: Path) -> None:
+        assert_in_place(read_volume(self.pages(tmp_path, TestTiff.STORED), settings=SPACING))
+
+    def test_of_several_sizes_or_kinds_or_stacks_are_refused(self, tmp_path: Path) -> None:
+        one = TestTiff.STORED
+        for stored in ([*one, one[0][:-1]], [*one, one[0].astype(np.int32)], [one, one]):
+            with pytest.raises(FormatError, match="several images"):
+                read_volume(self.pages(tmp_path, stored), settings=SPACING)
+
+    def test_of_several_scenes_are_refused(self, tmp_path: Path) -> None:
+        with pytest.raises(FormatError, match="several images"):
+            read_volume(self.pages(tmp_path, TestTiff.STORED, ome=True), settings=SPACING)
+
+    def test_beside_a_preview(self, tmp_path: Path) -> None:
+        with needed("tifffile").TiffWriter(tmp_path / "s.tif") as file:
+            file.write(TestTiff.STORED, photometric="minisblack")
+            file.write(np.zeros((3, 3), np.uint8), photometric="minisblack", subfiletype=1)
+        assert_in_place(read_volume(tmp_path / "s.tif", settings=SPACING))
+
+    @pytest.mark.parametrize("shape", [(1, 1, -1), (-1, 1), (1, -1)])
+    def test_with_axes_of_one(self, tmp_path: Path, shape: tuple[int, ...]) -> None:
+        stored = TestTiff.STORED.reshape(*shape, *TestTiff.STORED.shape[1:])
+        needed("tifffile").imwrite(tmp_path / "s.tif", stored, photometric="minisblack")
+        assert_in_place(read_volume(tmp_path / "s.tif", settings=SPACING))
+
+    def test_in_two_axes_are_refused(self, tmp_path: Path) -> None:
+        needed("tifffile").imwrite(tmp_path / "s.tif", np.stack([TestTiff.STORED] * 2), photometric="minisblack")
+        with pytest.raises(FormatError, match="several frames"):
+            read_volume(tmp_path / "s.tif", settings=SPACING)
+
+    def test_of_channels_are_told(self, tmp_path: Path) -> None:
+        needed("tifffile").imwrite(
+            tmp_path / "s.tif", np.stack([TestTiff.STORED] * 2, 1), imagej=True, metadata={"axes": "ZCYX"}
+        )
+        with pytest.raises(FormatError, match="several channels"):
+            read_volume(tmp_path / "s.tif", settings=SPACING)
+
+
 class TestUnits:
     """Of each axis, as ImageJ and OME spell them."""
 
