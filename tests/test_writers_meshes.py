@@ -97,6 +97,21 @@ class TestColumns:
         (tmp_path / "c.csv").write_text(text)
         assert read_points(tmp_path / "c.csv").positions.tolist() == [[1, 2, 3], [4, 5, 6]]
 
+    @pytest.mark.parametrize("text", [
+        '"x","y","z"\n"1","2","3"\n"4","5","6"\n', "// made by somebody\n1 2 3\n4 5 6 // the last\n",
+        "% made by somebody\n% x y z\n1 2 3\n4 5 6\n", "%z y x\n3 2 1\n6 5 4\n", "//\n\n1 2 3\n4 5 6",
+        '"z";"y";"x"\n"3,0";"2,0";"1,0"\n"6,0";"5,0";"4,0"\n',
+    ])  # fmt: skip
+    @pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "utf-16"])
+    def test_with_comments_and_quotes(self, tmp_path: Path, text: str, code: str) -> None:
+        (tmp_path / "c.csv").write_text(text, encoding=code)
+        assert read_points(tmp_path / "c.csv").positions.tolist() == [[1, 2, 3], [4, 5, 6]]
+
+    @pytest.mark.parametrize("suffix", ["xyzn", "xyzrgb"])
+    def test_of_open3d(self, tmp_path: Path, suffix: str) -> None:
+        (tmp_path / f"c.{suffix}").write_text("1 2 3 0 0 1\n4 5 6 0 1 0\n")
+        assert read_points(tmp_path / f"c.{suffix}").positions.tolist() == [[1, 2, 3], [4, 5, 6]]
+
     def test_three_of_other_names_are_told(self, tmp_path: Path) -> None:
         (tmp_path / "c.csv").write_text("left,back,high\n1,2,3\n")
         cloud = read_points(tmp_path / "c.csv")
