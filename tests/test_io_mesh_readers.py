@@ -136,7 +136,7 @@ class TestOff:
         lambda text: text.replace("\n4 ", "\n4  ").replace(" 0\n", " 0 # x\n", 1),
     ])  # fmt: skip
     @pytest.mark.parametrize(("head", "behind"), [("OFF", ""), ("COFF", " 255 0 0 255"), ("NOFF", " 0 0 1"),
-                                                  ("STOFF", " .5 .5")])  # fmt: skip
+                                                  ("NCOFF", " 9 8 7 255 0 0 1"), ("STOFF", " .5 .5")])  # fmt: skip
     def test_of_many(self, tmp_path: Path, change: Any, head: str, behind: str) -> None:
         rows = [f"{x} {y} {z}{behind}" for x, y, z in CORNERS] + [
             " ".join(map(str, [len(face), *face])) + " 255 0 0" * (head == "OFF") for face in MIXED

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .attributes import MeshAttributes
     from .cells import Arrays
 
-HEAD = re.compile(r"\s*(ST)?C?N?OFF\b(?!\s*BINARY)")
+HEAD = re.compile(r"\s*(ST|C|N)*OFF\b(?!\s*BINARY)")
 """The word that begins a file, and says what stands behind the three numbers of a vertex; it may be left out."""
 
 
