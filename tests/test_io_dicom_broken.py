@@ -125,6 +125,6 @@ class TestPaths:
         (tmp_path / ".c").write_text("x")
         with pytest.raises(
             FormatError,
-            match=r"0 of 3 files are images.*1 \.nii files, 1 hidden, 1 of an unknown kind.*Try: the file of the volume",
+            match=r"0 of 3 files are images.*1 \.nii files, 1 hidden, 1 of an unknown kind.*the file of the volume",
         ):
             read_volume(tmp_path)
