@@ -84,7 +84,7 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
         pixels, more = _pixels(path)
         _check_same_kind(pixels, first, path.name, ordered[0].name)
         stack[k], turned = pixels, turned or more
-    voxels, notes = without_holes(stack.view(np.uint8) if stack.dtype == np.bool_ else stack, file=folder)
+    voxels, notes = without_holes(native(stack, file=folder), file=folder)
     note = f"{len(ordered)} {kinds[0]} slices in the order of their names: columns left, rows back, slices up"
     return Volume.from_stored(voxels, upright(spacing), notes=(note, *told, *turned, *notes))
 

@@ -108,7 +108,7 @@ def _stored(found: list[Any], path: Path, name: str) -> tuple[NDArray[Any], tupl
         raise ValueError(parts[0].shape)
     keyframe, page = found[0].keyframe, found[0].shape[found[0].ndim - len(_page_axes(found[0])) :]
     stored = (parts[0] if len(parts) == 1 else np.stack(parts)).reshape(-1, *page)
-    stored = native(stored.view(np.uint8) if stored.dtype == np.bool_ else stored, file=name)
+    stored = native(stored, file=name)
     bits = keyframe.bitspersample if keyframe.photometric == WHITE_IS_ZERO or keyframe.bitspersample == 1 else 0
     stored, turned = bright_is_high(stored, bits)
     stored = np.moveaxis(stored, 1, -1) if _page_axes(found[0]) == "SYX" else stored.reshape(*stored.shape[:3], -1)
