@@ -116,12 +116,24 @@ class TestMillimeters:
         np.testing.assert_allclose(across, rotation(*turn)[:, :2], atol=0.011 * 10.0 ** (2 - digits))
         assert any("made straight" in note for note in volume.notes) <= (digits == 2)
 
-    def test_directions_that_are_off_by_more_are_refused(self, tmp_path: Path) -> None:
-        def longer(data: Dataset, k: int) -> None:
-            data.ImageOrientationPatient = [0.98 * float(value) for value in data.ImageOrientationPatient]
+    @pytest.mark.parametrize("off", [-0.03, -0.01, 0.01, 0.03])
+    @pytest.mark.parametrize("angle", [False, True])
+    def test_two_hundredths_are_taken_and_told(self, tmp_path: Path, off: float, angle: bool) -> None:
+        turned = AFFINES["oblique"]
 
-        with pytest.raises(GeometryError, match="directions of the slices are invalid"):
-            read_volume(write_series(tmp_path / "s", STORED, AXIAL, longer))
+        def edit(data: Dataset, k: int) -> None:
+            rows, columns = np.array(data.ImageOrientationPatient, float).reshape(2, 3)
+            both = (rows + off * columns, columns) if angle else ((1 + off) * rows, columns)
+            data.ImageOrientationPatient = [float(f"{value:.10f}") for value in np.concatenate(both)]
+
+        path = write_series(tmp_path / "s", sampled(turned), turned, edit)
+        if abs(off) > 0.02:
+            with pytest.raises(GeometryError, match="directions of the slices are invalid"):
+                read_volume(path)
+        else:
+            volume = read_volume(path)
+            assert any("0.01 off unit vectors at right angles" in note for note in volume.notes)
+            np.testing.assert_allclose(volume.spacing_mm, sorted((0.5, 0.7, 2.0)), rtol=1e-3)
 
     @pytest.mark.parametrize(("digits", "notes"), [(3, 1), (5, 0)])
     def test_spacings_that_were_rounded_in_some_slices(self, tmp_path: Path, digits: int, notes: int) -> None:

@@ -10,6 +10,8 @@ import numpy as np
 from ....errors import GeometryError
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ..headers.header import ImageFrame
 
 PARALLEL = 1e-3
@@ -19,9 +21,10 @@ SAME_SPACING, NEAR_SPACING = 1e-4, 1e-3
 """Spacings that differ by less than the first part are the same: over 1,000 pixels they are a tenth of one. Up to the
 second they are told: a number with three decimals in some slices and all in others, half a pixel over 500."""
 
-ROUNDED = 2e-3
-"""Products of the directions that are off those of unit vectors at right angles by more are told: rounding to three
-decimals moves them by up to .0017."""
+ROUGH, ROUNDED = 0.02, 2e-3
+"""Lengths of the directions may be off 1, and their cosine off 0, by the first: rounding to two decimals moves a length
+by up to .005 times the root of 3, which is .009, and a cosine by twice that. More than the second, which is that of
+three decimals, is told."""
 
 
 def check_same_geometry(frames: list[ImageFrame]) -> None:
@@ -60,8 +63,7 @@ def middle_of(frames: list[ImageFrame]) -> tuple[ImageFrame, tuple[str, ...]]:
     if first.axes is not None:
         axes = np.median([frame.axes for frame in frames if frame.axes is not None], axis=0)
         first = replace(first, axes=axes)
-        off = float(np.abs(axes @ axes.T - np.eye(2)).max())
-        if off > ROUNDED:
+        if (off := off_unit(axes)) > ROUNDED:
             notes = (f"ImageOrientationPatient is {off:.2g} off unit vectors at right angles: it was made straight",)
     if first.spacing is not None:
         spacings = np.array([frame.spacing for frame in frames])
@@ -71,6 +73,13 @@ def middle_of(frames: list[ImageFrame]) -> tuple[ImageFrame, tuple[str, ...]]:
             notes += (f"PixelSpacing differs by up to {off:.2g} mm from slice to slice: its median was taken",)
         first = replace(first, spacing=np.median(spacings, axis=0))
     return first, notes
+
+
+def off_unit(axes: NDArray[np.float64]) -> float:
+    """Return by how much directions (2, 3) are off unit vectors at right angles: in length, or in their cosine."""
+    lengths = np.linalg.norm(axes, axis=1)
+    cosine = abs(float(axes[0] @ axes[1])) / max(float(lengths.prod()), np.finfo(float).tiny)
+    return max(float(np.abs(lengths - 1).max()), cosine)
 
 
 def _same(found: object, expected: object, tolerance: float) -> bool:

@@ -12,7 +12,7 @@ from ...volumes.affine import check_affine, check_spacing
 from ..headers.kinds import class_of
 from ..headers.multiframe import DOSE, PROJECTIONS, no_slices
 from .regular import regular
-from .same_geometry import check_same_geometry, in_words, middle_of
+from .same_geometry import ROUGH, check_same_geometry, in_words, middle_of, off_unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,10 +26,6 @@ and no scanner's slices are so thin."""
 
 ON_LINE = 0.1
 """Origins may leave their straight line by this part of a pixel, which interpolation would not show."""
-
-RIGHT_ANGLE = 0.02
-"""Products of the directions of columns and rows may be off those of unit vectors at right angles by this: rounding to
-two decimals moves them by up to .005 (|a| + |b|), sums of three numbers, which is .0173."""
 
 TILTED = 0.1
 """Degrees of gantry tilt from which on it is mentioned: over a stack of 300 mm they are half a millimeter."""
@@ -185,7 +181,7 @@ def axes_of(frame: ImageFrame) -> NDArray[np.float64]:
     if frame.axes is None and frame.position is None:
         return np.eye(3)[:2]
     axes = np.full((2, 3), np.nan) if frame.axes is None else frame.axes
-    if not np.allclose(axes @ axes.T, np.eye(2), atol=RIGHT_ANGLE):
+    if not off_unit(axes) <= ROUGH:
         raise GeometryError(
             "the directions of the slices are invalid",
             file=frame.path.name,
