@@ -46,9 +46,11 @@ def joined(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Arrays:
     Vertices away from a border stay, whatever their positions; so do all where an edge would get two faces that run
     along it in the same way.
     """
-    count, edges = len(vertices), _edges(faces)
-    once = np.unique(edges.min(axis=1) * count + edges.max(axis=1), return_counts=True)
-    border = once[0][once[1] == 1]
+    count, (tails, heads) = len(vertices), _edges(faces)
+    edges, uses = np.unique(np.minimum(tails, heads) * count + np.maximum(tails, heads), return_counts=True)
+    border = edges[uses == 1]
+    if not len(border):
+        return vertices, faces
     at = np.unique([border // count, border % count])
     numbers = weld(vertices[at])[1]
     _, first = np.unique(numbers, return_index=True)
@@ -61,14 +63,15 @@ def joined(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Arrays:
     return vertices[kept], (np.cumsum(kept) - 1)[after]
 
 
-def _edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+def _edges(faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return where the edges of all faces (3m,) begin and end."""
+    return faces.T.ravel(), faces[:, [1, 2, 0]].T.ravel()
 
 
 def _repeated(faces: NDArray[np.int64], count: int) -> int:
     """Count the faces that run along an edge as another one does, and edges without a length."""
-    edges = _edges(faces)
-    return len(edges) - len(np.unique(edges[:, 0] * count + edges[:, 1])) + int((edges[:, 0] == edges[:, 1]).sum())
+    tails, heads = _edges(faces)
+    return len(tails) - len(np.unique(tails * count + heads)) + int((tails == heads).sum())
 
 
 def fans(corners: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
