@@ -51,9 +51,8 @@ class TestStack:
     @pytest.mark.parametrize("order", ["<", ">"])
     def test_tiff_slices_hold_the_numbers_of_a_tiff_stack(self, tmp_path: Path, kind: str, order: str) -> None:
         tifffile = needed("tifffile")
-        top = {"i": lambda t: np.iinfo(t).min // 2, "u": lambda t: np.iinfo(t).max, "f": lambda t: -0.5}
         stored = (STORED % 100).astype(kind)
-        stored[0, 0, 0] = top[kind[0]](kind)
+        stored[0, 0, 0] = -0.5 if kind[0] == "f" else np.iinfo(kind).max if kind[0] == "u" else np.iinfo(kind).min // 2
         (tmp_path / "s").mkdir()
         for k, pixels in enumerate(stored):
             tifffile.imwrite(tmp_path / "s" / f"{k}.tif", pixels, photometric="minisblack", byteorder=order)
