@@ -185,7 +185,9 @@ class TestObj:
         (tmp_path / "m.obj").write_text("\n".join(rows))
         assert volume_of(tmp_path / "m.obj") == pytest.approx(TORUS.volume)
 
-    @pytest.mark.parametrize("line", ["f 1 2 0", "f 1 2", "f 1 2 99", "f -1 -2 -99", "f a b c", "v 1 2"])
+    @pytest.mark.parametrize(
+        "line", ["f 1 2 0", "f 1 2", f"f 1 2 {9**30}", "f 1 2 99", "f -1 -2 -99", "f a b c", "v 1 2"]
+    )
     def test_what_cannot_be_is_refused(self, tmp_path: Path, line: str) -> None:
         (tmp_path / "m.obj").write_text("\n".join(["v 0 0 0", "v 1 0 0", "v 0 1 0", "v 0 0 1", "f 1 2 3", line]))
         with pytest.raises(FormatError):

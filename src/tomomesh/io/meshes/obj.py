@@ -55,7 +55,7 @@ def read_obj_mesh(data: bytes, file: str) -> Arrays:
     try:
         vertices = np.array(places, np.float64).reshape(-1, 3)
         corners = np.array([corner for polygon in polygons for corner in polygon], np.int64)
-    except ValueError:
+    except (ValueError, OverflowError):  # of numbers beyond 64 bits
         raise FormatError("a vertex or a face cannot be understood", file=file, expected="numbers") from None
     sizes = np.array([len(polygon) for polygon in polygons], np.int64)
     if (corners == 0).any() or (sizes < 3).any():

@@ -46,7 +46,7 @@ def read_off(data: bytes, file: str) -> Arrays:
         places = np.array([words[:3] for words in lines[1 : vertices + 1]], np.float64).reshape(-1, 3)
         polygons = [words[1 : int(words[0]) + 1] for words in lines[vertices + 1 : vertices + faces + 1]]
         corners = np.array([corner for polygon in polygons for corner in polygon], np.int64)
-    except ValueError:
+    except (ValueError, OverflowError):  # of numbers beyond 64 bits
         raise FormatError("the file cannot be understood", file=file, expected="OFF: vertices and faces") from None
     sizes = np.array([len(polygon) for polygon in polygons], np.int64)
     promised = np.array([int(words[0]) for words in lines[vertices + 1 : vertices + faces + 1]], np.int64)

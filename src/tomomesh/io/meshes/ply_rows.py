@@ -46,9 +46,11 @@ def read_ply_mesh(data: bytes, file: str) -> Arrays:
         name = next((name for name in CORNERS if name in lists), "")
         if name:
             corners, sizes = lists[name]
-            if (sizes < 3).any():
+            with np.errstate(invalid="ignore"):
+                numbers = corners.astype(np.int64)
+            if (sizes < 3).any() or not np.array_equal(numbers, corners):
                 raise FormatError("a face cannot be understood", file=file, expected="three vertices or more")
-            faces.append(cut(corners.astype(np.int64), sizes))
+            faces.append(cut(numbers, sizes))
     return vertices, np.concatenate(faces)
 
 
@@ -63,6 +65,8 @@ def rows_of(data: bytes, header: PlyHeader, name: str, file: str) -> tuple[Field
     before, element = header.before(name)
     if element.count == 0 or not element.properties:
         return {}, {}
+    if len(set(element.names)) < len(element.names):
+        raise FormatError("two properties have one name", file=file, found=f"element = {name}")
     if header.format == "ascii":
         return _of_text(data, header, sum(one.count for one in before), element, file)
     order, start = BYTE_ORDERS[header.format], start_of(data, header, before, file)
@@ -125,11 +129,11 @@ def _block(data: bytes, start: int, element: PlyElement, order: str) -> NDArray[
             if at + kind.itemsize > len(data) or kind.kind == "f" or len(words) < 4 or words[2] not in TYPE_CODES:
                 return None
             length = int(np.frombuffer(data, kind, 1, at)[0])
-            if not 0 <= length <= len(data):
+            if not 0 <= length * np.dtype(TYPE_CODES[words[2]]).itemsize <= len(data):
                 return None
             kinds.append((words[-1], order + TYPE_CODES[words[2]], (length,)))
     size = np.dtype(kinds).itemsize
-    if len({kind[0] for kind in kinds}) < len(kinds) or start + element.count * size > len(data):
+    if start + element.count * size > len(data):
         return None
     rows = np.frombuffer(data, np.dtype(kinds), element.count, start)
     return rows if all((rows[one[0]] == rows[one[0]][0]).all() for one in kinds if one[0].startswith("n ")) else None
