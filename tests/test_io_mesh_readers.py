@@ -150,7 +150,8 @@ class TestOff:
     @pytest.mark.parametrize("text", [
         "", "OFF", "OFF\n1 1", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n",
         "OFF\n3 1 0\n0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "OFF\n-3 1 0\n", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n",
-        "OFF BINARY\n3 1 0\n", f"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 {9**30}\n", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n",
+        "OFF BINARY\n3 1 0\n",
+        f"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 {9**30}\n", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n",
     ])  # fmt: skip
     def test_what_cannot_be_is_refused(self, tmp_path: Path, text: str) -> None:
         (tmp_path / "m.off").write_text(text)
