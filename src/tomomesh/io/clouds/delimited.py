@@ -14,7 +14,7 @@ from ..files.atomic import replacing
 from ..files.limits import require_rows
 from ..files.source import first_bytes, whole
 from ..meshes.obj import VERTEX, unfolded
-from ..text import delimiter_of, first_row, parse_rows, read_lines, typed
+from ..text import content, decoded, delimiter_of, first_row, parse_rows, read_lines, typed
 from .columns import PositionColumns, named_positions, positions_among
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Table:
 
 
 def read_text(path: Path) -> Cloud:
-    """Read rows of numbers; one line of names may come first, also behind ``#`` or ``//``, and a count before it.
+    """Read rows of numbers; one line of names may come first, also as a comment, and a count before it.
 
     Columns that are named as positions are (`named_positions`), else the first three. The other columns
     that have a name and hold numbers are fields.
@@ -54,14 +54,14 @@ def read_text(path: Path) -> Cloud:
 
 def columns_frame(path: Path) -> dict[str, Any]:
     """Return the unit that the names of the columns state, and what is to be told of them."""
-    lines = first_bytes(path, LONGEST_HEAD).decode("utf-8-sig", "replace").splitlines()
+    lines = decoded(first_bytes(path, LONGEST_HEAD), "replace").splitlines()
     columns = _table(lines, str(path)).columns
     return {"unit": columns.unit, "notes": columns.notes}
 
 
 def _table(lines: list[str], file: str) -> Table:
     """Find the line of names: the first that is no comment, or a comment before it that names the positions."""
-    first = next((n for n, line in enumerate(lines) if line.split("#")[0].strip()), len(lines))
+    first = next((n for n, line in enumerate(lines) if content(line)), len(lines))
     for n in (*range(first), *((first,) if first < len(lines) else ())):
         names = _names(lines[n])
         if named_positions(names) or (names and n == first):
@@ -101,7 +101,7 @@ def without_counts(lines: list[str], file: str) -> list[str]:
 
 def _next_row(lines: list[str], start: int) -> int:
     """Return the number of the next line that holds anything."""
-    return next((n for n in range(start, len(lines)) if lines[n].partition("#")[0].strip()), len(lines))
+    return next((n for n in range(start, len(lines)) if content(lines[n])), len(lines))
 
 
 def _is_comment(line: str) -> bool:
@@ -115,7 +115,7 @@ def _names(line: str) -> list[str]:
 
     A line of names has three words at least, and no number among the first three.
     """
-    plain = line.strip().lstrip("#/").strip()
+    plain = line.strip().lstrip("#/%").strip()
     names = [word.strip().strip("\"'") for word in plain.split(delimiter_of([plain]))]
     return names if len(names) >= 3 and not any(map(_is_number, names[:3])) else []
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import OutputError
 from ..files.signature import signature
-from .weld import weld
+from .cells import weld
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ...model.mesh import TriMesh
-    from .through_trimesh import Arrays
+    from .cells import Arrays
 
 ARCHIVED = (".dcm",)
 """Suffixes of meshes for an archive."""

@@ -16,7 +16,7 @@ from ..colors import linear, named_colors
 from ..files.atomic import replacing
 from ..files.source import third_party
 from .attributes import single_precision
-from .weld import weld
+from .cells import weld
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ...model.mesh import TriMesh
     from ..fields import Fields
     from .attributes import MeshAttributes
-    from .through_trimesh import Arrays
+    from .cells import Arrays
 
 UPRIGHT = ((1, 0, 0), (0, 0, 1), (0, -1, 0))
 """Rows of the rotation that brings z to y."""
