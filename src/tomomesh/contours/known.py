@@ -60,7 +60,8 @@ def known_slices(points: PointSet, thickness: float | None = None) -> Slices | N
     rank = np.lexsort((levels, groups))
     labels = np.where(neuron, np.argsort(rank)[labels], -1)
     heights, groups = levels[rank], groups[rank]
-    gap = max(typical_gap(heights[groups == one]) for one in np.unique(groups)) or (thickness or 0.0) / LAYERS
+    width = max(float(np.ptp(one, axis=0).max()) for one in rings)
+    gap = max(typical_gap(heights[groups == one], width) for one in np.unique(groups)) or (thickness or 0.0) / LAYERS
     if max(float(np.ptp(height[one])) for one in grouped) > 2 * PARTED * gap or gap <= 0:
         return None
     sides = np.concatenate([side_lengths(one) for one in rings])

@@ -171,21 +171,24 @@ def _planes(
     np.maximum.at(high, contour, placed[:, :2])
     height = np.bincount(contour, placed[:, 2]) / count
     column = columns_of(low, high)
-    plane = planes_within(height, column, (high - low).max(axis=1))
+    width = (high - low).max(axis=1)
+    plane = planes_within(height, column, width)
     full = np.bincount(plane, count) >= FEWEST
     labels = np.where(full, np.cumsum(full) - 1, -1)[plane][contour]
     group = np.zeros(len(full), np.int64)
     group[plane] = column
-    return (labels, group[full]) if _are_stack(placed, labels, group[full], spacing) else None
+    return (labels, group[full]) if _are_stack(placed, labels, group[full], spacing, float(width.max())) else None
 
 
-def _are_stack(placed: Floats, labels: NDArray[np.int64], groups: NDArray[np.int64], spacing: float) -> bool:
+def _are_stack(
+    placed: Floats, labels: NDArray[np.int64], groups: NDArray[np.int64], spacing: float, width: float
+) -> bool:
     """Tell whether points in planes are contours: near them, far apart, on curves, and closed."""
     if np.bincount(groups, minlength=1).max() < SLICES or np.mean(labels < 0) > STRAYS:
         return False
     taken, label = placed[labels >= 0], labels[labels >= 0]
     heights = np.bincount(label, taken[:, 2]) / np.bincount(label)
-    gaps = np.array([typical_gap(heights[groups == one]) for one in range(groups.max() + 1)])[groups][label]
+    gaps = np.array([typical_gap(heights[groups == one], width) for one in range(groups.max() + 1)])[groups][label]
     gap = np.median(gaps[gaps > 0])
     looked_at = np.unique(np.linspace(0, len(heights) - 1, LOOKED_AT).astype(int))
     planar = [np.unique(taken[label == k, :2], axis=0) for k in looked_at]

@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..measure.matching import SHARED, matched, similar
+from .endings import parabola, pole
 from .parts import shared_area
 
 if TYPE_CHECKING:
@@ -150,7 +151,9 @@ class _Neighbors:
         gap = self.gap(n, m)
         near = gap <= MISSING * self._step(n, m, way)
         tapers = self._taper(n, way), self._taper(m, -way)
-        return near and min(tapers) >= gap / 2 and (self._meet(n, m, way) or self._meet(m, n, -way))
+        poles = self._pole(n, way), self._pole(m, -way)
+        lasts = min(tapers) >= gap / 2 and max(poles) >= gap / 2
+        return near and lasts and (self._meet(n, m, way) or self._meet(m, n, -way))
 
     def _meet(self, n: int, m: int, way: int) -> bool:
         """Tell whether a part overlaps another when it moves on as it comes."""
@@ -184,6 +187,21 @@ class _Neighbors:
         m = max(inward, key=lambda one: self.parts[one].thickness)
         wider = self.parts[m].thickness - thick
         return self.gap(n, m) * thick / wider if wider > 0 else np.inf
+
+    def _pole(self, n: int, way: int) -> float:
+        """Return how far a part goes on before it ends as round as its last slices show it to be."""
+        key, inward = n, []
+        for _ in range(2):
+            beyond = self.beyond(key, -way, OVER)
+            if not beyond:
+                break
+            key = max(beyond, key=lambda one: self.parts[one].thickness)
+            inward.append(key)
+        if not inward:
+            return np.inf
+        gaps = tuple(self.gap(n, m) for m in inward)
+        squares = tuple((self.parts[m].thickness / self.parts[n].thickness) ** 2 for m in inward)
+        return pole(*parabola(gaps, squares))
 
     def successors(self, below: list[int], above: list[int]) -> list[tuple[int, int]]:
         """Pair the parts of two planes that seek each other."""
