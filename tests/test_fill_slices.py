@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from studies import write_nifti
 from tomomesh import reconstruct
@@ -91,6 +92,27 @@ class TestSolid:
         assert found.axis == axis
         filled, _ = filled_slices(sparse, volume_of(sparse, np.diag([1.0, 1.0, 1.0, 1.0])))
         assert (filled.voxels > 0).sum() == pytest.approx(body.sum(), rel=0.01)
+
+    @pytest.mark.parametrize("step", [2, 3, 5])
+    @pytest.mark.parametrize("spacing", [(1, 1, 1), (0.7, 0.7, 2.0), (0.5, 0.8, 1.0)])
+    @pytest.mark.parametrize("name", [*BODIES, "pole", "one pixel", "two pixels", "fin"])
+    def test_what_was_drawn_stays(self, name: str, spacing: tuple[float, float, float], step: int) -> None:
+        k, j, i = np.indices((SIZE,) * 3) - 31
+        thin = {
+            "pole": k**2 + j**2 + i**2 <= 15**2,
+            "one pixel": (j == 3) & (i == -4) & (np.abs(k) <= 15),
+            "two pixels": (j == 3) & (np.abs(i - 0.5) < 1) & (np.abs(k) <= 15),
+            "fin": (j == 0) & (np.abs(i) <= 9) & (np.abs(k) <= 15),
+        }
+        body = thin[name] if name in thin else BODIES[name][0]
+        sparse = thinned(body, step, 1)
+        filled, _ = filled_slices(sparse, volume_of(sparse, np.diag([*spacing, 1.0])))
+        drawn = sparse.any(axis=(1, 2))
+        np.testing.assert_array_equal(filled.voxels[drawn] > 0, sparse[drawn])
+        first, last = np.flatnonzero(drawn)[[0, -1]]
+        assert (filled.voxels[first : last + 1] > 0).any(axis=(1, 2)).all()
+        if name in thin:
+            assert ndimage.label(filled.voxels > 0)[1] == 1
 
     @pytest.mark.parametrize(("name", "genus"), [("ball", 0), ("fork", 0), ("standing torus", 1)])
     def test_the_mesh_is_one_smooth_solid(self, name: str, genus: int) -> None:

@@ -160,7 +160,8 @@ def solid_between(
     Parameters
     ----------
     slices : Slices
-        With `rings`; the pixels are as wide as its `spacing`, or wider where there would be too many.
+        With `rings`; the pixels are as wide as its `spacing`, and lie at whole multiples of it, or wider where there
+        would be too many.
     heights : (K,) float array
         Of the layers, rising.
     threads : int
@@ -177,7 +178,7 @@ def solid_between(
         Where fewer than two slices enclose anything.
     """
     drawn, found = _drawn(np.empty((0, 3)), slices, False, threads, progress)
-    stack = _stack(drawn, found, slices, slices.spacing, None)
+    stack = replace(_stack(drawn, found, slices, slices.spacing, None), on_pixels=True)
     return _levels(stack, threads, progress, heights), stack.low[:2], stack.edge
 
 

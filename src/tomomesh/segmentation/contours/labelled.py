@@ -131,7 +131,14 @@ def filled_slices(mask: Mask, study: Volume, *, threads: int = 0, progress: Prog
     )  # fmt: skip
     levels, low, edge = solid_between(slices, heights, threads=threads, progress=progress)
     depths = _resampled(levels, low, edge, (rows, columns), planes.shape)
+    depths[found.labelled] = _as_drawn(depths[found.labelled], planes[found.labelled])
     return replace(study, voxels=np.moveaxis(depths, 0, found.axis)), f"{found.told}: they were interpolated"
+
+
+def _as_drawn(depths: NDArray[np.float32], drawn: Mask) -> NDArray[np.float32]:
+    """Give the pixels that are not on the side where they were drawn the depth that a pixel alone has."""
+    alone = np.where(drawn, np.float32(0.5), np.float32(-0.5))
+    return np.where(drawn == (depths > 0), depths, alone)
 
 
 def _any_gaps(mask: Mask, axis: int) -> Gaps | None:
