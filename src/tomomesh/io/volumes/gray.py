@@ -17,13 +17,15 @@ WHITE_IS_ZERO = 0
 
 
 def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
-    """Return real numbers in the machine's own byte order.
+    """Return real numbers in the machine's own byte order; truth values are 0 and 1.
 
     Raises
     ------
     FormatError
         For complex and other kinds of voxels.
     """
+    if voxels.dtype == np.bool_:
+        return np.minimum(voxels.view(np.uint8), 1)
     if voxels.dtype.kind not in "iuf" or voxels.dtype.itemsize > 8:
         raise FormatError(
             "the voxels are of a kind that cannot be read",

@@ -76,7 +76,7 @@ def read_tiff(path: Path, settings: ReadSettings) -> Volume:
         if stored.shape != series.shape:
             raise ValueError(stored.shape)
         keyframe, axes = series.keyframe, series.axes
-    stored = native(stored.view(np.uint8) if stored.dtype == np.bool_ else stored, file=name)
+    stored = native(stored, file=name)
     bits = keyframe.bitspersample if keyframe.photometric == WHITE_IS_ZERO else 0
     stored, turned = bright_is_high(stored, bits)
     stored = np.moveaxis(stored, 1, -1) if axes.endswith("SYX") else stored.reshape(*stored.shape[:3], -1)
