@@ -209,6 +209,28 @@ class TestStructures:
             found = of_structures(tmp_path, {"one": whole})
             assert found.report["quality"]["components"] == 1
 
+    @pytest.mark.parametrize("up", [1, -1])
+    @pytest.mark.parametrize(("legs", "runs"), [(2, 1), (2, 2), (3, 1)])  # up to three slices without a leg
+    def test_legs_that_are_drawn_in_turns_join_their_trunk(self, tmp_path: Path, legs: int, runs: int, up: int) -> None:
+        apart, step, below = 15.0, 2.5, 12
+        places = apart * (np.arange(legs) - (legs - 1) / 2)
+        drawn = [polygon(6.0, step * k, center=(places[k // runs % legs], 0)) for k in range(below)]
+        trunk = apart * (legs - 1) / 2 + 6
+        drawn += [polygon(trunk, step * k) for k in range(below, below + 8)]
+        found = of_structures(tmp_path, {"trousers": [ring * [1, 1, up] for ring in drawn]})
+        assert (found.report["quality"]["components"], found.report["quality"]["genus"]) == (1, 0)
+        cylinders = np.pi * step * (8 * trunk**2 + below * legs * 36)
+        assert found.report["quality"]["volume_mm3"] == pytest.approx(cylinders, rel=0.08)
+
+    def test_two_that_become_one_become_two_in_turns(self, tmp_path: Path) -> None:
+        side = [(-1) ** k * 10.0 for k in range(8)]
+        drawn = [
+            polygon(7.0, 2.5 * k, center=(x, 0)) for k, x in zip([*range(8), *range(13, 21)], 2 * side, strict=True)
+        ]
+        drawn += [polygon(15.0, 2.5 * k) for k in range(8, 13)]
+        found = of_structures(tmp_path, {"one": drawn})
+        assert (found.report["quality"]["components"], found.report["quality"]["genus"]) == (1, 0)
+
     @pytest.mark.parametrize("off", [0.0005, 0.002, 0.01, 0.05])
     def test_heights_that_jitter(self, tmp_path: Path, off: float) -> None:
         rng = np.random.default_rng(3)

@@ -138,13 +138,13 @@ class _Neighbors:
     def onward(self, n: int, way: int) -> int:
         """Return the plane in which a part goes on; -1 where it ends."""
         over, within = (self.beyond(n, way, least) for least in (OVER, WITHIN))
-        if any(self._reach(n, m, way) for m in over):
+        if any(self.reaches(n, m, way) for m in over):
             return self.parts[over[0]].plane
         if over != within and any(self.gap(n, m) <= NEXT * self._nearest(n) for m in within):
             return self.parts[within[0]].plane
         return -1
 
-    def _reach(self, n: int, m: int, way: int) -> bool:
+    def reaches(self, n: int, m: int, way: int) -> bool:
         """Tell whether two parts are near enough to be of one body, though slices be missing between them."""
         if self.are_next(n, m, way):
             return True
@@ -170,9 +170,18 @@ class _Neighbors:
         return self.complete or self.gap(n, m) <= NEXT * self._step(n, m, way)
 
     def _step(self, n: int, m: int, way: int) -> float:
-        """Return the distance of slices on the far sides of two parts; of any neighbors, where they have no such."""
+        """Return the distance of slices on the far sides of two parts; of any neighbors, where they have no such.
+
+        Of two distances it is the wider one where the planes between are other parts': those are contoured in turns.
+        """
         far = [self.gap(one, other) for one, w in ((n, -way), (m, way)) for other in self.beyond(one, w, OVER)[:1]]
-        return min(far) if far else min(self._nearest(n), self._nearest(m))
+        if not far:
+            return min(self._nearest(n), self._nearest(m))
+        return max(far) if self._are_turns(n, m) else min(far)
+
+    def _are_turns(self, n: int, m: int) -> bool:
+        """Tell whether a plane of their group lies between two parts."""
+        return abs(self.place[n][1] - self.place[m][1]) > 1
 
     def _nearest(self, n: int) -> float:
         """Return how far the nearest part is that one may go on as."""
@@ -247,7 +256,7 @@ def _covering(near: _Neighbors, n: int, source: int | None, others: Sequence[int
         shift = share * (part.moments.center - near.parts[source].moments.center)
     shared = [shared_area(part, near.parts[m], shift, near.pixel) for m in others]
     best = int(np.argmax(shared))
-    joined = shared[best] > SHARED * part.moments.area and near.are_next(n, others[best], 1 if n < others[best] else -1)
+    joined = shared[best] > SHARED * part.moments.area and near.reaches(n, others[best], 1 if n < others[best] else -1)
     return others[best] if joined else -1
 
 
