@@ -36,9 +36,9 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
     Parameters
     ----------
     path : path
-        ``.ply`` (text or binary) and ``.vtp``; ``.xyz``, ``.asc``, ``.txt``, ``.csv`` or ``.tsv`` (the columns named
-        x, y and z or the like, else the first three; a count may come first); ``.pts`` and ``.ptx``; ``.npy`` with
-        an (n, 3) array or named fields; ``.npz`` with ``points`` or the like; ``.pcd``; ``.las``, ``.laz`` and ``.e57`` (with
+        ``.ply`` (text or binary) and ``.vtp``; ``.xyz``, ``.asc``, ``.txt``, ``.csv`` or ``.tsv`` (the columns named x,
+        y and z or the like, else the first three; a count may come first); ``.pts`` and ``.ptx``; ``.npy`` with an (n,
+        3) array or named fields; ``.npz`` with ``points`` or the like; ``.pcd``; ``.las``, ``.laz`` and ``.e57`` (with
         the extra ``clouds``, which compressed ``.pcd`` needs too); or the vertices of ``.obj``, ``.off``, ``.3mf``,
         ``.glb``, ``.gii`` and ``.stl`` (its equal positions become one vertex); or a DICOM RT Structure Set, of which
         one structure's contours are taken.
