@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 
 from studies import write_nifti
-from tomomesh import reconstruct
+from tomomesh import compare_with_study, reconstruct
 from tomomesh.cli import main
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.model.volume import Volume
@@ -165,6 +165,16 @@ class TestRecognised:
             reconstruct(volume_of(thinned(body, 40, 31)), select=(1,), fill_slices=True)
         with pytest.raises(UsageError, match="--select"):
             reconstruct(volume_of(body), fill_slices=True, lower=0.5)
+
+    def test_a_comparison_tells_of_them_too(self) -> None:
+        body = BODIES["ball"][0]
+        mesh = reconstruct(volume_of(body), select=(1,)).mesh
+        sparse = volume_of(thinned(body, 8))
+        missed = compare_with_study(mesh, sparse, select=(1,))
+        filled = compare_with_study(mesh, sparse, select=(1,), fill_slices=True)
+        assert any("--fill-slices interpolates them" in note for note in missed["notes"])
+        assert any("they were interpolated" in note for note in filled["notes"])
+        assert missed["dice"] < 0.3 < 0.95 < filled["dice"]
 
     def test_the_command_line_has_it(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
         write_nifti(tmp_path / "l.nii", thinned(BODIES["ball"][0], 4).astype(np.uint8), SPACING)
