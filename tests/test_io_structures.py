@@ -68,6 +68,31 @@ class TestSpelling:
             read_points(written({"one": EVEN}, tmp_path / "open.dcm", "OPEN_NONPLANAR"))
 
 
+class TestThickness:
+    """One contour alone as a slab, thin or thick beside its width."""
+
+    @pytest.mark.parametrize("thickness", [0.5, 3.0, 30.0, 60.0])
+    @pytest.mark.parametrize("name", ["circle", "square", "ring"])
+    def test_volume(self, tmp_path: Path, name: str, thickness: float) -> None:
+        corners = np.array([[-10.0, -10, 3], [10, -10, 3], [10, 10, 3], [-10, 10, 3]])
+        drawn, area = {
+            "circle": ([circle(12.0, 3.0)], np.pi * 144),
+            "square": ([corners], 400.0),
+            "ring": ([circle(12.0, 3.0), circle(6.0, 3.0)], np.pi * 108),
+        }[name]
+        settings = CloudSettings(thickness=thickness)
+        points = read_points(written({"one": drawn}, tmp_path / "plan.dcm"), settings=settings)
+        report = reconstruct_points(points, thickness=thickness).report
+        assert report["quality"]["volume_mm3"] == pytest.approx(area * thickness, rel=0.04)
+
+    @pytest.mark.parametrize("count", [6, 8, 72])
+    def test_few_points_are_enough(self, count: int) -> None:
+        turn = 2 * np.pi * np.arange(count) / count
+        ring = np.column_stack([10 * np.cos(turn), 10 * np.sin(turn), np.zeros(count)])
+        report = reconstruct_points(ring, thickness=40.0).report
+        assert report["quality"]["volume_mm3"] == pytest.approx(np.pi * 4000, rel=0.02)
+
+
 class TestTruth:
     @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.5, -0.7, 0.3), (np.pi / 2, 0.0, 0.0), (0.0, 1.4, 0.0)])
     def test_a_sphere_in_planes_of_any_direction(self, tmp_path: Path, turn: tuple[float, float, float]) -> None:

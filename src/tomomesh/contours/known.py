@@ -12,7 +12,7 @@ from ..model.points import NEURON, RING, SIDE, STRUCTURE
 from .direction import FEWEST, axes_across, common_normal
 from .levels import typical_gap
 from .rings import holes
-from .slices import LAYERS, PARTED, Slices
+from .slices import ACROSS, LAYERS, PARTED, Slices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,7 +65,7 @@ def known_slices(points: PointSet, thickness: float | None = None) -> Slices | N
     if max(float(np.ptp(height[one])) for one in grouped) > 2 * PARTED * gap or gap <= 0:
         return None
     sides = np.concatenate([side_lengths(one) for one in rings])
-    spacing = min(float(np.median(sides)), gap)
+    spacing = min(float(np.median(sides)), gap, *([width / ACROSS] if len(heights) == 1 else []))
     found = Slices(origin, axes_across(normal), heights, groups, labels, spacing, complete=structure is None)
     return replace(found, rings=_oriented(points, grouped, found))
 

@@ -50,6 +50,9 @@ twice by +1.2 %; with twice of the second, or half of the third, the stack is no
 LAYERS = 4
 """Voxels that a slice alone is thick at least. Chosen: half of it rounds the edges of a slab off, twice of it takes
 eight times the memory."""
+ACROSS = 16
+"""Voxels that a slice alone is wide at least, where it is thick and has few points. Chosen: of a square 20 wide and 30
+thick 0.0 % of the volume is missing, with half of it 2.9 %, without it 5.9 %; with twice of it there is 0.7 % more."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +147,7 @@ def one_slice(positions: Floats, thickness: float) -> Slices | None:
     alone = np.zeros(1, np.int64)
     return Slices(
         origin, axes_across(normal), np.array([height.mean()]), alone, np.zeros(len(positions), np.int64),
-        min(apart, thickness / LAYERS),
+        min(apart, thickness / LAYERS, float(np.ptp(local, axis=0).max()) / ACROSS),
     )  # fmt: skip
 
 
