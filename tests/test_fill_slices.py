@@ -141,6 +141,45 @@ class TestSolid:
         assert (filled.voxels > 0).sum() == pytest.approx(body.sum(), rel=0.01)
 
 
+def ball_at(x: float, z: float = 0.0, radius: float = 11.0) -> NDArray[np.bool_]:
+    inside: NDArray[np.bool_] = (X - x) ** 2 + J**2 + (K - z) ** 2 <= radius**2
+    return inside
+
+
+class TestSeveralBodies:
+    """Each is filled between its own slices, wherever those of the others lie."""
+
+    @pytest.mark.parametrize("axis", [0, 1])
+    @pytest.mark.parametrize(
+        ("steps", "first"), [((4, 4), (0, 2)), ((4, 8), (0, 2)), ((3, 5), (1, 0)), ((8, 1), (0, 0)), ((4, 4), (1, 1))]
+    )
+    def test_side_by_side(self, steps: tuple[int, int], first: tuple[int, int], axis: int) -> None:
+        one, other = ball_at(-14), ball_at(15)
+        sparse = thinned(one, steps[0], first[0], axis) | thinned(other, steps[1], first[1], axis)
+        filled, told = filled_slices(sparse, volume_of(sparse, np.diag([1.0, 1.0, 1.0, 1.0])))
+        inside = filled.voxels > 0
+        assert ndimage.label(inside)[1] == 2
+        for body, half in ((one, slice(None, 32)), (other, slice(32, None))):
+            assert inside[:, :, half].sum() == pytest.approx(body.sum(), rel=0.04)
+        assert ("slices", "rows")[axis] in told
+
+    @pytest.mark.parametrize("apart", [26, 32, 40])
+    def test_over_each_other(self, apart: int) -> None:
+        both = ball_at(0, -apart / 2, 9.0) | ball_at(0, apart / 2, 9.0)
+        sparse = thinned(both, 3)
+        inside = filled_slices(sparse, volume_of(sparse, np.diag([1.0, 1.0, 1.0, 1.0])))[0].voxels > 0
+        assert ndimage.label(inside)[1] == 2
+        assert inside.sum() == pytest.approx(both.sum(), rel=0.04)
+
+    def test_legs_in_turns_join_their_trunk(self) -> None:
+        left, right = rod((0, 0, 0), (-16, 0, 24), 7), rod((0, 0, 0), (16, 0, 24), 7)
+        trunk = rod((0, 0, -24), (0, 0, 0), 9)
+        sparse = thinned(left, 8, 3) | thinned(right, 8, 7) | thinned(trunk, 4, 3)
+        inside = filled_slices(sparse, volume_of(sparse, np.diag([1.0, 1.0, 1.0, 1.0])))[0].voxels > 0
+        assert ndimage.label(inside)[1] == 1
+        assert inside.sum() == pytest.approx((left | right | trunk).sum(), rel=0.05)
+
+
 class TestRecognised:
     def test_whole_bodies_and_two_that_taper_are_no_gaps(self) -> None:
         for body, _ in BODIES.values():

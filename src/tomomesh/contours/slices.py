@@ -76,6 +76,8 @@ class Slices:
         The contours of each plane, where they are known: seen against the normal, the inside on their left.
     complete : bool
         Whether every plane between two was looked at all over: what is not there ends, and was not left out.
+    sparse : bool
+        Whether nothing was looked at between two planes, however far apart they are.
     """
 
     origin: Floats
@@ -86,6 +88,7 @@ class Slices:
     spacing: float
     rings: tuple[tuple[Floats, ...], ...] = ()
     complete: bool = False
+    sparse: bool = False
 
     @property
     def normal(self) -> Floats:

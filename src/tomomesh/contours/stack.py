@@ -257,7 +257,7 @@ def _stack(
     ]
     if len({part.plane for part in parts}) < (2 if thickness is None else 1):
         raise EmptyError("the contours enclose nothing", expected="at least two slices with closed contours")
-    links = link_parts(parts, slices.groups, edge, complete=slices.complete)
+    links = link_parts(parts, slices.groups, edge, complete=slices.complete, sparse=slices.sparse)
     stack = Stack(parts, links, edge, typical_gap(slices.heights, width_of(parts)) or thickness or 0.0, thickness)
     while np.prod(stack.shape) > MOST_VOXELS:
         stack = replace(stack, edge=COARSER * stack.edge)

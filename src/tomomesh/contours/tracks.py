@@ -44,7 +44,9 @@ class Link:
     above: tuple[int, ...]
 
 
-def link_parts(parts: Sequence[Part], groups: NDArray[np.int64], pixel: float, *, complete: bool) -> list[Link]:
+def link_parts(
+    parts: Sequence[Part], groups: NDArray[np.int64], pixel: float, *, complete: bool, sparse: bool = False
+) -> list[Link]:
     """Find which parts go on as which.
 
     A part goes on in the nearest plane of its group that holds something it overlaps, or something like it nearby;
@@ -62,13 +64,15 @@ def link_parts(parts: Sequence[Part], groups: NDArray[np.int64], pixel: float, *
         Finest detail that matters.
     complete : bool
         Whether what is not on the next plane ends.
+    sparse : bool
+        Whether a part may go on in the next plane of its group however far that is.
 
     Returns
     -------
     list of Link
         Those below what begins, those between, those above what ends; by rising plane.
     """
-    near = _Neighbors(parts, _layers(parts, groups), pixel, complete)
+    near = _Neighbors(parts, _layers(parts, groups), pixel, complete, sparse)
     sought = _sought(near)
     pairs = [pair for key in sorted(sought) for pair in near.successors(*sought[key])]
     pairs += _branches(near, sought, pairs)
@@ -98,8 +102,10 @@ def _sought(near: _Neighbors) -> dict[tuple[int, int], tuple[list[int], list[int
 class _Neighbors:
     """What lies over and under each part."""
 
-    def __init__(self, parts: Sequence[Part], groups: list[list[list[int]]], pixel: float, complete: bool) -> None:
-        self.parts, self.groups, self.pixel, self.complete = parts, groups, pixel, complete
+    def __init__(
+        self, parts: Sequence[Part], groups: list[list[list[int]]], pixel: float, complete: bool, sparse: bool
+    ) -> None:
+        self.parts, self.groups, self.pixel, self.complete, self.sparse = parts, groups, pixel, complete, sparse
         self.place = {n: (g, k) for g, layers in enumerate(groups) for k, layer in enumerate(layers) for n in layer}
         self.on = {parts[layer[0]].plane: layer for layers in groups for layer in layers}
         self.known: dict[tuple[int, int], int] = {}
@@ -149,11 +155,13 @@ class _Neighbors:
         if self.are_next(n, m, way):
             return True
         gap = self.gap(n, m)
+        if max(self._pole(n, way), self._pole(m, -way)) < gap / 2:
+            return False
+        if self.sparse and not self._are_turns(n, m):
+            return True
         near = gap <= MISSING * self._step(n, m, way)
         tapers = self._taper(n, way), self._taper(m, -way)
-        poles = self._pole(n, way), self._pole(m, -way)
-        lasts = min(tapers) >= gap / 2 and max(poles) >= gap / 2
-        return near and lasts and (self._meet(n, m, way) or self._meet(m, n, -way))
+        return near and min(tapers) >= gap / 2 and (self._meet(n, m, way) or self._meet(m, n, -way))
 
     def _meet(self, n: int, m: int, way: int) -> bool:
         """Tell whether a part overlaps another when it moves on as it comes."""
