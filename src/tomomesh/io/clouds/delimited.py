@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,12 @@ if TYPE_CHECKING:
 LONGEST_HEAD = 1 << 16
 """Bytes at the beginning of a text in which its names are looked for."""
 
+COUNTING = (
+    "the first of the columns without names counts, as that of contours does, and was taken for x: a line of names, "
+    "as contour,x,y,z, says which are the positions",
+)
+"""What is said of it."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -53,10 +60,24 @@ def read_text(path: Path) -> Cloud:
 
 
 def columns_frame(path: Path) -> dict[str, Any]:
-    """Return the unit that the names of the columns state, and what is to be told of them."""
-    lines = decoded(first_bytes(path, LONGEST_HEAD), "replace").splitlines()
-    columns = _table(lines, str(path)).columns
-    return {"unit": columns.unit, "notes": columns.notes}
+    """Return the unit and the frame that the names of the columns state, and what is to be told of them."""
+    head = decoded(first_bytes(path, LONGEST_HEAD), "replace")
+    table = _table(head.splitlines() if len(head) < LONGEST_HEAD else head.splitlines()[:-1], str(path))
+    columns = table.columns
+    stated = {"frame": columns.frame} if columns.frame else {}
+    counting = COUNTING if not table.names and _counts(table.lines) else ()
+    return {"unit": columns.unit, "notes": columns.notes + counting} | stated
+
+
+def _counts(lines: list[str]) -> bool:
+    """Tell whether the first of more than three columns without names counts something, as contours: 0, 0, 1, 1, 1."""
+    delimiter = delimiter_of(lines)
+    rows = [line.split(delimiter) for line in lines if line.partition("#")[0].strip()]
+    firsts = [row[0].strip() for row in rows]
+    if len(rows) < 3 or min(map(len, rows)) < 4 or not all(map(str.isdecimal, firsts)):
+        return False
+    steps = np.diff([int(first) for first in firsts])
+    return bool(((steps == 0) | (steps == 1)).all())
 
 
 def _table(lines: list[str], file: str) -> Table:
@@ -116,7 +137,8 @@ def _names(line: str) -> list[str]:
     A line of names has three words at least, and no number among the first three.
     """
     plain = line.strip().lstrip("#/%").strip()
-    names = [word.strip().strip("\"'") for word in plain.split(delimiter_of([plain]))]
+    words = re.split(r"\t+", plain) if "\t" in plain else plain.split(delimiter_of([plain]))
+    names = [word.strip().strip("\"'") for word in words]
     return names if len(names) >= 3 and not any(map(_is_number, names[:3])) else []
 
 

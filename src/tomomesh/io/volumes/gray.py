@@ -20,7 +20,7 @@ ONE_BIT = "pixels of one bit: a mask of 0 and 1"
 
 
 def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
-    """Return real numbers in the machine's own byte order; true and false are 1 and 0.
+    """Return real numbers in the machine's own byte order; truth values are 0 and 1.
 
     Raises
     ------
@@ -28,7 +28,7 @@ def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
         For complex and other kinds of voxels.
     """
     if voxels.dtype == np.bool_:
-        return voxels.view(np.uint8)
+        return np.minimum(voxels.view(np.uint8), 1)
     if voxels.dtype.kind not in "iuf" or voxels.dtype.itemsize > 8:
         raise FormatError(
             "the voxels are of a kind that cannot be read",

@@ -79,7 +79,7 @@ def read_metaimage(path: Path, settings: ReadSettings) -> Volume:
     affine, notes = _frame(fields, settings, name)
     channels = _channels(fields, name)
     stored = read_raster(_raster(fields, (*sizes[::-1], channels), path, start, length), file=name)
-    voxels, more = gray_or_color(stored, channels, file=name)
+    voxels, more = gray_or_color(stored, channels, file=name, named=False)
     return Volume.from_stored(voxels, affine, notes=notes + more)
 
 

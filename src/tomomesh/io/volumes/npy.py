@@ -54,7 +54,7 @@ def read_npy_volume(path: Path, settings: ReadSettings) -> Volume:
     spacing = required_spacing(settings.spacing, file=name, what="NPY arrays hold no spacing")
     numbers = read_raster(Raster(shape[::-1] if by_columns else shape, dtype, PLAIN, (path,), start), file=name)
     stored = (numbers.T if by_columns else numbers).reshape(*plain[:3], -1)
-    voxels, notes = gray_or_color(stored, stored.shape[3], file=name)
+    voxels, notes = gray_or_color(stored, stored.shape[3], file=name, named=False)
     return Volume.from_stored(voxels, upright(spacing), notes=(GIVEN, *notes))
 
 
