@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from .model.columns import any_of
+from .model.mesh import QuadMesh
 from .model.points import CAP
 from .report import Reported
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from .followed import Followed
     from .isosurface.crossings import Levels
     from .model.cubes import CubeGrid
-    from .model.mesh import QuadMesh, TriMesh
+    from .model.mesh import TriMesh
     from .model.points import PointSet
     from .model.trace import Trace
     from .model.volume import Volume
@@ -63,6 +64,17 @@ class Segmentation(Reported, Generic[S]):
     sampling: Sampling
     source: S
     levels: Levels | None = None
+
+    def without_voxels(self) -> Segmentation[S]:
+        """Return the same without the study's voxels, where its way does not go on by them."""
+        return self if self.levels is not None else replace(self, volume=self.volume.bare())
+
+    def bare(self) -> Segmentation[Any]:
+        """Return the same without all that no step after its surface needs: it is only shown, or written."""
+        none = np.broadcast_to(np.False_, self.mask.shape)
+        return replace(
+            self, volume=self.volume.bare(), mask=none, labels=none.view(np.uint8), source=None, levels=None
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -159,6 +171,11 @@ class Surface(Reported):
     segmentation: Segmentation[Any] | None = None
     place: Place | None = None
     part: Part | None = None
+
+    def bare(self) -> Surface:
+        """Return the same without what is only shown of how it came about."""
+        none = QuadMesh(np.empty((0, 3)), np.empty((0, 4), np.int64))
+        return replace(self, cuberille=none, smoothed=self.mesh, nearest=np.empty(0, np.int32), trace=None)
 
     @property
     def capped(self) -> bool:

@@ -14,8 +14,9 @@ from ..kernels.remeshing.lengths import TOO_LONG, TOO_SHORT, mark_lengths
 from ..kernels.remeshing.links import KEPT
 from ..kernels.remeshing.moves import lift_vertices, move_vertices
 from ..kernels.remeshing.splits import split_edges
+from ..kernels.remeshing.surface import normals_of
 from ..kernels.threads import in_blocks
-from ..model.columns import any_of
+from ..model.columns import any_of, mean_over
 from ..model.mesh import TriMesh
 
 if TYPE_CHECKING:
@@ -61,7 +62,11 @@ class Making:
             self.outs[self.corners[gone]], self.corners[gone] = -1, -1
         along = np.flatnonzero(ground.creases)
         self.under[ground.faces.reshape(-1)[along]] = along // 3
-        self.ups = ground.normals[self.under]
+        self.ups = np.empty_like(self.places)
+        in_blocks(
+            lambda start, stop: normals_of(ground.mesh.vertices, ground.faces, self.under, self.ups, start, stop),
+            len(self.ups), block=BLOCK, threads=threads,
+        )  # fmt: skip
         self._begun = self.places
         self.counts = np.array([len(self.places), len(self.corners) // 3])
 
@@ -87,8 +92,7 @@ class Making:
     def rescaled(self, ground: Ground) -> None:
         """Go on with other lengths of edges."""
         self._ground = ground
-        under = np.maximum(self.under, 0)
-        self.sizes = ground.sizes[ground.faces[under]].mean(axis=1)
+        self.sizes = mean_over(ground.sizes, ground.faces[np.maximum(self.under, 0)])
 
     @contextmanager
     def only_around(self, some: NDArray[np.bool_], share: float) -> Iterator[Callable[[], NDArray[np.bool_]]]:
@@ -176,7 +180,7 @@ class Making:
             move_vertices(
                 self.places, self.corners, self.twins, self.outs, self.kinds, self.sharp, self.sizes, self.under,
                 self.ups, ground.mesh.vertices, ground.faces, ground.creases.reshape(-1, 3), ground.twins, ground.fans,
-                ground.first, ground.normals, ground.sizes, start, stop,
+                ground.first, ground.sizes, start, stop,
             )  # fmt: skip
 
         self._over_vertices(work)
