@@ -60,7 +60,7 @@ class TriMesh:
 
     @property
     def face_vectors(self) -> NDArray[np.float64]:
-        """Outward normals whose length is twice the face's area, (m, 3); not kept, for they are as large as the mesh."""
+        """Outward normals whose length is twice the face's area, (m, 3); not kept: they are as large as it."""
         found = np.empty((len(self.faces), 3))
         for part in parts_of(len(found)):
             a, b, c = (self.vertices[corner] for corner in self.faces[part].T)
