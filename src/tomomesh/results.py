@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
@@ -14,6 +15,8 @@ from .model.points import CAP
 from .report import Reported
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from .followed import Followed
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
     from .model.volume import Volume
     from .printing.part import Part
     from .segmentation.sample import Sampling
+
+    Regions = NDArray[np.unsignedinteger[Any]]
 
 S = TypeVar("S")
 
@@ -45,8 +50,8 @@ class Segmentation(Reported, Generic[S]):
         Of the slices: axial, coronal or sagittal.
     mask : (K, J, I) bool array
         The window.
-    labels : (K, J, I) uint8 or uint16 array
-        Every window pixel's winner: 0 background, neuron + 1 within its slice.
+    regions : (K, J, I) uint8 or uint16 array, or callable
+        The labels, or what finds them.
     points : PointSet
         The neurons, bridged gaps and caps in patient millimeters.
     sampling : Sampling
@@ -59,11 +64,16 @@ class Segmentation(Reported, Generic[S]):
     volume: Volume
     plane: str
     mask: NDArray[np.bool_]
-    labels: NDArray[np.unsignedinteger[Any]]
+    regions: Regions | Callable[[], Regions]
     points: PointSet
     sampling: Sampling
     source: S
     levels: Levels | None = None
+
+    @cached_property
+    def labels(self) -> Regions:
+        """Every window pixel's winner, (K, J, I): 0 background, neuron + 1 within its slice; found on first use."""
+        return self.regions() if callable(self.regions) else self.regions
 
     def without_voxels(self) -> Segmentation[S]:
         """Return the same without the study's voxels, where its way does not go on by them."""
@@ -73,7 +83,7 @@ class Segmentation(Reported, Generic[S]):
         """Return the same without all that no step after its surface needs: it is only shown, or written."""
         none = np.broadcast_to(np.False_, self.mask.shape)
         return replace(
-            self, volume=self.volume.bare(), mask=none, labels=none.view(np.uint8), source=None, levels=None
+            self, volume=self.volume.bare(), mask=none, regions=none.view(np.uint8), source=None, levels=None
         )  # fmt: skip
 
 

@@ -16,6 +16,8 @@ from ..kernels.remeshing.moves import lift_vertices, move_vertices
 from ..kernels.remeshing.splits import split_edges
 from ..kernels.remeshing.surface import normals_of
 from ..kernels.threads import in_blocks
+from ..measure.intersections import marked_in
+from ..measure.tree import Tree
 from ..model.columns import any_of, mean_over
 from ..model.mesh import TriMesh
 
@@ -83,11 +85,21 @@ class Making:
 
     def mesh(self) -> tuple[TriMesh, NDArray[np.int32]]:
         """Return the mesh, and the face of the surface before under each of its vertices."""
+        used, faces = self._numbered()
+        return TriMesh(self.places[used], faces), self.under[used]
+
+    def crossing(self) -> NDArray[np.bool_]:
+        """Mark the faces (m,) that pass through others; before there is a mesh, whose numbers have twice the bits."""
+        used, faces = self._numbered()
+        return marked_in(Tree.over(self.places[used], faces, threads=self._threads), threads=self._threads)
+
+    def _numbered(self) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
+        """Tell which vertices (n,) are used, and return the faces (m, 3) by their numbers among these."""
         faces = self.faces
         used = np.zeros(len(self.outs), np.bool_)
         used[faces.reshape(-1)] = True
-        number = np.cumsum(used) - 1
-        return TriMesh(self.places[used], number[faces]), self.under[used]
+        number = np.cumsum(used, dtype=np.int32) - np.int32(1)
+        return used, np.take(number, faces)
 
     def rescaled(self, ground: Ground) -> None:
         """Go on with other lengths of edges."""

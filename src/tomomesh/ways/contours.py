@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,13 +40,11 @@ def segment_by_contours(kept: Selected, settings: Settings, progress: Progress) 
         "networks", train_contours, mask, settings.network, levels=levels, pixel_mm=pixel_mm, seed=run.seed,
         threads=run.threads, progress=progress,
     )  # fmt: skip
-    labels = measured("regions", regions, mask, trained.value, pixel_mm=pixel_mm, threads=run.threads)
+    labels = partial(regions, mask, trained.value, pixel_mm=pixel_mm, threads=run.threads)
     placed = measured("points", sample_contours, trained.value, study)
     sampling = placed.value
-    found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value, levels)
-    return folded(
-        found, trained, labels, _contours_found(trained.value, kept, settings), placed, sampling_found(placed.value)
-    )
+    found = Segmentation(study, kept.plane, mask, labels, sampling.points, sampling, trained.value, levels)
+    return folded(found, trained, _contours_found(trained.value, kept, settings), placed, sampling_found(placed.value))
 
 
 def surface_by_contours(found: Segmentation[Contours], settings: Settings, progress: Progress) -> Stage[Surface]:
