@@ -56,13 +56,13 @@ def surface_by_contours(found: Segmentation[Contours], settings: Settings, progr
         Where the rings enclose the middle of no pixel, or are on one slice alone.
     """
     run = settings.run
+    follows = measured("quality", _followed, found, run.threads)  # before there is a net, which takes as much
     bounded = measured(
         "contours", boundary_of_rings, found, surface=settings.cubes.surface, threads=run.threads, progress=progress
     )
     made = bounded.value
     meshed = measured("fit", voxel_surface, made, settings.fit, threads=run.threads, progress=progress)
     rest = meshed.value
-    follows = measured("quality", _followed, found, run.threads)
     surface = Surface(
         found.points, made.cuberille, rest.smoothed, rest.mesh, NOTHING, cavities=made.cavities,
         encloses=Enclosed("rings", found.sampling.volume_mm3).or_more(Enclosed.window(found)),
