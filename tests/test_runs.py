@@ -25,7 +25,7 @@ MASKS = arrays(np.bool_, st.tuples(*(st.integers(1, 7),) * 3))
 def labelled(mask: Mask, *, corners: bool) -> tuple[NDArray[np.int32], int]:
     """Number the components of a mask from 1, voxel by voxel."""
     labels, count = ndimage.label(mask, np.ones((3, 3, 3)) if corners else None)
-    return labels, count
+    return labels.astype(np.int32), count
 
 
 @pytest.mark.parametrize("corners", [False, True])

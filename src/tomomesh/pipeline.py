@@ -171,11 +171,12 @@ def _reconstructed(
     del volume, labels
     found = found if kept else found.without_voxels()
     made = way.surface(found, taken, progress)
-    surface, made = made.value if kept else made.value.bare(), folded(None, made)
+    surface, told = made.value if kept else made.value.bare(), folded(None, made)
+    del made
     found = found if kept else found.bare()
     done, later = finish(replace(surface, segmentation=found), settings, progress)
     known = () if truth is None else (compare_with(done.value, truth),)
-    return replace(done.value, way=found.way, settings=settings, stages=(*found.stages, made, done, *known, *later))
+    return replace(done.value, way=found.way, settings=settings, stages=(*found.stages, told, done, *known, *later))
 
 
 def _settled(settings: Settings | None, changes: dict[str, Any]) -> Settings:

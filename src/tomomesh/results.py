@@ -82,8 +82,9 @@ class Segmentation(Reported, Generic[S]):
     def bare(self) -> Segmentation[Any]:
         """Return the same without all that no step after its surface needs: it is only shown, or written."""
         none = np.broadcast_to(np.False_, self.mask.shape)
+        every: Segmentation[Any] = self
         return replace(
-            self, volume=self.volume.bare(), mask=none, regions=none.view(np.uint8), source=None, levels=None
+            every, volume=self.volume.bare(), mask=none, regions=none.view(np.uint8), source=None, levels=None
         )  # fmt: skip
 
 

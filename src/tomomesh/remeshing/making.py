@@ -86,7 +86,7 @@ class Making:
     def mesh(self) -> tuple[TriMesh, NDArray[np.int32]]:
         """Return the mesh, and the face of the surface before under each of its vertices."""
         used, faces = self._numbered()
-        return TriMesh(self.places[used], faces), self.under[used]
+        return TriMesh(self.places[used], faces.astype(np.int64)), self.under[used]
 
     def crossing(self) -> NDArray[np.bool_]:
         """Mark the faces (m,) that pass through others; before there is a mesh, whose numbers have twice the bits."""
