@@ -62,6 +62,6 @@ def test_thin_squares_are_those_with_background_behind(seed: int) -> None:
     mask = np.zeros((9, 8, 10), bool)
     mask[1:-1, 1:-1, 1:-1] = np.random.default_rng(seed).random((7, 6, 8)) < 0.8
     net, lit = net_around(mask), set(map(tuple, np.argwhere(mask)))
-    for inner, step, found in zip(net.inner, net.steps, thin_squares(mask, net), strict=True):
+    for inner, step, found in zip(net.inner, net.steps, thin_squares(mask, net.inner + 1, net.steps), strict=True):
         behind = [tuple((inner + 1 - n * step)[::-1]) for n in range(1, DEPTH + 1)]
         assert found == (not all(min(one) >= 0 and one in lit for one in behind))

@@ -18,7 +18,7 @@ from .ways.choice import take_way
 from .ways.clouds.points import take_points
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Callable, Collection
 
     import numpy as np
     from numpy.typing import NDArray
@@ -71,13 +71,28 @@ def reconstruct(
     >>> found.report["quality"]["closed"], found.report["quality"]["genus"]
     (True, 0)
     """
-    settings = _settled(settings, changes)
-    way_of(choose_way(settings, _input_of(volume))).require(settings)
-    found, way, taken = _segmented(volume, labels, settings, changes, progress)
-    made = way.surface(found, taken, progress)
-    done, later = finish(replace(made.value, segmentation=found), settings, progress)
-    known = () if truth is None else (compare_with(done.value, truth),)
-    return replace(done.value, way=found.way, settings=settings, stages=(*found.stages, made, done, *known, *later))
+    return _reconstructed(lambda: (volume, labels), _settled(settings, changes), changes, progress, truth=truth)
+
+
+def reconstruct_once(
+    read: Callable[[], tuple[Volume, Volume | None]], settings: Settings, *, progress: Progress = silent, **changes: Any
+) -> Surface:
+    """Reconstruct a study that nobody looks at again: what no later step needs is let go as soon as that is known.
+
+    Parameters
+    ----------
+    read : callable
+        Hands over the study, and the label map beside it or None, and keeps neither.
+    settings, progress, **changes
+        As in `reconstruct`.
+
+    Returns
+    -------
+    Surface
+        The mesh, its points and its report are those of `reconstruct`; the study's voxels, its window, networks and
+        the surface before the fit are left out.
+    """
+    return _reconstructed(read, _settled(settings, changes), changes, progress, kept=False)
 
 
 def segment(
@@ -144,6 +159,24 @@ def reconstruct_points(
     made = begun.value.surface(taken.value, settings, progress)
     done, later = finish(replace(made.value, place=taken.value.place), settings, progress)
     return replace(done.value, way=begun.value.name, settings=settings, stages=(taken, begun, made, done, *later))
+
+
+def _reconstructed(
+    read: Callable[[], tuple[Volume, Volume | None]], settings: Settings, given: Collection[str], progress: Progress,
+    *, truth: TriMesh | None = None, kept: bool = True,
+) -> Surface:  # fmt: skip
+    volume, labels = read()
+    way_of(choose_way(settings, _input_of(volume))).require(settings)
+    found, way, taken = _segmented(volume, labels, settings, given, progress)
+    del volume, labels
+    found = found if kept else found.without_voxels()
+    made = way.surface(found, taken, progress)
+    surface, told = made.value if kept else made.value.bare(), folded(None, made)
+    del made
+    found = found if kept else found.bare()
+    done, later = finish(replace(surface, segmentation=found), settings, progress)
+    known = () if truth is None else (compare_with(done.value, truth),)
+    return replace(done.value, way=found.way, settings=settings, stages=(*found.stages, told, done, *known, *later))
 
 
 def _settled(settings: Settings | None, changes: dict[str, Any]) -> Settings:

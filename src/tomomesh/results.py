@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from .model.columns import any_of
+from .model.mesh import QuadMesh
 from .model.points import CAP
 from .report import Reported
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from .followed import Followed
     from .isosurface.crossings import Levels
     from .model.cubes import CubeGrid
-    from .model.mesh import QuadMesh, TriMesh
+    from .model.mesh import TriMesh
     from .model.points import PointSet
     from .model.trace import Trace
     from .model.volume import Volume
     from .printing.part import Part
     from .segmentation.sample import Sampling
+
+    Regions = NDArray[np.unsignedinteger[Any]]
 
 S = TypeVar("S")
 
@@ -44,8 +50,8 @@ class Segmentation(Reported, Generic[S]):
         Of the slices: axial, coronal or sagittal.
     mask : (K, J, I) bool array
         The window.
-    labels : (K, J, I) uint8 or uint16 array
-        Every window pixel's winner: 0 background, neuron + 1 within its slice.
+    regions : (K, J, I) uint8 or uint16 array, or callable
+        The labels, or what finds them.
     points : PointSet
         The neurons, bridged gaps and caps in patient millimeters.
     sampling : Sampling
@@ -58,11 +64,28 @@ class Segmentation(Reported, Generic[S]):
     volume: Volume
     plane: str
     mask: NDArray[np.bool_]
-    labels: NDArray[np.unsignedinteger[Any]]
+    regions: Regions | Callable[[], Regions]
     points: PointSet
     sampling: Sampling
     source: S
     levels: Levels | None = None
+
+    @cached_property
+    def labels(self) -> Regions:
+        """Every window pixel's winner, (K, J, I): 0 background, neuron + 1 within its slice; found on first use."""
+        return self.regions() if callable(self.regions) else self.regions
+
+    def without_voxels(self) -> Segmentation[S]:
+        """Return the same without the study's voxels, where its way does not go on by them."""
+        return self if self.levels is not None else replace(self, volume=self.volume.bare())
+
+    def bare(self) -> Segmentation[Any]:
+        """Return the same without all that no step after its surface needs: it is only shown, or written."""
+        none = np.broadcast_to(np.False_, self.mask.shape)
+        every: Segmentation[Any] = self
+        return replace(
+            every, volume=self.volume.bare(), mask=none, regions=none.view(np.uint8), source=None, levels=None
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -159,6 +182,11 @@ class Surface(Reported):
     segmentation: Segmentation[Any] | None = None
     place: Place | None = None
     part: Part | None = None
+
+    def bare(self) -> Surface:
+        """Return the same without what is only shown of how it came about."""
+        none = QuadMesh(np.empty((0, 3)), np.empty((0, 4), np.int64))
+        return replace(self, cuberille=none, smoothed=self.mesh, nearest=np.empty(0, np.int32), trace=None)
 
     @property
     def capped(self) -> bool:

@@ -39,6 +39,7 @@ from .streams import streamed
 
 if TYPE_CHECKING:
     from ..model.mesh import TriMesh
+    from ..model.volume import Volume
     from ..results import Surface
 
 
@@ -102,12 +103,19 @@ def _reconstruct(chosen: Namespace) -> None:
 def _reconstruct_one(chosen: Namespace, settings: Settings) -> Surface:
     check_outputs(chosen, OF_STUDIES, *sources_of(chosen, settings))
     check_frame(chosen.output, settings)
-    from ..pipeline import reconstruct
+    from ..pipeline import reconstruct, reconstruct_once
 
-    with Bars(quiet=chosen.quiet) as progress:
+    def read() -> tuple[Volume, Volume | None]:
         volume, labels = read_study(chosen, settings, progress)
         check_archive(chosen, volume)
-        surface = reconstruct(volume, settings, labels=labels, progress=progress, **given_of(chosen))
+        return volume, labels
+
+    with Bars(quiet=chosen.quiet) as progress:
+        if chosen.figures or chosen.labels or chosen.mask_out:
+            volume, labels = read()
+            surface = reconstruct(volume, settings, labels=labels, progress=progress, **given_of(chosen))
+        else:
+            surface = reconstruct_once(read, settings, progress=progress, **given_of(chosen))
         return write_surface(chosen, surface, settings, progress)
 
 

@@ -45,6 +45,10 @@ OWNED = np.array([sum((case ^ case >> shift) & 1 for shift in (1, 2, 4)) for cas
 """Faces that a cell owns: those between its lowest corner and the next along each axis."""
 
 
+BELOW = np.full(3, -1, np.int32)
+"""The first voxel of a mask that has a layer more than the study around it."""
+
+
 def _linked() -> NDArray[np.bool_]:
     """Tell for every case which of the six neighbors share a side of a face with the cell: (256, 6)."""
     inside = np.arange(256)[:, None] >> np.arange(8) & 1
@@ -88,14 +92,16 @@ class Net:
         return np.array(DIRECTIONS, np.int32)[self.directions]
 
 
-def net_around(mask: NDArray[np.bool_], threads: int = 0) -> Net:
+def net_around(mask: NDArray[np.bool_], threads: int = 0, lowest: NDArray[np.int32] = BELOW) -> Net:
     """Span a net around the voxels of a mask.
 
     Parameters
     ----------
     mask : (K, J, I) bool array
-        Well composed, with one layer of background around it; voxel (0, 0, 0) of the study is its (1, 1, 1).
+        Well composed, with one layer of background around it.
     threads : int
+    lowest : (3,) int32 array
+        The voxel (x, y, z) of the study that is its first.
 
     Returns
     -------
@@ -117,7 +123,7 @@ def net_around(mask: NDArray[np.bool_], threads: int = 0) -> Net:
         list_fans(cases, table, first, fans, start, stop)
 
     in_blocks(work, len(cells), block=BLOCK, threads=threads)
-    low = cells - np.int32(1)
+    low = cells + lowest
     backward = np.maximum(-np.array(DIRECTIONS, np.int32), 0)[directions]
     return Net(low.astype(np.float64), table, fans, quads, np.repeat(low, owned, axis=0) + backward, directions)
 

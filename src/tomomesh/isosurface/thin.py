@@ -33,13 +33,21 @@ ROUNDS = 6
 volume of rods and leaves by .3 %."""
 
 
-def thin_squares(mask: Marks, net: Net) -> Marks:
-    """Tell behind which squares (q,) the mask (K, J, I) of the net, one layer of background around it, ends soon."""
-    deep = np.pad(mask, DEPTH - 1)
-    found = np.zeros(len(net.quads), np.bool_)
+def thin_squares(mask: Marks, inner: NDArray[np.int32], steps: NDArray[np.int32]) -> Marks:
+    """Tell behind which squares (q,) a mask (K, J, I) ends soon; it has one layer of background around it.
+
+    Parameters
+    ----------
+    mask : (K, J, I) bool array
+    inner : (q, 3) int32 array
+        The voxel (x, y, z) of the mask behind each square.
+    steps : (q, 3) int32 array
+        From there to the voxel outside.
+    """
+    found, last = np.zeros(len(inner), np.bool_), np.array(mask.shape[::-1], np.int32) - 1
     for step in range(1, DEPTH + 1):
-        x, y, z = (net.inner + np.int32(DEPTH) - step * net.steps).T
-        found |= ~deep[z, y, x]
+        x, y, z = np.clip(inner - step * steps, 0, last).T
+        found |= ~mask[z, y, x]
     return found
 
 

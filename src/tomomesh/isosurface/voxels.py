@@ -15,6 +15,7 @@ from ..model.points import PointSet
 from ..progress import Progress, silent
 from .crossings import LevelCrossings, Levels, crossings
 from .diagonals import placed, right_handed, triangulated
+from .runs import Runs
 from .surface_nets import Net, NetFit, net_around, settle
 from .thick_slices import thinned
 from .thin import thin_squares
@@ -123,21 +124,28 @@ def boundary(
     thin = thinned(levels, mask, affine, threads) if divide else None
     if thin is not None:
         levels, mask, affine = thin.levels, thin.mask, thin.affine
-    padded = np.pad(mask, 1)
-    joined = without_contacts(padded, lambda voxels: levels.excess(voxels - np.int32(1)), threads)
-    net = net_around(_filled(joined) if surface == "outer" else joined, threads)
-    x, y, z = (net.inner + 1).T
-    found = crossings(levels, net.inner, net.steps, ~padded[z, y, x], thin)
+    held, low = _framed(mask)
+    joined = without_contacts(held, lambda voxels: levels.excess(voxels + low), threads)
+    net = net_around(_filled(joined) if surface == "outer" else joined, threads, low)
+    x, y, z = net.inner.T
+    found = crossings(levels, net.inner, net.steps, ~mask[z, y, x], thin)
     if found.stepped:  # gray levels say themselves where their border is
-        found = replace(found, thin=thin_squares(joined, net))
-    added = int(np.count_nonzero(joined) - np.count_nonzero(padded))
+        found = replace(found, thin=thin_squares(joined, net.inner - low, net.steps))
+    added = int(np.count_nonzero(joined) - np.count_nonzero(held))
     return Boundary(affine, net, found, added, 1 if thin is None else thin.parts)
+
+
+def _framed(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
+    """Return the box of a mask with one layer of background around it, and its lowest voxel (x, y, z)."""
+    box = ndimage.find_objects(mask.view(np.uint8))[0]
+    return np.pad(mask[box], 1), np.array([side.start - 1 for side in box[::-1]], np.int32)
 
 
 def _filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Fill what the outside does not reach; a mask without contacts stays without them."""
-    background, _ = ndimage.label(~mask)
-    return np.asarray(background != background[0, 0, 0])
+    holes, filled = Runs.of(mask, value=False), mask.copy()
+    holes.fill(filled, ~holes.bordering, True)
+    return filled
 
 
 @dataclass(frozen=True)

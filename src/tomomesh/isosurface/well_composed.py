@@ -107,8 +107,8 @@ def without_contacts(
     -------
     (K, J, I) bool array
     """
-    joined = mask.copy()
-    cells, _ = cells_where(joined, JOINING > 0, threads)
+    cells, _ = cells_where(mask, JOINING > 0, threads)
+    joined = mask.copy() if len(cells) else mask
     while len(cells):
         voxels = _once_each([_nearest_to_window(part, joined, excess) for part in _parts(cells)], mask.shape)
         x, y, z = voxels.T

@@ -6,14 +6,19 @@ Along the rows numpy takes twenty times as long.
 from __future__ import annotations
 
 from functools import reduce
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import ArrayLike, NDArray
 
 Kind = TypeVar("Kind", bound=np.generic)
+
+PART = 100_000
+"""Rows worked on together. Only memory and time depend on it."""
 
 
 def box(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -31,6 +36,19 @@ def cells_at(
 def any_of(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Tell which rows (n, k) have any true column, (n,)."""
     return reduce(np.logical_or, rows.T)
+
+
+def mean_over(values: NDArray[np.float64], rows: NDArray[np.integer[Any]]) -> NDArray[np.float64]:
+    """Average values (n,) over rows of their numbers (m, k), part by part, for what is taken is many times as large."""
+    found = np.empty(len(rows))
+    for part in parts_of(len(rows)):
+        values[rows[part]].mean(axis=1, out=found[part])
+    return found
+
+
+def parts_of(count: int) -> Iterator[slice]:
+    """Part so many rows into some, which bounds the memory of what is made of them."""
+    return (slice(start, start + PART) for start in range(0, count, PART))
 
 
 def for_kernels(numbers: ArrayLike, kind: type[Kind]) -> NDArray[Kind]:

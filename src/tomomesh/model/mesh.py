@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .columns import for_kernels
+from .columns import for_kernels, parts_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,11 +58,14 @@ class TriMesh:
         """Positions of the three corners of every face, (m, 3, 3); not kept, for they are four times the mesh."""
         return self.vertices[self.faces]
 
-    @cached_property
+    @property
     def face_vectors(self) -> NDArray[np.float64]:
-        """Outward normals whose length is twice the face's area, (m, 3)."""
-        a, b, c = (self.vertices[corner] for corner in self.faces.T)
-        return np.cross(b - a, c - a)
+        """Outward normals whose length is twice the face's area, (m, 3); not kept: they are as large as it."""
+        found = np.empty((len(self.faces), 3))
+        for part in parts_of(len(found)):
+            a, b, c = (self.vertices[corner] for corner in self.faces[part].T)
+            found[part] = np.cross(b - a, c - a)
+        return found
 
     @cached_property
     def face_areas(self) -> NDArray[np.float64]:
@@ -88,12 +91,9 @@ class TriMesh:
     @cached_property
     def vertex_normals(self) -> NDArray[np.float64]:
         """Unit normals at the vertices, area-weighted, (n, 3)."""
+        columns = self.face_vectors.T
         total = np.stack(
-            [
-                np.bincount(self.faces.ravel(), np.repeat(self.face_vectors[:, axis], 3), len(self.vertices))
-                for axis in range(3)
-            ],
-            axis=1,
+            [np.bincount(self.faces.ravel(), np.repeat(column, 3), len(self.vertices)) for column in columns], axis=1
         )
         length = np.sqrt((total**2).sum(axis=1, keepdims=True))
         return total / np.where(length > 0, length, 1.0)

@@ -218,6 +218,10 @@ class Volume:
         grid = replace(self.grid, corner=(corner[0], corner[1], corner[2]))
         return replace(self, voxels=self.voxels[box], affine=affine, grid=grid)
 
+    def bare(self) -> Volume:
+        """Return the same without its voxels: all 0, they take no memory."""
+        return replace(self, voxels=np.broadcast_to(np.zeros((), self.voxels.dtype), self.voxels.shape))
+
     def to_mm(self, indices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Carry (n, 3) indices (i, j, k) to patient millimeters (x, y, z)."""
         return indices @ self.affine[:3, :3].T + self.affine[:3, 3]

@@ -12,6 +12,7 @@ from ..kernels.remeshing.surface import face_normals, gather_fans, link
 from ..kernels.threads import in_blocks
 from ..measure.links import Links
 from ..measure.shape import areas_and_volumes
+from ..model.columns import mean_over
 from .creases import find_creases
 from .sizes import wanted_sizes
 
@@ -32,10 +33,6 @@ class Ground:
     ----------
     mesh : TriMesh
     faces : (m, 3) int32 array
-    normals : (m, 3) float array
-        Unit normals of the faces, 0 where a face has no area.
-    areas, volumes : (m,) float arrays
-        Of the faces, and signed ones under them.
     twins : (3 m,) int32 array
         The half edge that runs the other way; -1 at a border.
     valence : (n,) int32 array
@@ -54,9 +51,6 @@ class Ground:
 
     mesh: TriMesh
     faces: Ints
-    normals: Floats
-    areas: Floats
-    volumes: Floats
     twins: Ints
     valence: Ints
     first: Ints
@@ -83,12 +77,10 @@ class Ground:
             lambda start, stop: face_normals(mesh.vertices, faces, normals, start, stop),
             len(faces), block=BLOCK, threads=threads,
         )  # fmt: skip
-        areas, volumes = areas_and_volumes(links, threads=threads)
+        areas, _ = areas_and_volumes(links, threads=threads)
         creases, kinds = find_creases(mesh, twins, normals, edge)
         sizes = wanted_sizes(mesh.vertices, faces, normals, areas, edge)
-        return cls(
-            mesh, faces, normals, areas, volumes, twins, valence, first, fans, links.face_pieces, sizes, creases, kinds
-        )
+        return cls(mesh, faces, twins, valence, first, fans, links.face_pieces, sizes, creases, kinds)
 
     def scaled(self, share: float) -> Ground:
         """Return the same with other lengths of edges."""
@@ -100,12 +92,13 @@ class Ground:
         sizes[np.unique(self.faces[faces])] *= share
         return replace(self, sizes=sizes)
 
-    def with_specks(self, few: int, least: float) -> Ground:
+    def with_specks(self, few: int, least: float, threads: int = 0) -> Ground:
         """Return the same with shorter edges where a component would have fewer faces, about.
 
         Such a component is kept as it is where it is less round than `least`: 36 pi V^2 / A^3, which is 1 for a ball.
         """
-        volume, area = (np.bincount(self.pieces, each) for each in (self.volumes, self.areas))
+        sizes = areas_and_volumes(Links(self.mesh), threads=threads)
+        area, volume = (np.bincount(self.pieces, each) for each in sizes)
         short = np.sqrt(area / (EVEN * few))
         if short.min() >= self.sizes.max():
             return self
@@ -115,9 +108,10 @@ class Ground:
         kinds = np.where(flat, np.uint8(KEPT), self.kinds)
         return replace(self, sizes=np.minimum(self.sizes, short[piece]), kinds=kinds)
 
-    def forecast(self) -> float:
+    def forecast(self, threads: int = 0) -> float:
         """Return about how many faces a mesh of even triangles has with these lengths of edges."""
-        return float((self.areas / self.sizes[self.faces].mean(axis=1) ** 2).sum()) / (EVEN * LONGER**2)
+        areas, _ = areas_and_volumes(Links(self.mesh), threads=threads)
+        return float((areas / mean_over(self.sizes, self.faces) ** 2).sum()) / (EVEN * LONGER**2)
 
 
 BLOCK = 20_000

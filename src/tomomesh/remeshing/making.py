@@ -14,8 +14,11 @@ from ..kernels.remeshing.lengths import TOO_LONG, TOO_SHORT, mark_lengths
 from ..kernels.remeshing.links import KEPT
 from ..kernels.remeshing.moves import lift_vertices, move_vertices
 from ..kernels.remeshing.splits import split_edges
+from ..kernels.remeshing.surface import normals_of
 from ..kernels.threads import in_blocks
-from ..model.columns import any_of
+from ..measure.intersections import marked_in
+from ..measure.tree import Tree
+from ..model.columns import any_of, mean_over
 from ..model.mesh import TriMesh
 
 if TYPE_CHECKING:
@@ -61,7 +64,11 @@ class Making:
             self.outs[self.corners[gone]], self.corners[gone] = -1, -1
         along = np.flatnonzero(ground.creases)
         self.under[ground.faces.reshape(-1)[along]] = along // 3
-        self.ups = ground.normals[self.under]
+        self.ups = np.empty_like(self.places)
+        in_blocks(
+            lambda start, stop: normals_of(ground.mesh.vertices, ground.faces, self.under, self.ups, start, stop),
+            len(self.ups), block=BLOCK, threads=threads,
+        )  # fmt: skip
         self._begun = self.places
         self.counts = np.array([len(self.places), len(self.corners) // 3])
 
@@ -78,17 +85,26 @@ class Making:
 
     def mesh(self) -> tuple[TriMesh, NDArray[np.int32]]:
         """Return the mesh, and the face of the surface before under each of its vertices."""
+        used, faces = self._numbered()
+        return TriMesh(self.places[used], faces.astype(np.int64)), self.under[used]
+
+    def crossing(self) -> NDArray[np.bool_]:
+        """Mark the faces (m,) that pass through others; before there is a mesh, whose numbers have twice the bits."""
+        used, faces = self._numbered()
+        return marked_in(Tree.over(self.places[used], faces, threads=self._threads), threads=self._threads)
+
+    def _numbered(self) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
+        """Tell which vertices (n,) are used, and return the faces (m, 3) by their numbers among these."""
         faces = self.faces
         used = np.zeros(len(self.outs), np.bool_)
         used[faces.reshape(-1)] = True
-        number = np.cumsum(used) - 1
-        return TriMesh(self.places[used], number[faces]), self.under[used]
+        number = np.cumsum(used, dtype=np.int32) - np.int32(1)
+        return used, np.take(number, faces)
 
     def rescaled(self, ground: Ground) -> None:
         """Go on with other lengths of edges."""
         self._ground = ground
-        under = np.maximum(self.under, 0)
-        self.sizes = ground.sizes[ground.faces[under]].mean(axis=1)
+        self.sizes = mean_over(ground.sizes, ground.faces[np.maximum(self.under, 0)])
 
     @contextmanager
     def only_around(self, some: NDArray[np.bool_], share: float) -> Iterator[Callable[[], NDArray[np.bool_]]]:
@@ -176,7 +192,7 @@ class Making:
             move_vertices(
                 self.places, self.corners, self.twins, self.outs, self.kinds, self.sharp, self.sizes, self.under,
                 self.ups, ground.mesh.vertices, ground.faces, ground.creases.reshape(-1, 3), ground.twins, ground.fans,
-                ground.first, ground.normals, ground.sizes, start, stop,
+                ground.first, ground.sizes, start, stop,
             )  # fmt: skip
 
         self._over_vertices(work)

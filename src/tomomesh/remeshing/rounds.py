@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..measure.intersections import crossing_of, self_intersections
+from ..measure.intersections import crossing_of
 from ..model.mesh import TriMesh
 from .making import Making
 
@@ -65,8 +65,8 @@ def made_even(
 
 def _repaired(making: Making, most: float, threads: int) -> Made:
     """Where faces cross, put vertices back onto the surface before, then make edges longer, then shorter."""
+    crosses = making.crossing()
     made, under = making.mesh()
-    crosses = self_intersections(made, threads=threads)
     best = made, under, crosses
     resizes: list[Callable[[Making, Marks], Marks]] = [partial(_resize, share=share) for share in REPAIRS]
     for repair in (Making.lower, *resizes):

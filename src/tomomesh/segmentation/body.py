@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
 
+from ..isosurface.runs import Runs
 from .window import PRESETS_HU
 
 if TYPE_CHECKING:
@@ -59,8 +60,8 @@ class Components:
 
 def largest_component(mask: NDArray[np.bool_]) -> Components:
     """Keep the component of a window with the most voxels; of equals the first."""
-    labels, sizes = _components(mask)
-    return _kept(labels, np.arange(len(sizes)) == np.argmax(sizes), mask)
+    runs = Runs.of(mask, corners=True)
+    return _kept(runs, np.arange(len(runs.sizes)) == np.argmax(runs.sizes), mask)
 
 
 def components_of_body(mask: NDArray[np.bool_], volume: Volume) -> Components:
@@ -93,8 +94,9 @@ def _holders(volume: Volume, body: NDArray[np.bool_]) -> NDArray[np.bool_]:
     every, spacing = _coarse(volume, RIM)
     steps = tuple(slice(None, None, step) for step in every)
     dense = volume.voxels[steps] > PRESETS_HU["spongy-bone"][0]
-    labels, sizes = _components(dense & ~_in_body(dense, body[steps]).mask)
-    foreign = (sizes * np.prod(spacing) > 4 / 3 * np.pi * THICK**3)[labels]
+    foreign = dense & ~_in_body(dense, body[steps]).mask
+    runs = Runs.of(foreign, corners=True)
+    runs.fill(foreign, runs.sizes * np.prod(spacing) <= 4 / 3 * np.pi * THICK**3, False)
     if foreign.any():
         reach = max(float(spacing.min()), min(RIM, RIM_VOXELS * min(volume.spacing_mm)))
         foreign = ndimage.distance_transform_edt(~foreign, spacing) <= reach
@@ -110,9 +112,8 @@ def thick_components(mask: NDArray[np.bool_], volume: Volume) -> Components:
 
 def _in_body(mask: NDArray[np.bool_], body: NDArray[np.bool_]) -> Components:
     """Keep the components that lie in bodies by a tenth at least."""
-    labels, sizes = _components(mask)
-    within = np.bincount(labels[body], minlength=len(sizes))
-    return _kept(labels, within >= LEAST * sizes, mask)
+    runs = Runs.of(mask, corners=True)
+    return _kept(runs, runs.within(body) >= LEAST * runs.sizes, mask)
 
 
 @dataclass(frozen=True)
@@ -148,22 +149,15 @@ def without_specks(mask: NDArray[np.bool_]) -> Cleaned:
         One voxel at least.
     """
     box = ndimage.find_objects(mask.view(np.uint8))[0]
-    labels, sizes = _components(mask[box])
+    pieces, holes = Runs.of(mask[box], corners=True), Runs.of(mask[box], value=False)
+    sizes, room = pieces.sizes, holes.sizes
     limit = min(float(SPECK), SMALL * float(sizes.max()))
-    small = (sizes > 0) & (sizes < limit)
-    specks = _taken(small, labels) if small.any() else None
-    del labels  # four times the mask
-    holes, _ = ndimage.label(np.pad(~mask[box], 1, constant_values=True))
-    room = _counted(holes)
-    room[[0, holes[0, 0, 0]]] = 0
-    pores = (room > 0) & (room < limit)
-    if specks is None and not pores.any():
+    small, pores = sizes < limit, ~holes.bordering & (room < limit)
+    if not (small.any() or pores.any()):
         return Cleaned(mask)
     cleaned = mask.copy()
-    if specks is not None:
-        cleaned[box] &= ~specks
-    if pores.any():
-        cleaned[box] |= _taken(pores, holes[tuple(slice(1, -1) for _ in range(3))])
+    pieces.fill(cleaned[box], small, False)
+    holes.fill(cleaned[box], pores, True)
     counts = (small.sum(), sizes[small].sum(), sizes[small].max(initial=0), pores.sum(), room[pores].sum())
     return Cleaned(cleaned, *map(int, counts))
 
@@ -205,32 +199,13 @@ def is_dense(mask: NDArray[np.bool_], volume: Volume) -> bool:
     return bool(2 * np.count_nonzero(volume.voxels[mask] > PRESETS_HU["skin"][0]) > np.count_nonzero(mask))
 
 
-def _components(mask: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[np.int64]]:
-    """Return the numbers of components that touch along faces, edges or at corners, and their sizes, 0 for the rest."""
-    labels, _ = ndimage.label(mask, np.ones((3, 3, 3), np.bool_))
-    sizes = _counted(labels)
-    sizes[0] = 0
-    return labels, sizes
-
-
-def _counted(labels: NDArray[Any]) -> NDArray[np.int64]:
-    """Count the voxels of each number, slice by slice: NumPy makes 64 bits of what it counts."""
-    count = int(labels.max(initial=0)) + 1
-    return sum((np.bincount(plane.ravel(), minlength=count) for plane in labels), np.zeros(count, np.int64))
-
-
-def _taken(kept: NDArray[np.bool_], labels: NDArray[Any]) -> NDArray[np.bool_]:
-    """Return ``kept[labels]``, slice by slice: NumPy makes 64 bits of what it takes by."""
-    taken = np.empty(labels.shape, np.bool_)
-    for plane, out in zip(labels, taken, strict=True):
-        np.take(kept, plane, out=out)
-    return taken
-
-
-def _kept(labels: NDArray[Any], kept: NDArray[np.bool_], mask: NDArray[np.bool_]) -> Components:
-    kept[0], found = False, len(kept) - 1
-    left = int(np.count_nonzero(kept))
-    return Components(mask if left == found else _taken(kept, labels), found, found - left)
+def _kept(runs: Runs, kept: NDArray[np.bool_], mask: NDArray[np.bool_]) -> Components:
+    found, left = len(kept), int(np.count_nonzero(kept))
+    if left == found:
+        return Components(mask, found, 0)
+    some = mask.copy()
+    runs.fill(some, ~kept, False)
+    return Components(some, found, found - left)
 
 
 def _body(volume: Volume) -> NDArray[np.bool_]:

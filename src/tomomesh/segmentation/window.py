@@ -96,7 +96,10 @@ def by_layer(volume: Volume, *, lower: Limit = -np.inf, upper: Limit = np.inf) -
     levels = volume.voxels
     if np.isneginf(lower).all():
         return np.asarray(levels <= upper)
-    return np.asarray((levels > lower) & (levels <= upper))
+    kept = np.asarray(levels > lower)
+    if not np.isposinf(upper).all():
+        kept &= levels <= upper
+    return kept
 
 
 def any_of_layers(kept: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,13 +40,11 @@ def segment_by_contours(kept: Selected, settings: Settings, progress: Progress) 
         "networks", train_contours, mask, settings.network, levels=levels, pixel_mm=pixel_mm, seed=run.seed,
         threads=run.threads, progress=progress,
     )  # fmt: skip
-    labels = measured("regions", regions, mask, trained.value, pixel_mm=pixel_mm, threads=run.threads)
+    labels = partial(regions, mask, trained.value, pixel_mm=pixel_mm, threads=run.threads)
     placed = measured("points", sample_contours, trained.value, study)
     sampling = placed.value
-    found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value, levels)
-    return folded(
-        found, trained, labels, _contours_found(trained.value, kept, settings), placed, sampling_found(placed.value)
-    )
+    found = Segmentation(study, kept.plane, mask, labels, sampling.points, sampling, trained.value, levels)
+    return folded(found, trained, _contours_found(trained.value, kept, settings), placed, sampling_found(placed.value))
 
 
 def surface_by_contours(found: Segmentation[Contours], settings: Settings, progress: Progress) -> Stage[Surface]:
@@ -57,13 +56,13 @@ def surface_by_contours(found: Segmentation[Contours], settings: Settings, progr
         Where the rings enclose the middle of no pixel, or are on one slice alone.
     """
     run = settings.run
+    follows = measured("quality", _followed, found, run.threads)  # before there is a net, which takes as much
     bounded = measured(
         "contours", boundary_of_rings, found, surface=settings.cubes.surface, threads=run.threads, progress=progress
     )
     made = bounded.value
     meshed = measured("fit", voxel_surface, made, settings.fit, threads=run.threads, progress=progress)
     rest = meshed.value
-    follows = measured("quality", _followed, found, run.threads)
     surface = Surface(
         found.points, made.cuberille, rest.smoothed, rest.mesh, NOTHING, cavities=made.cavities,
         encloses=Enclosed("rings", found.sampling.volume_mm3).or_more(Enclosed.window(found)),

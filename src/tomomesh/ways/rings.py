@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..followed import outline_followed
@@ -48,16 +49,14 @@ def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> 
         levels=levels_of(kept, settings), pixel_mm=study.spacing_mm[:2], seed=run.seed, threads=run.threads,
         progress=progress,
     )  # fmt: skip
-    labels = measured("regions", regions, mask, trained.value, pixel_mm=study.spacing_mm[:2], threads=run.threads)
+    labels = partial(regions, mask, trained.value, pixel_mm=study.spacing_mm[:2], threads=run.threads)
     placed = measured(
         "points", sample, trained.value, study, caps=settings.cubes.caps, bridge=settings.network.bridge,
         cell_from=settings.cubes.cell_from,
     )  # fmt: skip
     sampling = placed.value
-    found = Segmentation(study, kept.plane, mask, labels.value, sampling.points, sampling, trained.value)
-    return folded(
-        found, trained, labels, _networks_found(trained.value, kept, settings), placed, sampling_found(placed.value)
-    )
+    found = Segmentation(study, kept.plane, mask, labels, sampling.points, sampling, trained.value)
+    return folded(found, trained, _networks_found(trained.value, kept, settings), placed, sampling_found(placed.value))
 
 
 def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress: Progress) -> Stage[Surface]:

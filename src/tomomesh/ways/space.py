@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -104,15 +105,15 @@ def segment_in_space(kept: Selected, settings: Settings, progress: Progress) -> 
     progress("networks", 0, 1)
     trained = measured("networks", train_space, places, settings.network, outlined=outlined, seed=run.seed)
     progress("networks", 1, 1)
-    labels = measured("regions", regions_in_space, mask, voxels, trained.value, run.threads)
+    labels = partial(regions_in_space, mask, voxels, trained.value, run.threads)
     network, sampling = trained.value, _sampled(trained.value)
     source = SpaceFound(network, places, shown.value.follows)
-    found = Segmentation(kept.study, kept.plane, kept.mask, labels.value, sampling.points, sampling, source)
+    found = Segmentation(kept.study, kept.plane, kept.mask, labels, sampling.points, sampling, source)
     inside = not outlined and settings.network.network in SURFACES and not is_wall(mask)
     dropped = int(np.count_nonzero(kept.mask) - np.count_nonzero(mask))
     asked = settings.network.neurons
     told = _network_found(network, kept.mask, count, dropped, inside=inside, asked=asked)
-    return folded(found, pieces, shown, trained, labels, told, points_found(sampling.points, sampling.spacing_mm))
+    return folded(found, pieces, shown, trained, told, points_found(sampling.points, sampling.spacing_mm))
 
 
 def _shown(kept: Selected, mask: NDArray[np.bool_], settings: Settings) -> Shown:

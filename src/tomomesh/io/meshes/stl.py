@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import FormatError
+from ...model.columns import parts_of
+from ...model.mesh import TriMesh
 from ..fields import doubles
 from ..files.atomic import replacing
 from ..files.limits import require_bytes
@@ -15,11 +17,11 @@ from .attributes import single_precision
 from .cells import weld
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
     from .cells import Arrays
 
@@ -112,9 +114,11 @@ def write_stl(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     OutputError
         Where 32 bits cannot keep the vertices apart.
     """
-    data = stl_bytes(mesh, path, beside)
+    parts = _stl_parts(mesh, path, beside)
+    head = next(parts)  # refused before a file is begun
     with replacing(path) as file:
-        file.write(data)
+        file.write(head)
+        file.writelines(parts)
 
 
 def stl_bytes(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> bytes:
@@ -125,12 +129,21 @@ def stl_bytes(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> bytes:
     OutputError
         Where 32 bits cannot keep the vertices apart; `path` is named.
     """
-    rows = np.zeros(len(mesh.faces), FACE)
-    rows["corners"] = single_precision(mesh.vertices, path, kind="STL")[mesh.faces]
-    length = np.linalg.norm(mesh.face_vectors, axis=1, keepdims=True)
-    rows["normal"] = mesh.face_vectors / np.where(length > 0, length, 1.0)
+    return b"".join(_stl_parts(mesh, path, beside))
+
+
+def _stl_parts(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> Iterator[bytes]:
+    """Yield the bytes of a file part by part, first those before the faces."""
+    places = single_precision(mesh.vertices, path, kind="STL")
     head = _shortened(beside.head).encode("ascii").ljust(STL_HEADER_BYTES)
-    return head + np.array(len(rows), "<u4").tobytes() + rows.tobytes()
+    yield head + np.array(len(mesh.faces), "<u4").tobytes()
+    for part in parts_of(len(mesh.faces)):
+        some = TriMesh(mesh.vertices, mesh.faces[part])
+        rows = np.zeros(len(some.faces), FACE)
+        rows["corners"] = places[some.faces]
+        length = np.linalg.norm(some.face_vectors, axis=1, keepdims=True)
+        rows["normal"] = some.face_vectors / np.where(length > 0, length, 1.0)
+        yield rows.tobytes()
 
 
 def _shortened(head: str) -> str:

@@ -28,10 +28,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..compile import kernel
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
@@ -106,6 +107,14 @@ def face_shape(places: Floats, a: int, b: int, c: int) -> tuple[float, float, fl
         places[a, 0], places[a, 1], places[a, 2], places[b, 0], places[b, 1], places[b, 2],
         places[c, 0], places[c, 1], places[c, 2],
     )  # fmt: skip
+
+
+@kernel("void(f8[:,::1], i4[:,::1], i8, f8[:,::1], i8)")
+def put_normal(vertices: Floats, faces: Ints, f: int, normals: Floats, n: int) -> None:
+    """Put the unit normal of face f into row n; 0 where it has no area."""
+    x, y, z, _ = face_shape(vertices, faces[f, 0], faces[f, 1], faces[f, 2])
+    length = max(np.sqrt(x * x + y * y + z * z), TINY)
+    normals[n, 0], normals[n, 1], normals[n, 2] = x / length, y / length, z / length
 
 
 @kernel("UniTuple(f8, 4)(f8[:,::1], f8, f8, f8, i8, i8)")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..compile import kernel
 from .ground import walk, walk_along
-from .links import CREASE, FREE, POOR, TINY, UPRIGHT, after, before, face_shape, shapes_around
+from .links import CREASE, FREE, POOR, TINY, UPRIGHT, after, before, face_shape, put_normal, shapes_around
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -100,12 +100,12 @@ def may_move(places: Floats, corners: Ints, twins: Ints, outs: Ints, ups: Floats
 
 @kernel(
     "void(f8[:,::1], i4[::1], i4[::1], i4[::1], u1[::1], b1[::1], f8[::1], i4[::1], f8[:,::1], f8[:,::1], i4[:,::1], "
-    "b1[:,::1], i4[::1], i4[::1], i4[::1], f8[:,::1], f8[::1], i8, i8)"
+    "b1[:,::1], i4[::1], i4[::1], i4[::1], f8[::1], i8, i8)"
 )
 def move_vertices(
     places: Floats, corners: Ints, twins: Ints, outs: Ints, kinds: Bytes, sharp: Bools, sizes: Floats, under: Ints,
-    ups: Floats, surface: Floats, faces: Ints, creases: Bools, across: Ints, fans: Ints, first: Ints, normals: Floats,
-    wanted: Floats, start: int, stop: int,
+    ups: Floats, surface: Floats, faces: Ints, creases: Bools, across: Ints, fans: Ints, first: Ints, wanted: Floats,
+    start: int, stop: int,
 ) -> None:  # fmt: skip
     """Move vertices, one after the other, evenly among their neighbors and along the surface before."""
     spare, place, aim = np.empty(3), np.empty(3), np.empty(3)
@@ -121,8 +121,8 @@ def move_vertices(
             continue
         under[v] = face
         sizes[v] = (wanted[faces[face, 0]] + wanted[faces[face, 1]] + wanted[faces[face, 2]]) / 3.0
-        for axis in range(3):
-            places[v, axis], ups[v, axis] = place[axis], normals[face, axis]
+        places[v, 0], places[v, 1], places[v, 2] = place[0], place[1], place[2]
+        put_normal(surface, faces, face, ups, v)
 
 
 @kernel("void(f8[:,::1], i4[::1], i4[::1], i4[::1], u1[::1], f8[:,::1], f8[:,::1], i8, i8)")

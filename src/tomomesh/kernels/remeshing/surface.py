@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compile import kernel
-from .links import TINY, after, face_shape
+from .links import TINY, after, put_normal
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,9 +68,14 @@ def link(corners: Ints, first: Ints, fans: Ints, twins: Ints, valence: Ints, sta
 def face_normals(vertices: Floats, faces: Ints, normals: Floats, start: int, stop: int) -> None:
     """Find the unit normals (m, 3) of faces, 0 where a face has no area."""
     for f in range(start, stop):
-        x, y, z, _ = face_shape(vertices, faces[f, 0], faces[f, 1], faces[f, 2])
-        length = max(np.sqrt(x * x + y * y + z * z), TINY)
-        normals[f, 0], normals[f, 1], normals[f, 2] = x / length, y / length, z / length
+        put_normal(vertices, faces, f, normals, f)
+
+
+@kernel("void(f8[:,::1], i4[:,::1], i4[::1], f8[:,::1], i8, i8)")
+def normals_of(vertices: Floats, faces: Ints, some: Ints, normals: Floats, start: int, stop: int) -> None:
+    """Find the unit normals (n, 3) of some faces (n,); of -1, which is none, that of the last."""
+    for n in range(start, stop):
+        put_normal(vertices, faces, some[n], normals, n)
 
 
 @kernel("i8(i4[::1], f8[:,::1], f8, i4[::1])")
