@@ -155,13 +155,20 @@ class _Neighbors:
         if self.are_next(n, m, way):
             return True
         gap = self.gap(n, m)
-        if max(self._pole(n, way), self._pole(m, -way)) < gap / 2:
+        if max(self._pole(n, way), self._pole(m, -way)) < gap / 2 or self._lies_in(n, m):
             return False
         if self.sparse and not self._are_turns(n, m):
             return True
         near = gap <= MISSING * self._step(n, m, way)
         tapers = self._taper(n, way), self._taper(m, -way)
         return near and min(tapers) >= gap / 2 and (self._meet(n, m, way) or self._meet(m, n, -way))
+
+    def _lies_in(self, n: int, m: int) -> bool:
+        """Tell whether one of two parts ends in a hole: the other goes on around it in the planes between."""
+        (g, one), (_, other) = self.place[n], self.place[m]
+        between = [p for layer in self.groups[g][min(one, other) + 1 : max(one, other)] for p in layer]
+        ends = ((self.parts[n], m), (self.parts[m], n))
+        return any(_around(self.parts[p], end) and self.kind(p, far) == OVER for p in between for end, far in ends)
 
     def _meet(self, n: int, m: int, way: int) -> bool:
         """Tell whether a part overlaps another when it moves on as it comes."""
