@@ -1,18 +1,17 @@
-"""What a command writes: refused before any work where it could not be, written at the end."""
+"""What a command writes at its end."""
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import io
-from ..errors import OutputError, UsageError
-from ..io.files.source import suffix_of
-from ..stage import Stage
+from ... import io
+from ...io.files.source import suffix_of
+from ...stage import Stage
+from .checks import LENGTHS, make_folder
 from .parts import frame_of_part
 
 if TYPE_CHECKING:
@@ -21,100 +20,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from ..model.mesh import TriMesh
-    from ..model.points import PointSet
-    from ..model.volume import Volume
-    from ..results import Place, Segmentation, Surface
-    from ..settings import Settings
-    from .bars import Bars
+    from ...model.mesh import TriMesh
+    from ...model.points import PointSet
+    from ...results import Place, Segmentation, Surface
+    from ...settings import Settings
+    from ...som.region import TrainedNetwork
+    from ..bars import Bars
 
-RAS_ALONE, LENGTHS = (".gii",), (".gii", ".3mf")
-"""Suffixes of meshes that are in RAS whatever is asked, and of those whose coordinates are lengths."""
-OF_STUDIES = (*io.MESH_WRITERS, *io.ARCHIVED)
-"""Suffixes of meshes of a study."""
-
-
-def check_folder(path: str | Path) -> Path:
-    """Refuse a folder that could not be made, before any work is done.
-
-    Raises
-    ------
-    OutputError
-    """
-    folder = Path(path)
-    there = folder if folder.exists() else Path(os.path.realpath(folder)).parent
-    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
-        raise OutputError("the folder cannot be made", file=str(path), expected="a place that can be written to")
-    return folder
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder, if it is not there.
-
-    Raises
-    ------
-    OutputError
-    """
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as fault:
-        raise OutputError("the folder cannot be made", file=str(folder), found=fault.strerror or "") from fault
-
-
-def check_outputs(chosen: Namespace, writers: Any, *sources: str) -> None:
-    """Refuse outputs that could not be written, or that would overwrite what is read."""
-    io.check_output(chosen.output, writers, inputs=list(sources))
-    check_files(chosen, *sources, chosen.output)
-
-
-def check_files(chosen: Namespace, *taken: str) -> None:
-    """Refuse further outputs that could not be written, or that would overwrite another file of this run."""
-    kinds = {
-        "points": io.POINT_WRITERS,
-        "labels": io.LABEL_WRITERS,
-        "mask_out": io.LABEL_WRITERS,
-        "report": (".json",),
-        "save_settings": (".toml",),
-    }
-    names = list(taken)
-    for name, suffixes in kinds.items():
-        if getattr(chosen, name, None):
-            io.check_output(getattr(chosen, name), suffixes, inputs=names)
-            names.append(getattr(chosen, name))
-    if getattr(chosen, "figures", None):
-        check_folder(chosen.figures)
-
-
-def check_frame(output: str | Path, settings: Settings) -> None:
-    """Refuse voxel indices of a part to print and in a format of lengths, before any work is done.
-
-    Raises
-    ------
-    UsageError
-    """
-    if settings.run.frame == "voxel" and settings.printing.asked:
-        raise UsageError("a part to print has no voxels", found="--frame = voxel", expected="--frame lps or ras")
-    if settings.printing.asked and suffix_of(output) in io.ARCHIVED:
-        raise UsageError("a part to print lies in no patient", file=str(output), expected="a mesh, or another format")
-    if settings.run.frame == "voxel" and suffix_of(output) in (*LENGTHS, *io.ARCHIVED):
-        raise UsageError(
-            "3MF, GIFTI and DICOM hold lengths, not voxel indices", found=f"--frame = voxel, --output = {output}",
-            expected="--frame lps or ras, or another format",
-        )  # fmt: skip
-
-
-def check_archive(chosen: Namespace, volume: Volume) -> None:
-    """Refuse a mesh for the archive of what is no DICOM study, and personal fields in any other file.
-
-    Raises
-    ------
-    UsageError
-    """
-    archived = suffix_of(chosen.output) in io.ARCHIVED
-    if chosen.patient and not archived:
-        raise UsageError("only a mesh for the archive names its patient", found="--patient", expected="-o MESH.dcm")
-    if archived:
-        io.check_archived(volume.dicom, file=str(chosen.output))
+RAS_ALONE = (".gii",)
+"""Suffixes of meshes that are in RAS whatever is asked."""
 
 
 def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> Surface:
@@ -186,7 +100,7 @@ def _frame_of_cloud(place: Place | None) -> dict[str, str]:
 
 def _write_mask(surface: Surface, path: str | Path, settings: Settings) -> dict[str, Any]:
     """Write the voxels inside the mesh on the study's own grid; return how well they agree with those of the window."""
-    from ..measure.fill import fill_mesh, overlap
+    from ...measure.fill import fill_mesh, overlap
 
     stage_one = surface.segmentation
     assert stage_one is not None
@@ -200,7 +114,7 @@ def _write_mask(surface: Surface, path: str | Path, settings: Settings) -> dict[
 
 def _fields(surface: Surface, output: str | Path) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
     """Return what the format keeps beside the mesh: what is known of the points, and which faces were filled."""
-    from ..pointcloud.attributes import carry
+    from ...pointcloud.attributes import carry
 
     points = surface.points
     kept = {name: values for name, values in points.attributes.items() if io.keeps(output, name)}
@@ -250,9 +164,26 @@ def draw(
     progress("pictures", done, done)
 
 
+def draw_network(
+    folder: Path, chosen: Namespace, trained: TrainedNetwork, settings: Settings, pixel_area: float
+) -> None:
+    """Draw a network over its region, and its training as a film where that was asked for."""
+    from ...som.shapes import SHAPES
+    from .pictures import film_of_network, pictures_of_network
+
+    given = chosen.region in SHAPES
+    title = f"A network over a {chosen.region if given else 'picture'}"
+    axes = slice(None if given else 2)  # a neuron's place in a picture is its column and row
+    for name, figure in pictures_of_network(trained, title, axes):
+        write_picture(figure, folder / f"{name}.png")
+    if chosen.film:
+        with io.replacing(folder / "02-film.gif") as file:
+            file.write(film_of_network(trained, settings, pixel_area, title, axes))
+
+
 def write_picture(figure: Figure, path: Path) -> None:
     """Write a picture, whole or not at all."""
-    from ..show import save
+    from ...show import save
 
     with io.replacing(path) as file:
         save(figure, file)
