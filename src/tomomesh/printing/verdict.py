@@ -120,10 +120,8 @@ def _reasons(told: dict[str, Any], walls: Thickness, least: float) -> list[str]:
         reasons.append(f"{told['floating_pieces']} of {told['pieces']} pieces float free of the plate (--one-piece)")
     if walls.widest_spot(least) > least**2:
         share = 100 * told["thin_wall_share"]
-        thinnest = (
-            f"thinnest wall {length_in_words(told['thinnest_wall_mm'], digits=3)} at {_at(told['thinnest_wall_at_mm'])}"
-        )
-        reasons.append(f"{thinnest}, {share:.3g} % of the surface under {least:g} mm (--thicken {least:g})")
+        thin = f"{share:.3g} % of the surface under {least:g} mm"
+        reasons.append(f"thinnest wall {_least(told, 'wall')}, {thin} (--thicken {least:g})")
     return reasons
 
 
@@ -138,9 +136,7 @@ def _notes(told: dict[str, Any], least: float) -> list[str]:
             f"{told['sealed_cavities']} sealed cavity(ies): resin or powder stays inside (--drain, --fill-cavities)"
         )
     if told["thin_gap_share"] > 0:
-        notes.append(
-            f"narrowest gap {length_in_words(told['thinnest_gap_mm'], digits=3)} at {_at(told['thinnest_gap_at_mm'])} may close"
-        )
+        notes.append(f"narrowest gap {_least(told, 'gap')} may close")
     if told["self_intersections"]:
         notes.append(f"{told['self_intersections']} faces pass through others")
     if told["base_area_mm2"] == 0:
@@ -152,5 +148,7 @@ def _long(side: float) -> str:
     return f"{length_in_words(side, digits=3)} long"
 
 
-def _at(place: list[float]) -> str:
-    return f"({', '.join(f'{c:.1f}' for c in place)})"
+def _least(told: dict[str, Any], name: str) -> str:
+    """Name the least width of walls or gaps, and its place."""
+    place = ", ".join(f"{c:.1f}" for c in told[f"thinnest_{name}_at_mm"])
+    return f"{length_in_words(told[f'thinnest_{name}_mm'], digits=3)} at ({place})"

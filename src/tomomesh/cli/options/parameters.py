@@ -107,7 +107,7 @@ def add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
 
 
 def chosen_from(choices: Sequence[Any], text: str) -> dict[str, Any]:
-    """Return the arguments of an option with a choice: many are listed in its help, which is wrapped, and not before it.
+    """Return the arguments of an option with a choice: many are listed in its help, which is wrapped.
 
     Examples
     --------
