@@ -31,7 +31,7 @@ PRINTED_MM = {**MM, "unknown": 1.0}
 MIRRORED = {"anterior": "posterior", "posterior": "anterior", "left": "right", "right": "left"}
 """Where a side of LPS lies in RAS."""
 
-FOOT = 3.0
+LOW_END = 3.0
 """How many times as much is added where a cut has left a wall thin: half of it lies below the base and is cut off, and
 in half a disk of radius R the ball that touches the arc at 30 degrees, as walls are measured, has a diameter of 2/3 R.
 With half of it 4 % of a cap of .4 mm stay thin, with two thirds none, and some faces pass through others (measured)."""
@@ -149,7 +149,7 @@ def _stood(mesh: TriMesh, asked: PrintSettings, threads: int, progress: Progress
     if asked.thicken is None:
         return made
     for _ in range(ROUNDS):
-        thick = thickened(made, asked.thicken, room=FOOT * ROOM, threads=threads, progress=progress)
+        thick = thickened(made, asked.thicken, room=LOW_END * ROOM, threads=threads, progress=progress)
         if thick is made:
             break
         made = stood(thick, _below(thick, made, asked.down), asked.down)

@@ -121,7 +121,9 @@ def _reasons(told: dict[str, Any], walls: Thickness, least: float) -> list[str]:
     if walls.widest_spot(least) > least**2:
         share = 100 * told["thin_wall_share"]
         thin = f"{share:.3g} % of the surface under {least:g} mm"
-        reasons.append(f"thinnest wall {_least(told, 'wall')}, {thin} (--thicken {least:g})")
+        reasons.append(
+            f"thinnest wall {_at(told['thinnest_wall_mm'], told['thinnest_wall_at_mm'])}, {thin} (--thicken {least:g})"
+        )
     return reasons
 
 
@@ -136,7 +138,8 @@ def _notes(told: dict[str, Any], least: float) -> list[str]:
             f"{told['sealed_cavities']} sealed cavity(ies): resin or powder stays inside (--drain, --fill-cavities)"
         )
     if told["thin_gap_share"] > 0:
-        notes.append(f"narrowest gap {_least(told, 'gap')} may close")
+        gap = _at(told["thinnest_gap_mm"], told["thinnest_gap_at_mm"])
+        notes.append(f"narrowest gap {gap} may close")
     if told["self_intersections"]:
         notes.append(f"{told['self_intersections']} faces pass through others")
     if told["base_area_mm2"] == 0:
@@ -148,7 +151,6 @@ def _long(side: float) -> str:
     return f"{length_in_words(side, digits=3)} long"
 
 
-def _least(told: dict[str, Any], name: str) -> str:
-    """Name the least width of walls or gaps, and its place."""
-    place = ", ".join(f"{c:.1f}" for c in told[f"thinnest_{name}_at_mm"])
-    return f"{length_in_words(told[f'thinnest_{name}_mm'], digits=3)} at ({place})"
+def _at(width: float, place: list[float]) -> str:
+    """Name a width and its place."""
+    return f"{length_in_words(width, digits=3)} at ({', '.join(f'{c:.1f}' for c in place)})"
