@@ -126,7 +126,7 @@ FAULTS: dict[str, tuple[bytes, type[TomomeshError], str]] = {
     "type.mgh": (mgh()[:20] + b"\0\0\0\7" + mgh()[24:], FormatError, "type = 7"),
     "spacing.mgh": (mgh()[:30] + bytes(4) + mgh()[34:], GeometryError, "delta"),
     "damaged.mgz": (gzip.compress(mgh())[:-20], FormatError, "damaged"),
-    "plain.mgz": (mgh(), FormatError, "damaged"),
+    "marked.mgz": (b"\x1f\x8b" + mgh(), FormatError, "damaged"),
     "text.npy": (b"hello", FormatError, "numpy"),
     "text.tif": (b"hello" * 99, FormatError, "tifffile"),
 }

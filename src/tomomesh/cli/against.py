@@ -40,7 +40,7 @@ def compared(chosen: Namespace, mesh: TriMesh, settings: Settings) -> dict[str, 
     found = compare_with_study(_in_lps(mesh, named, study.grid), study, settings)
     notes = () if "frame" in stated else (f"{chosen.mesh} names no frame, and is taken for LPS (--mesh-frame)",)
     what = "labels" if settings.window.select else "window"
-    return {"against": what, **found, "frame": named["frame"], "notes": [*notes, *study.notes]}
+    return {"against": what, **found, "frame": named["frame"], "notes": [*notes, *found["notes"]]}
 
 
 def _with_mesh(path: str, mesh: TriMesh, stated: dict[str, str]) -> dict[str, Any]:

@@ -220,11 +220,13 @@ def _print(chosen: Namespace) -> None:
         named = frame_of_mesh(chosen.mesh, given_of(chosen).get("units"))
         asked = replace(settings, printing=turned(settings.printing, named["frame"]))
         part = make_part(mesh, asked, unit=named["unit"], progress=progress)
-        written = frame_of_part(named, settings.printing.scale)
+        named = frame_of_part(named, settings.printing.scale)
         io.write_mesh(
-            part.mesh, chosen.output, unit=written["unit"], frame=written["frame"], z_up=True,
+            part.mesh, chosen.output, unit=named["unit"], frame=named["frame"], z_up=True,
             precision=settings.run.precision,
         )  # fmt: skip
+    in_file = io.frame_in_file(chosen.output, **named)
+    written = {"unit": in_file.unit, "frame": in_file.name}
     report = {"print": part.report, "written": written, "settings": settings.to_dict()}
     if chosen.report:
         io.write_document(report, chosen.report)

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from ...model.volume import Volume
     from ...settings import Settings
 
-LENGTHS = (".gii", ".3mf")
-"""Suffixes of meshes whose coordinates are lengths."""
 OF_STUDIES = (*io.MESH_WRITERS, *io.ARCHIVED)
 """Suffixes of meshes of a study."""
 
@@ -84,7 +82,7 @@ def check_frame(output: str | Path, settings: Settings) -> None:
         raise UsageError("a part to print has no voxels", found="--frame = voxel", expected="--frame lps or ras")
     if settings.printing.asked and suffix_of(output) in io.ARCHIVED:
         raise UsageError("a part to print lies in no patient", file=str(output), expected="a mesh, or another format")
-    if settings.run.frame == "voxel" and suffix_of(output) in (*LENGTHS, *io.ARCHIVED):
+    if settings.run.frame == "voxel" and suffix_of(output) in (*io.LENGTHS, *io.ARCHIVED):
         raise UsageError(
             "3MF, GIFTI and DICOM hold lengths, not voxel indices", found=f"--frame = voxel, --output = {output}",
             expected="--frame lps or ras, or another format",

@@ -11,7 +11,7 @@ import numpy as np
 from ... import io
 from ...io.files.source import suffix_of
 from ...stage import Stage
-from .checks import LENGTHS, make_folder
+from .checks import make_folder
 from .parts import frame_of_part
 
 if TYPE_CHECKING:
@@ -20,30 +20,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from ...model.mesh import TriMesh
     from ...model.points import PointSet
     from ...results import Place, Segmentation, Surface
     from ...settings import Settings
     from ...som.region import TrainedNetwork
     from ..bars import Bars
 
-RAS_ALONE = (".gii",)
-"""Suffixes of meshes that are in RAS whatever is asked."""
-
 
 def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> Surface:
     """Write the mesh, and whatever else was asked for; return the surface, whose report tells of it."""
-    stage_one = surface.segmentation
-    at_vertices, on_faces = _fields(surface, chosen.output)
-    mesh, frame = _placed(surface, chosen.output, settings)
-    if stage_one is not None and suffix_of(chosen.output) in io.ARCHIVED:
-        io.write_encapsulated(mesh, chosen.output, stage_one.volume.dicom, patient=chosen.patient)
-    else:
-        io.write_mesh(
-            mesh, chosen.output, **frame, vertex_fields=at_vertices, face_fields=on_faces,
-            z_up=surface.part is not None, precision=settings.run.precision,
-        )  # fmt: skip
-    told: dict[str, dict[str, Any]] = {"written": _as_written(frame, chosen.output)}
+    stage_one, part = surface.segmentation, surface.part
+    frame = _frame_asked(surface, chosen.output, settings)
+    in_file = _write_mesh(chosen, surface, frame, settings)
+    told: dict[str, dict[str, Any]] = {"written": {"unit": in_file.unit, "frame": in_file.name}}
     if getattr(chosen, "points", None):
         write_points(surface.points, stage_one, chosen.points, settings, surface.place)
     if stage_one is not None:
@@ -51,31 +40,45 @@ def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progr
     if getattr(chosen, "mask_out", None):
         told["mask"] = _write_mask(surface, chosen.mask_out, settings)
     surface = replace(surface, stages=(*surface.stages, Stage(None, told)))
+    if part is None:
+        _tell_cavities(surface.report, frame, in_file)
     write_documents(chosen, surface.report, settings)
     draw(chosen.figures, stage_one, surface, settings, progress)
     return surface
 
 
-def _as_written(frame: dict[str, str], output: str | Path) -> dict[str, str]:
-    """Name the unit of the numbers in a file: of formats of lengths millimeters, where the unit is known."""
-    return frame | {"unit": "mm"} if suffix_of(output) in LENGTHS and frame["unit"] != "unknown" else frame
-
-
-def _placed(surface: Surface, output: str | Path, settings: Settings) -> tuple[TriMesh, dict[str, str]]:
-    """Return the mesh, or its part to print, in the frame that was asked for, with its unit and name.
-
-    GIFTI and DICOM have frames of their own.
-    """
-    stage_one, part = surface.segmentation, surface.part
-    mesh = surface.mesh if part is None else part.mesh
-    if stage_one is None:
-        of_cloud = _frame_of_cloud(surface.place)
-        return mesh, of_cloud if part is None else frame_of_part(of_cloud, settings.printing.scale)
-    own = "ras" if suffix_of(output) in RAS_ALONE else "lps" if suffix_of(output) in io.ARCHIVED else ""
-    asked = own or settings.run.frame
-    frame = io.frame_of_study(asked, stage_one.volume.grid)
+def _write_mesh(chosen: Namespace, surface: Surface, frame: io.Frame, settings: Settings) -> io.Frame:
+    """Write the mesh in a frame, or its part to print; return that of the numbers in the file."""
+    stage_one, part, output = surface.segmentation, surface.part, chosen.output
+    at_vertices, on_faces = _fields(surface, output)
+    mesh = frame.mesh(surface.mesh if part is None else part.mesh)
     named = {"unit": frame.unit, "frame": frame.name}
-    return frame.mesh(mesh), named if part is None else frame_of_part(named, settings.printing.scale)
+    named = named if part is None else frame_of_part(named, settings.printing.scale)
+    if stage_one is not None and suffix_of(output) in io.ARCHIVED:
+        io.write_encapsulated(mesh, output, stage_one.volume.dicom, patient=chosen.patient)
+    else:
+        io.write_mesh(
+            mesh, output, **named, vertex_fields=at_vertices, face_fields=on_faces, z_up=part is not None,
+            precision=settings.run.precision,
+        )  # fmt: skip
+    return io.frame_in_file(output, **named)
+
+
+def _tell_cavities(report: dict[str, Any], frame: io.Frame, in_file: io.Frame) -> None:
+    """Add a place in each cavity to what was written, in the file's own numbers: holes for finite elements."""
+    places = report.get("quality", {}).get("cavity_places_mm")
+    if places:
+        report["written"]["cavity_places"] = in_file.place(frame.place(np.array(places))).tolist()
+
+
+def _frame_asked(surface: Surface, output: str | Path, settings: Settings) -> io.Frame:
+    """Return the frame of the mesh that is written: a cloud's own, or that which was asked for, or the format has."""
+    stage_one = surface.segmentation
+    if stage_one is None:
+        named = _frame_of_cloud(surface.place)
+        return io.Frame(named["unit"], named["frame"], np.eye(4))
+    own = "ras" if suffix_of(output) in io.RAS_ALONE else "lps" if suffix_of(output) in io.ARCHIVED else ""
+    return io.frame_of_study(own or settings.run.frame, stage_one.volume.grid)
 
 
 def write_points(
