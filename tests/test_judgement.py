@@ -21,7 +21,7 @@ from tomomesh.cli import main
 from tomomesh.errors import GeometryError
 from tomomesh.finish import finish
 from tomomesh.followed import boundary_followed, outline_followed, sides_of
-from tomomesh.judgement import LIMITS, OFF, TOLD
+from tomomesh.judgement import LIMITS, OFF, TOLD, follow
 from tomomesh.progress import silent
 
 if TYPE_CHECKING:
@@ -178,6 +178,18 @@ class TestLimits:
         assert list(done.warnings) == ([told] if told else [])
         assert ("does not follow" in str(told)) == beyond(1)
 
+    def test_for_few_faces_alone_nothing_is_refused(self) -> None:
+        """What is far with the faces that were asked for is told, where with those of its way it is not far."""
+        made = whole()
+        middle = made.mesh.vertices.mean(axis=0)
+        far = replace(made, mesh=made.mesh.moved(middle + 0.6 * (made.mesh.vertices - middle)))
+        told = follow(far, Settings(), finer=made)
+        assert told.warnings[0].startswith("the mesh with faces so large does not follow its window: ")
+        assert told.stats["quality"]["follows"]["far"] == told.warnings[0]
+        assert follow(made, Settings(), finer=made).warnings == ()
+        with pytest.raises(GeometryError, match="the mesh does not follow its window"):
+            follow(far, Settings(), finer=far)
+
     def test_what_is_a_voxel_thick_may_lose_all_of_its_volume(self) -> None:
         voxels = np.zeros((24, 24, 3), np.uint8)
         voxels[2:22, 2:22, 1] = 1
@@ -222,6 +234,11 @@ class TestWays:
             assert str(followed(made)["far"]).startswith("the mesh does not follow its window")
         else:
             assert followed(reconstruct(volume, lower=50.0, **asked))["far"] is None
+
+    def test_few_faces_are_no_way_around_it(self) -> None:
+        for asked in ({"target_faces": 500}, {"edge": 3.0}):
+            with pytest.raises(GeometryError, match="--way voxels, or --allow-far"):
+                reconstruct(balls(*TWO, radius=6.0), lower=50.0, way="ring", **asked)
 
     @pytest.mark.parametrize("way", ["rings", "loops", "voxels", "sphere"])
     def test_the_built_in_head_is_written(self, way: str) -> None:
@@ -292,6 +309,19 @@ class TestStudies:
             with pytest.raises(GeometryError, match="follow"):
                 reconstruct(volume, settings.replace(way="ring"), **asked)
         assert followed(reconstruct(volume, network="none", **asked))["far"] is None
+
+    @pytest.mark.parametrize("faces", [1_000, 5_000, 20_000])
+    def test_a_real_head_has_as_few_faces_as_asked_for_or_as_is_named(self, faces: int) -> None:
+        try:
+            made = reconstruct(read_volume(CT), preset="bone", target_faces=faces)
+        except GeometryError as refused:
+            assert faces < 5_000
+            faces = int(str(refused).split("Try: --target-faces ")[1].split(",")[0].rstrip("."))
+            made = reconstruct(read_volume(CT), preset="bone", target_faces=faces)
+        assert len(made.mesh.faces) <= faces
+        assert made.report["quality"]["sound"]
+        assert 0.8 < followed(made)["volume_share"] < 1.25
+        assert "is far" in str(followed(made)["far"]) or "with faces so large" in str(followed(made)["far"])
 
     def test_skin_has_a_ring_a_slice_and_none_inside_of_it(self) -> None:
         volume = read_volume(MR)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 import shlex
 from typing import TYPE_CHECKING
 
@@ -96,23 +97,62 @@ class TestOption:
             ("--label 5", "--select 5"),
             ("--presett bone", "--preset bone"),
             ("--target_faces 100", "--target-faces 100"),
+            ("--organ 5", "--select 5"),
+            ("--seg s.nii", "--labels-in s.nii"),
+            ("--spacing-xy 1", "--spacing 1"),
+            ("--window 300", "--lower 300"),
+            ("-q", "--quiet"),
         ],
     )
     def test_is_found_by_its_usual_name(self, asked: str, meant: str, capsys: pytest.CaptureFixture[str]) -> None:
         told = said(f"reconstruct a.nii -o m.stl {asked}", 2, capsys)
         assert told.endswith(f"Try: {meant}.")
 
-    def test_of_another_command_is_not_named(self, capsys: pytest.CaptureFixture[str]) -> None:
-        assert "--lower" not in said("surface a.xyz -o m.stl --threshold 3", 2, capsys)
+    @pytest.mark.parametrize("option", ["--threshold 3", "--iso 3", "--hu 3", "--window 3", "--seg s.nii"])
+    def test_of_another_command_is_not_named(self, option: str, capsys: pytest.CaptureFixture[str]) -> None:
+        """Nor one that only shares letters with it, as --json with --iso."""
+        assert said(f"surface a.xyz -o m.stl {option}", 2, capsys).endswith("Try: `tomomesh surface --help`.")
+
+    @pytest.mark.parametrize(
+        ("line", "hint"),
+        [
+            ("reconstruct a.nii --out m.stl", "--output m.stl"),
+            ("reconstruct a.nii --outfile=m.stl", "--output=m.stl"),
+            ("reconstruct a.nii m.stl", "-o m.stl"),
+            ("surface a.xyz m.PLY", "-o m.PLY"),
+            ("surface --depth 8 a.xyz", "`tomomesh surface --help`"),
+            ("--threshold 300 a.nii", "`tomomesh --help`"),
+        ],
+    )
+    def test_of_an_output_that_is_missing_or_before_the_command(
+        self, line: str, hint: str, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert said(line, 2, capsys).endswith(f"Try: {hint}.")
+
+    @pytest.mark.parametrize("command", sorted(build_parser().commands))
+    def test_the_help_fits_into_eighty_columns(
+        self, command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        monkeypatch.setenv("COLUMNS", "80")
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        told = capsys.readouterr().out.splitlines()
+        assert told[0].startswith(f"usage: tomomesh {command} ")
+        assert max(map(len, told)) <= 80
+        choices = [one.choices for one in build_parser().commands[command]._actions if one.choices]
+        words = set(re.split(r"[\s,{}().:;]+", " ".join(told)))
+        assert {str(one) for several in choices for one in several if "." not in str(one)} <= words
 
     def test_the_tables_name_what_there_is(self) -> None:
         commands = build_parser().commands
         options = {option for one in commands.values() for option in one._option_string_actions}
         assert {f"--{name}" for name in USUAL} <= options
         assert set(COMMANDS) <= set(commands)
-        usual = [other for others in USUAL.values() for other in others]
-        assert len(usual) == len(set(usual))
+        usual = {other for others in USUAL.values() for other in others}
         assert not {f"--{other}" for other in usual} & set(commands["reconstruct"]._option_string_actions)
+        for command in commands.values():
+            known = [others for name, others in USUAL.items() if f"--{name}" in command._option_string_actions]
+            assert max(sum(other in others for others in known) for other in usual) <= 1
 
 
 class TestLabels:

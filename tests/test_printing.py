@@ -182,6 +182,25 @@ class TestCures:
         judged(mended.mesh)
         assert mended.report["printable"], mended.report["reasons"]
 
+    def test_what_a_cut_leaves_thin_is_thickened_above_the_base(self) -> None:
+        """A cap of .4 mm, as the low end of a skull's shell is; and a ball, whose foot is not thin, stays as it was."""
+        told = verdict_of(BALL, flat_base=39.6)
+        assert [why.rsplit("(")[-1] for why in told["reasons"]] == ["--thicken 0.8)"]
+        part = make_part(BALL, Settings().replace(flat_base=39.6, thicken=0.8))
+        judged(part.mesh)
+        assert part.report["printable"], part.report["reasons"]
+        assert part.mesh.vertices[:, 2].min() == pytest.approx(BALL.vertices[:, 2].max() - 0.4, abs=1e-6)
+        assert part.report["base_area_mm2"] > told["base_area_mm2"] > 0
+        plain, thick = (part_of(BALL, flat_base=1.0, **more) for more in ({}, {"thicken": 0.8}))
+        assert plain.vertices.tobytes() == thick.vertices.tobytes()
+
+    def test_what_is_smaller_than_a_wall_cannot_be_printed(self) -> None:
+        told = verdict_of(BALL, scale=0.0045)
+        assert told["reasons"] == ["0.18 mm long, it is smaller than the printer's thinnest wall (--scale)"]
+        assert not told["printable"]
+        assert not any("smaller" in note for note in told["notes"])
+        assert verdict_of(BALL, scale=0.0045 * 50)["printable"]
+
     def test_a_plate_grows_on_both_sides_alike(self) -> None:
         low, high = (getattr(part_of(PLATE, thicken=0.8).vertices, end)(axis=0) for end in ("min", "max"))
         np.testing.assert_allclose(low, -high, atol=0.1)
@@ -206,8 +225,8 @@ class TestCures:
         ("options", "note"),
         [
             ({"drain": 2.0}, "no cavity to drain: --hollow makes one"),
-            ({"scale": 300.0}, "larger than printers are"),
-            ({"scale": 0.002}, "smaller than a printer resolves"),
+            ({"scale": 300.0}, "12 m long, it is larger than printers are"),
+            ({"scale": 0.05}, "smaller than a printer resolves"),
         ],
     )
     def test_what_is_likely_not_meant_is_noted_once(self, options: dict[str, Any], note: str) -> None:

@@ -60,7 +60,7 @@ def finish(made: Surface, settings: Settings, progress: Progress) -> tuple[Stage
     smooth = _smooth(made, settings, progress)
     even = _even(smooth.value, settings, progress)
     progress("judgement", 0, 1)
-    judged = Stage(None, warnings=walls) if walls else _judged(even.value, settings)
+    judged = Stage(None, warnings=walls) if walls else _judged(even.value, smooth.value, settings)
     progress("judgement", 1, 1)
     part = _print(even.value, settings, progress)
     surface = part.value
@@ -77,9 +77,10 @@ def compare_with(surface: Surface, truth: TriMesh) -> Stage[None]:
 
 
 @timed("quality")
-def _judged(made: Surface, settings: Settings) -> Stage[None]:
+def _judged(made: Surface, finer: Surface, settings: Settings) -> Stage[None]:
     """Refuse a mesh that does not follow what it was made from, as it is to be written."""
-    return follow(made, settings)
+    asked = settings.run.edge is not None or settings.run.target_faces is not None
+    return follow(made, settings, finer=finer if asked else None)
 
 
 def _check(made: Surface) -> None:

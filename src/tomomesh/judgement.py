@@ -111,7 +111,7 @@ def require_one_wall(made: Surface, settings: Settings) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def follow(made: Surface, settings: Settings) -> Stage[None]:
+def follow(made: Surface, settings: Settings, *, finer: Surface | None = None) -> Stage[None]:
     """Refuse a mesh that is far from its window or its slices, or say so where that was allowed.
 
     Parameters
@@ -119,6 +119,9 @@ def follow(made: Surface, settings: Settings) -> Stage[None]:
     made : Surface
         As it is to be written.
     settings : Settings
+    finer : Surface, optional
+        With the faces that its way has made, where others were asked for: a mesh that is far for these alone is what
+        was asked for, and only told of.
 
     Returns
     -------
@@ -135,14 +138,21 @@ def follow(made: Surface, settings: Settings) -> Stage[None]:
     limits = LIMITS[kind]
     far, near = _beyond(found, limits), _beyond(found, limits.part(TOLD))
     what = "slices" if kind == "slices" else "window"
-    if far and not settings.run.allow_far:
+    coarse = bool(far) and finer is not None and not _is_far(finer, settings.run.threads)
+    if far and not (coarse or settings.run.allow_far):
         raise GeometryError(
             f"the mesh does not follow its {what}", found="; ".join(far), expected=limits.in_words(found),
             hint=ALLOW if kind in SURE else f"{OTHER_WAY}, or {ALLOW}",
         )  # fmt: skip
-    told = f"the mesh {'does not follow' if far else 'is far from'} its {what}: {'; '.join(near)}" if near else None
+    mesh = "the mesh with faces so large" if coarse else "the mesh"
+    told = f"{mesh} {'does not follow' if far else 'is far from'} its {what}: {'; '.join(near)}" if near else None
     stats = {"measure": kind, **found, **limits.keys(found), "far": told}
     return Stage(None, {"quality": {"follows": stats}}, () if told is None else (told,))
+
+
+def _is_far(made: Surface, threads: int) -> bool:
+    kind, found = _measured(made, threads)
+    return bool(_beyond(found, LIMITS[kind]))
 
 
 def _measured(made: Surface, threads: int) -> tuple[str, dict[str, float]]:

@@ -13,7 +13,7 @@ from ..errors import UsageError
 from .options import build_parser
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
 FOLDERS = ("FOLDER",)
 FILES = ("FILE", "FILE.json", "FILE.toml", "MESH", "POINTS", "REGION", "STUDY")
@@ -65,21 +65,11 @@ def manual() -> str:
     library = _library("argparse_manpage.manpage")
     parser: Any = build_parser()
     parser.formatter_class = partial(argparse.HelpFormatter, width=UNWRAPPED)
-    for action in _actions(parser):
-        if isinstance(action, argparse._SubParsersAction):
-            _shorten(action.choices.values())
     page = library.Manpage(parser, format="single-commands-section")
     page.description, page.date = parser.description, ""
     page.source, page.manual = f"tomomesh {__version__}", "tomomesh"
     # a line that begins with a dot is a command of roff, and would be lost: no suffix is one
     return re.sub(r"(?m)^(?=\.[a-z0-9]{3}|')", r"\\&", str(page))
-
-
-def _shorten(commands: Iterable[argparse.ArgumentParser]) -> None:
-    """Leave the options out of the usage: each is described below it."""
-    for command in commands:
-        named = [action.metavar or action.dest for action in command._actions if not action.option_strings]
-        command.usage = " ".join([command.prog, "[OPTION ...]", *map(str, named)])
 
 
 def _library(module: str) -> Any:

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import EmptyError
 from ..isosurface.well_composed import without_contacts
 from ..model.mesh import TriMesh
+from ..model.units import length_in_words
 from .depth import deep_inside, deepest, depth_near, level_surface
 from .solids import mesh_of, solid_of
 
@@ -59,7 +60,7 @@ def hollowed(mesh: TriMesh, wall: float, *, threads: int, progress: Progress) ->
             found=f"--hollow = {wall:g}",
             expected="a wall thinner than half of the part where that is thickest",
             hint="a thinner wall, or a larger --scale; "
-            f"the deepest place is about {deepest(mesh, threads):.3g} mm from a face",
+            f"the deepest place is about {length_in_words(deepest(mesh, threads), digits=3)} from a face",
         )
     inner = _coarser(_inner_side(depth, deep, wall, threads), wall)
     progress("hollow", 1, 1)

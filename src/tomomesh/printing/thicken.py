@@ -38,7 +38,7 @@ FLAT = 0.005
 """Share of the thickness by which what is added may move where it is made coarser."""
 
 
-def thickened(mesh: TriMesh, least: float, *, threads: int, progress: Progress) -> TriMesh:
+def thickened(mesh: TriMesh, least: float, *, room: float = ROOM, threads: int, progress: Progress) -> TriMesh:
     """Add to a solid around the middle of its thin walls, so that they are thick enough.
 
     The faces where the ball inside is smaller than that are moved to the middle of their wall; what lies within half
@@ -50,6 +50,8 @@ def thickened(mesh: TriMesh, least: float, *, threads: int, progress: Progress) 
         Closed, 2-manifold and outward, but for the linings of cavities.
     least : float
         Thickness.
+    room : float
+        Thickness that is made over that.
     threads : int
     progress : callable
 
@@ -68,7 +70,7 @@ def thickened(mesh: TriMesh, least: float, *, threads: int, progress: Progress) 
         added = []
         for count, tile in enumerate(tiles):
             progress("thicken", count, len(tiles))
-            added.append(solid_of(_around(tile, 0.5 * ROOM * least, threads)).simplify(FLAT * least))
+            added.append(solid_of(_around(tile, 0.5 * room * least, threads)).simplify(FLAT * least))
         progress("thicken", len(tiles), len(tiles))
         mesh = _apart(mesh_of(Manifold.batch_boolean([solid_of(mesh), *added], OpType.Add)))
     return mesh

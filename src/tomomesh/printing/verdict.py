@@ -10,6 +10,7 @@ from ..measure.intersections import self_intersections
 from ..measure.thickness import SHARE, walls_and_gaps
 from ..measure.topology import topology
 from ..measure.winding import linings, pieces_of
+from ..model.units import length_in_words
 from ..progress import Progress, silent
 from .flat_base import direction_of
 
@@ -112,28 +113,33 @@ def _of_widths(found: Thickness, name: str, least: float) -> dict[str, Any]:
 
 def _reasons(told: dict[str, Any], walls: Thickness, least: float) -> list[str]:
     """Say what keeps a part from being printed; thin spots smaller than the printer's own wall do not."""
-    reasons = []
+    reasons, longest = [], max(told["size_mm"])
+    if longest < least:
+        reasons.append(f"{_long(longest)}, it is smaller than the printer's thinnest wall (--scale)")
     if told["floating_pieces"]:
         reasons.append(f"{told['floating_pieces']} of {told['pieces']} pieces float free of the plate (--one-piece)")
     if walls.widest_spot(least) > least**2:
         share = 100 * told["thin_wall_share"]
-        thinnest = f"thinnest wall {told['thinnest_wall_mm']:.3g} mm at {_at(told['thinnest_wall_at_mm'])}"
-        reasons.append(f"{thinnest}, {share:.3g} % of the surface under {least:g} mm (--thicken {least:g})")
+        thin = f"{share:.3g} % of the surface under {least:g} mm"
+        reasons.append(
+            f"thinnest wall {_at(told['thinnest_wall_mm'], told['thinnest_wall_at_mm'])}, {thin} (--thicken {least:g})"
+        )
     return reasons
 
 
 def _notes(told: dict[str, Any], least: float) -> list[str]:
     """Say what a printer should know."""
     notes, longest = [], max(told["size_mm"])
-    if not SMALLEST * least <= longest <= LARGEST:
+    if SMALLEST * least > longest >= least or longest > LARGEST:
         size = "smaller than a printer resolves" if longest < LARGEST else "larger than printers are"
-        notes.append(f"{longest:.3g} mm long, it is {size}: --scale, or --units where they are not mm")
+        notes.append(f"{_long(longest)}, it is {size}: --scale, or --units where they are not mm")
     if told["sealed_cavities"]:
         notes.append(
             f"{told['sealed_cavities']} sealed cavity(ies): resin or powder stays inside (--drain, --fill-cavities)"
         )
     if told["thin_gap_share"] > 0:
-        notes.append(f"narrowest gap {told['thinnest_gap_mm']:.3g} mm at {_at(told['thinnest_gap_at_mm'])} may close")
+        gap = _at(told["thinnest_gap_mm"], told["thinnest_gap_at_mm"])
+        notes.append(f"narrowest gap {gap} may close")
     if told["self_intersections"]:
         notes.append(f"{told['self_intersections']} faces pass through others")
     if told["base_area_mm2"] == 0:
@@ -141,5 +147,10 @@ def _notes(told: dict[str, Any], least: float) -> list[str]:
     return notes
 
 
-def _at(place: list[float]) -> str:
-    return f"({', '.join(f'{c:.1f}' for c in place)})"
+def _long(side: float) -> str:
+    return f"{length_in_words(side, digits=3)} long"
+
+
+def _at(width: float, place: list[float]) -> str:
+    """Name a width and its place."""
+    return f"{length_in_words(width, digits=3)} at ({', '.join(f'{c:.1f}' for c in place)})"

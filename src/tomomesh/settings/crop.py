@@ -10,7 +10,7 @@ from .parameter import Group, param
 
 @dataclass(frozen=True)
 class CropSettings(Group):
-    """The part of a study that matters; the rest is cropped away before anything else is done."""
+    """The part of a study that matters; the rest is cropped away before all else."""
 
     roi: tuple[float, ...] | None = param(
         None, "box that is kept: the voxels whose centers lie from X0 to X1, Y0 to Y1 and Z0 to Z1 in the patient, LPS",

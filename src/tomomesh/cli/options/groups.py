@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...settings import Settings, option_of, parameters
 from .formats import LABEL, POINT, STUDY
-from .parameters import add_parameter
+from .parameters import add_parameter, chosen_from
 
 if TYPE_CHECKING:
     import argparse
@@ -36,11 +36,13 @@ def add_streams(
     """Add the options that name formats where no suffix does."""
     group = parser.add_argument_group("Streams")
     group.add_argument(
-        "--input-format", choices=read,
-        help=f"what is read from standard input (default {usual}), or from a file whose suffix does not tell",
-    )  # fmt: skip
+        "--input-format",
+        **chosen_from(
+            read, f"what is read from standard input (default {usual}), or from a file whose suffix does not tell"
+        ),
+    )
     if written:
-        group.add_argument("--format", choices=written, help="what is written to standard output (-o -)")
+        group.add_argument("--format", **chosen_from(written, "what is written to standard output (-o -)"))
 
 
 def add_each(parser: argparse.ArgumentParser) -> None:

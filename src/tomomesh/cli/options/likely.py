@@ -14,20 +14,41 @@ if TYPE_CHECKING:
     from collections.abc import Collection
 
 USUAL = {
-    "lower": ("threshold", "iso", "isovalue", "isolevel", "iso-value", "level-set", "min", "hu", "low", "lt"),
+    "lower": ("threshold", "iso", "isovalue", "isolevel", "iso-value", "level-set", "min", "hu", "low", "lt", "window"),
     "upper": ("max", "high", "ht"),
+    "preset": ("tissue",),
     "smooth": ("smoothing", "smooth-iterations", "sigma", "laplacian", "taubin"),
-    "target-faces": ("decimate", "decimation", "simplify", "faces", "reduce", "reduction", "triangles", "max-faces"),
-    "select": ("label", "segment-number", "roi-number"),
-    "output": ("out", "outfile", "save", "destination"),
-    "cell": ("voxel-size", "resolution", "grid", "pitch"),
-    "keep": ("keep-largest", "largest-component", "lcc"),
+    "target-faces": (
+        "decimate",
+        "decimation",
+        "decimate-ratio",
+        "simplify",
+        "faces",
+        "n-faces",
+        "num-faces",
+        "max-faces",
+        "triangles",
+        "reduce",
+        "reduction",
+        "target-reduction",
+    ),
+    "labels-in": ("seg", "seg-file", "segmentation", "labelmap", "mask", "mask-in"),
+    "select": ("label", "labels-list", "organ", "segment", "segment-number", "roi-number", "roi-subset"),
+    "structure": ("organ", "roi-name", "contour"),
+    "output": ("out", "outfile", "output-file", "output-dir", "save", "destination"),
+    "cell": ("voxel-size", "voxelsize", "resolution", "grid", "pitch"),
+    "keep": ("keep-largest", "largest-component", "lcc", "remove-islands", "islands", "min-size"),
+    "fill-holes": ("close-holes", "hole-size", "fill"),
     "edge": ("edge-length", "mesh-size", "max-edge"),
     "threads": ("jobs", "cores", "workers", "n-jobs"),
     "neurons": ("nodes", "n-neurons"),
     "epochs": ("iter", "n-iter"),
-    "spacing": ("pixel-size", "voxel-spacing"),
+    "seed": ("random-state", "random-seed"),
+    "spacing": ("pixel-size", "voxel-spacing", "spacing-xy", "spacing-x", "spacing-y"),
+    "series": ("series-number", "series-id", "series-uid"),
+    "slices": ("axis", "plane", "orientation"),
     "report": ("log", "stats"),
+    "quiet": ("q", "silent"),
 }
 """Options by which other programs call what ours do."""
 COMMANDS = {
@@ -52,9 +73,15 @@ KINDS = {
 def likely_option(word: str, known: Collection[str]) -> str:
     """Return the option that was likely meant by one that there is not, given all that there are; "" where none is."""
     name = word.partition("=")[0].lstrip("-").replace("_", "-")
-    usual = [f"--{option}" for option, others in USUAL.items() if name in others]
-    near = get_close_matches(f"--{name}", [*known], 1, 0.7)
-    return next((option for option in (*usual, *near) if option in known), "")
+    usual = [option for option, others in USUAL.items() if name in others]
+    near = get_close_matches(name, [option.lstrip("-") for option in known], 1, 0.7)
+    return next((f"--{option}" for option in (*usual, *near) if f"--{option}" in known), "")
+
+
+def likely_output(words: Collection[str]) -> str:
+    """Return the option for a mesh that is named last, where no output is; "" where no mesh is."""
+    last = [*words][-1]
+    return f"-o {last}" if Path(last).suffix.lower() in MESHES and not _is_there(last) else ""
 
 
 def likely_command(word: str, known: Collection[str]) -> str:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
 ALIASES = {"cell_mm": "--cell"}
 """Second spellings: the numbers of a cloud need not be millimeters."""
 
+WIDE = 40
+"""Letters of choices over which they are listed in the help of an option: with its own name they would be wider than
+half of a terminal of 80 columns."""
+
 
 def spellings(name: str) -> list[str]:
     """Return the options by which a parameter goes."""
@@ -97,11 +101,26 @@ def add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
         dest=name,
         type=_numbers if one_or_three or listed else _labels if many else _kind(meta),
         nargs=several,
-        choices=meta["choices"] or None,
-        metavar=None if meta["choices"] else _metavar(name, meta),
         default=argparse.SUPPRESS,
-        help=_help(entry),
+        **(chosen_from(meta["choices"], _help(entry)) if meta["choices"] else _free(entry)),
     )
+
+
+def chosen_from(choices: Sequence[Any], text: str) -> dict[str, Any]:
+    """Return the arguments of an option with a choice: many are listed in its help, which is wrapped.
+
+    Examples
+    --------
+    >>> chosen_from(("lps", "ras"), "the frame")
+    {'choices': ('lps', 'ras'), 'metavar': None, 'help': 'the frame'}
+    """
+    if sum(map(len, map(str, choices))) <= WIDE:
+        return {"choices": choices, "metavar": None, "help": text}
+    return {"choices": choices, "metavar": "NAME", "help": f"{text}: {', '.join(map(str, choices))}"}
+
+
+def _free(entry: Field[Any]) -> dict[str, Any]:
+    return {"metavar": _metavar(entry.name, entry.metadata), "help": _help(entry)}
 
 
 def _kind(meta: Any) -> Any:

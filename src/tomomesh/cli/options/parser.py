@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 from ... import __version__
 from ...errors import UsageError
 from .commands import add_commands
-from .likely import likely_command, likely_option
+from .likely import likely_command, likely_option, likely_output
 
 
 class _Parser(argparse.ArgumentParser):
@@ -25,12 +25,31 @@ class _Parser(argparse.ArgumentParser):
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse; of an option or a command that there is not, say which was likely meant."""
         words = list(args or ())
-        if words and not words[0].startswith("-") and words[0] not in self.commands:
+        if words and words[0] not in self.commands and words[0] not in self._option_string_actions:
             raise self._no_command(words[0])
-        found, unknown = self.parse_known_args(words, namespace)
+        try:
+            found, unknown = self.parse_known_args(words, namespace)
+        except UsageError as fault:  # of what is missing: it may be there under another name
+            raise self._with_hint(fault, words) from None
         if unknown:
             raise _no_option(self.commands[found.command], unknown)
         return found
+
+    def _strange(self, words: list[str]) -> list[str]:
+        """Return the first option that the command does not know, and what stands behind it."""
+        known = self.commands[words[0]]._option_string_actions if words and words[0] in self.commands else {}
+        strange = (
+            n for n, word in enumerate(words) if known and word[:2] == "--" and word.partition("=")[0] not in known
+        )
+        first = next(strange, None)
+        return [] if first is None else words[first : first + 2]
+
+    def _with_hint(self, fault: UsageError, words: list[str]) -> UsageError:
+        """Return the error of arguments that cannot be parsed, with what was likely meant."""
+        if strange := self._strange(words):
+            return _no_option(self.commands[words[0]], strange)
+        output = likely_output(words) if "required: -o" in str(fault) and len(words) > 1 else ""
+        return UsageError("no output is named", expected="-o/--output", hint=output) if output else fault
 
     def _no_command(self, word: str) -> UsageError:
         meant = likely_command(word, self.commands)
@@ -64,4 +83,17 @@ def build_parser() -> _Parser:
     )
     add_commands(commands)
     parser.commands = dict(commands.choices)
+    for command in parser.commands.values():
+        command.usage = _usage(command)
     return parser
+
+
+def _usage(command: argparse.ArgumentParser) -> str:
+    """Name what a command cannot do without; every option is described below that."""
+    named = [str(action.metavar or action.dest) for action in command._actions if not action.option_strings]
+    needed = [
+        f"{action.option_strings[0]} {action.metavar}"
+        for action in command._actions
+        if action.required and action.option_strings
+    ]
+    return " ".join([command.prog, *named, *needed, "[OPTION ...]"])

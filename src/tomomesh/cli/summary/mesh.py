@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...measure.topology import FAULTS
+from ...model.units import length_in_words, plain, volume_in_words
 
 WIDTHS = ("thinnest_wall_mm", "thinnest_gap_mm")
 """Keys of the widths that are told of a part."""
@@ -25,9 +26,9 @@ def of_check(report: dict[str, Any]) -> list[str]:
         + (f", genus {report['genus']}" if report["sound"] else "")
         + loops,
         f"crossing  {report['self_intersections'] or 'no'} face(s) pass through others",
-        f"size      area {report['area_mm2']:.6g}{_volume(report)}",
-        f"edges     {report['shortest_edge_mm']:.4g} to {report['longest_edge_mm']:.4g}, "
-        f"median {report['median_edge_mm']:.4g}; the surface turns by {report['mean_turn_deg']:.1f} deg on average",
+        f"size      area {plain(report['area_mm2'], 6)}{_volume(report)}",
+        f"edges     {plain(report['shortest_edge_mm'])} to {plain(report['longest_edge_mm'])}, "
+        f"median {plain(report['median_edge_mm'])}; the surface turns by {report['mean_turn_deg']:.1f} deg on average",
         f"angles    {report['smallest_angle_deg']:.1f} to {report['largest_angle_deg']:.1f} deg, "
         f"mean of the smallest {report['mean_smallest_angle_deg']:.1f} deg",
         *_parts(report),
@@ -46,11 +47,10 @@ def of_print(report: dict[str, Any]) -> list[str]:
     told = report.get("print")
     if told is None:
         return []
-    size = " x ".join(f"{side:.4g}" for side in told["size_mm"])
-    widths = [f"{told[key]:.3g} mm" if told.get(key) is not None else "none found" for key in WIDTHS]
+    widths = [length_in_words(told[key], digits=3) if told.get(key) is not None else "none found" for key in WIDTHS]
     verdict = "yes" if told["printable"] else f"no: {'; '.join(told['reasons'])}"
     return [
-        f"part      {size} mm, {told['volume_mm3'] / 1000:.4g} cm^3 of material, "
+        f"part      {length_in_words(*told['size_mm'])}, {volume_in_words(told['volume_mm3'])} of material, "
         f"{100 * told['overhang_share']:.3g} % of the surface hangs over",
         f"          thinnest wall {widths[0]}, narrowest gap {widths[1]}",
         f"printable {verdict}",
@@ -65,7 +65,7 @@ def _parts(report: dict[str, Any]) -> list[str]:
         return []
     lines = [
         f"part {n}    {part['faces']} faces, {part['self_intersections'] or 'no'} crossing, "
-        f"area {part['area_mm2']:.4g}{_volume(part)}, genus {part['genus']}"
+        f"area {plain(part['area_mm2'])}{_volume(part)}, genus {part['genus']}"
         for n, part in enumerate(parts[:LARGEST], 1)
     ]
     more = report["components"] - len(lines)
@@ -92,7 +92,7 @@ def _of_agreement(report: dict[str, Any]) -> list[str]:
 
 def _volume(found: dict[str, Any]) -> str:
     """Name the volume of what is closed, and say so of what is not."""
-    return ", open" if found["volume_mm3"] is None else f", volume {found['volume_mm3']:.6g}"
+    return ", open" if found["volume_mm3"] is None else f", volume {plain(found['volume_mm3'], 6)}"
 
 
 def pieces_in_words(quality: dict[str, Any]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...model.units import plain
 from ...ways import way_of
 from ...ways.clouds.samples import points_in_words
 from ...ways.sections import unit_in_words
@@ -121,7 +122,7 @@ def _of_mesh(quality: dict[str, Any], unit: str) -> list[str]:
         f"mesh      {quality['vertices']} vertices, {quality['faces']} faces, {shape}, "
         f"{quality['self_intersections'] or 'no'} face(s) pass through others",
         f"          {pieces_in_words(quality)}, genus {quality['genus']}, "
-        f"area {quality['area_mm2']:.6g} {unit}^2{_of_volume(quality, unit)}{_of_rings(quality)}",
+        f"area {plain(quality['area_mm2'], 6)} {unit}^2{_of_volume(quality, unit)}{_of_rings(quality)}",
         f"distance  points to surface: mean {quality['points_to_surface_mean_mm']:.3g}, "
         f"95 % {quality['points_to_surface_p95_mm']:.3g}, largest {quality['points_to_surface_max_mm']:.3g} {unit}",
     ]
@@ -148,7 +149,7 @@ def _of_truth(report: dict[str, Any]) -> list[str]:
 
 def _of_volume(quality: dict[str, Any], unit: str) -> str:
     volume = quality["volume_mm3"]
-    return f", {quality['boundary_loops']} border(s)" if volume is None else f", volume {volume:.6g} {unit}^3"
+    return f", {quality['boundary_loops']} border(s)" if volume is None else f", volume {plain(volume, 6)} {unit}^3"
 
 
 def _of_rings(quality: dict[str, Any]) -> str:
