@@ -45,10 +45,9 @@ FEWER = 0.5
 OFF, TURNED = 0.25, 0.5
 """Distance from the mesh, sampling distances, and cosine of the angle between the normals, over and under which it
 passes a sample by: all that are joined do both, a rounded edge only one."""
-PASSED, BESIDE = 12, 4.0
-"""Samples passed by that tell of a joint, within how many sampling distances of one of them. Chosen: at most 9 are in
-the clean and noisy clouds of docs/clouds.md at 15,000 points, 13 and more where fingers and turns of a coil were
-joined."""
+PASSED, BESIDE = 24, 4.0
+"""Samples passed by that tell of a joint, within how many sampling distances of one of them: 36 and more where turns of
+a coil were joined, at most 17 in the clouds of docs/clouds.md (cat, skull, fandisk; measured)."""
 
 
 def may_join(shell: Shell) -> bool:
@@ -62,10 +61,12 @@ def apart(
 ) -> Shell:
     """Return a shell, or one that joins less: of small cubes, or of what the normals say is inside.
 
-    The normals are asked where points still lie deep inside, or cubes of the two sizes disagree about the handles.
+    The normals are asked where points still lie deep inside, or cubes of the two sizes disagree about the handles;
+    but not in noise, of which small cubes make handles.
     """
     other = of_small_cubes(shell, samples, settings, progress)
-    agree = not other.leak_test.tight or other.leak_test.faces.handles == shell.leak_test.faces.handles
+    as_many = other.leak_test.faces.handles == shell.leak_test.faces.handles
+    agree = as_many or not other.leak_test.tight or _is_noisy(samples)
     shell = other if is_nearer(other, shell, samples) else shell
     if agree and joint(shell.leak_test.shell, shell.finer) is None:
         return shell
@@ -76,7 +77,7 @@ def apart(
 def of_small_cubes(shell: Shell, samples: Samples, settings: Settings, progress: Progress) -> Shell:
     """Return the shell of small cubes that hold the triangles between neighbors; the one before where it leaks."""
     spacing, noise = float(np.median(samples.spacing)), float(np.median(samples.noise))
-    cell = np.full(3, max(SMALL * spacing, NOISE[0] * noise))
+    cell = np.full(3, max(SMALL * spacing, NOISE[1] * noise))
     if settings.cubes.cell_mm or cell[0] > SMALLER * shell.cell.min():
         return shell
     threads = settings.run.threads
@@ -96,6 +97,11 @@ def is_nearer(other: Shell, shell: Shell, samples: Samples) -> bool:
     if handles != before:
         return handles < before
     return _without_say(other, samples) < FEWER * _without_say(shell, samples)
+
+
+def _is_noisy(samples: Samples) -> bool:
+    """Tell whether noise leaves no room for the small cubes."""
+    return NOISE[1] * float(np.median(samples.noise)) > SMALL * float(np.median(samples.spacing))
 
 
 def _without_say(shell: Shell, samples: Samples) -> int:

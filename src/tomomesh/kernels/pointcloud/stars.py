@@ -56,7 +56,7 @@ def spread_out(samples: Floats, p: int, found: Integers, count: int, places: Flo
 
 @kernel("i8(f8[:,::1], i8, i8, f8)")
 def beside(places: Floats, count: int, one: int, way: float) -> int:
-    """Return the next Delaunay neighbor of the origin from one of them on, counter-clockwise for a way of 1; -1 if none.
+    """Return the Delaunay neighbor of the origin after another, counter-clockwise for a way of 1; -1 if there is none.
 
     The triangle of the origin, that one and the next holds no other in its circle where its angle at the next is the
     largest.
