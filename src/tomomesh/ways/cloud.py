@@ -158,8 +158,9 @@ def _close(points: Points, samples: Samples, settings: Settings, progress: Progr
         other = _by_normals(shell, samples, lowest_corner(points), settings, progress)
         shell = other if other.leak_test.is_better_than(shell.leak_test) else shell
     if settings.cubes.closing is None and may_join(shell):
-        by_normals = partial(_by_normals, samples=samples, origin=lowest_corner(points))
-        shell = apart(shell, samples, settings, progress, by_normals)
+        origin = lowest_corner(points)
+        normals = partial(_by_normals, samples=samples, origin=origin, settings=settings, progress=progress)
+        shell = apart(shell, samples, origin, settings, progress, normals)
     told = shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
     return folded(shell, told, Stage(None, warnings=(shell.doubt,) if shell.doubt else ()))
 

@@ -41,7 +41,8 @@ BURIED = 1.5
 """Distance from the surface, sampling distances, from which a sample has no say in it."""
 FEWER = 0.5
 """Share of the samples without a say of another shell that may be left for this one to be taken instead."""
-
+LOST = 0.001
+"""The same, over all samples, that may be without a say in addition: a loop of a lace is more."""
 OFF, TURNED = 0.25, 0.5
 """Distance from the mesh, sampling distances, and cosine of the angle between the normals, over and under which it
 passes a sample by: all that are joined do both, a rounded edge only one."""
@@ -57,21 +58,36 @@ def may_join(shell: Shell) -> bool:
 
 
 def apart(
-    shell: Shell, samples: Samples, settings: Settings, progress: Progress, by_normals: Callable[..., Shell]
-) -> Shell:
+    shell: Shell, samples: Samples, origin: Floats, settings: Settings, progress: Progress,
+    by_normals: Callable[[Shell], Shell],
+) -> Shell:  # fmt: skip
     """Return a shell, or one that joins less: of small cubes, or of what the normals say is inside.
 
     The normals are asked where points still lie deep inside, or cubes of the two sizes disagree about the handles;
     but not in noise, of which small cubes make handles.
     """
-    other = of_small_cubes(shell, samples, settings, progress)
-    as_many = other.leak_test.faces.handles == shell.leak_test.faces.handles
-    agree = as_many or not other.leak_test.tight or _is_noisy(samples)
-    shell = other if is_nearer(other, shell, samples) else shell
-    if agree and joint(shell.leak_test.shell, shell.finer) is None:
-        return shell
-    other = by_normals(shell, settings=settings, progress=progress)
-    return other if is_nearer(other, shell, samples) else shell
+    small, noisy = of_small_cubes(shell, samples, settings, progress), _is_noisy(samples)
+    first, second = (small, shell) if is_nearer(small, shell, samples, fewer=noisy) else (shell, small)
+    agree = noisy or _handles(first) == _handles(second) or not second.leak_test.tight
+    if agree and joint(first.leak_test.shell, first.finer) is None:
+        return first
+    third = by_normals(first)
+    if is_nearer(third, first, samples, fewer=True):
+        return third
+    sure = agree or (third is not first and _handles(third) == _handles(first))
+    return first if sure else replace(first, doubt=_disagreement(first, second, origin))
+
+
+def _handles(shell: Shell) -> int:
+    return shell.leak_test.faces.handles
+
+
+def _disagreement(shell: Shell, other: Shell, origin: Floats) -> str:
+    """Say how many handles two shells have, and where they are farthest from one another."""
+    middles, others = (one.lowest + one.cell * (one.leak_test.faces.cells + 0.5) for one in (shell, other))
+    farthest = middles[cKDTree(others).query(middles)[0].argmax()] + origin
+    counts = f"{_handles(shell)} with those of {shell.cell.min():.3g}, {_handles(other)} with {other.cell.min():.3g}"
+    return f"cubes of two sizes disagree about the handles, {counts}, most around {place_in_words(farthest)}"
 
 
 def of_small_cubes(shell: Shell, samples: Samples, settings: Settings, progress: Progress) -> Shell:
@@ -89,14 +105,15 @@ def of_small_cubes(shell: Shell, samples: Samples, settings: Settings, progress:
     return replace(shell, cell=cell, lowest=lowest, cubes=len(cells), leak_test=test, finer=FINER)
 
 
-def is_nearer(other: Shell, shell: Shell, samples: Samples) -> bool:
-    """Tell whether another shell is surely tight, and has fewer handles or leaves fewer samples without a say."""
+def is_nearer(other: Shell, shell: Shell, samples: Samples, *, fewer: bool) -> bool:
+    """Tell whether another shell is surely tight, loses no part, and has other (or fewer) handles or joins less."""
     if other is shell or other.leak_test.two_sided < SURE:
         return False
-    handles, before = other.leak_test.faces.handles, shell.leak_test.faces.handles
-    if handles != before:
-        return handles < before
-    return _without_say(other, samples) < FEWER * _without_say(shell, samples)
+    handles, before = _handles(other), _handles(shell)
+    left, had = _without_say(other, samples), _without_say(shell, samples)
+    if left > had + LOST * len(samples.positions):
+        return False
+    return handles < before or not fewer if handles != before else left < FEWER * had
 
 
 def _is_noisy(samples: Samples) -> bool:
