@@ -116,7 +116,7 @@ class TestStars:
         known = set(neighbors[corners[0] : corners[1]].tolist())
         others = np.ascontiguousarray(places[1:])
         first = one = int(np.argmin((others**2).sum(axis=1)))
-        found = []
+        found: list[int] = []
         while one >= 0 and len(found) < len(others):
             found.append(one + 1)
             one = beside(others, len(others), one, 1.0)

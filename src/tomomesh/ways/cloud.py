@@ -28,10 +28,10 @@ from ..pointcloud.forecast import require_room
 from ..pointcloud.solid import fills_solid
 from ..results import Surface
 from ..stage import Stage, folded, measured, timed
-from .joints import apart, follows, may_join, place_in_words
 from .points import interpolated, place_found
 from .samples import ACROSS, cell_edges, lowest_corner, require_parts, settle, too_wide
 from .sections import WIDE, body_of_cubes, count_walls, fit_found, hollow, shell_found, walls_found
+from .shells.joints import apart, follows, may_join, place_in_words
 from .way import CUBES, POINTS, Way, on_input, parameters
 
 if TYPE_CHECKING:

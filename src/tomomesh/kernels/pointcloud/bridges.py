@@ -25,7 +25,7 @@ STEEP = 0.5
 """Slope over which a bridge would leave the surface at its end. Chosen: half of it changes the distance by +6.8 %,
 twice by 0.0 %."""
 ALONG, BESIDE = 0.7, 2.5
-"""Cosine of the angle between a bridge and the normal of a sample from which this lies on a wall that turns away from
+"""Cosine of the angle between a bridge and the normal of a sample from which this lies on a side that turns away from
 the bridge, as that of a slot does, and how far beside the bridge it is looked for, times the spacing."""
 SAME_SIDE = 0.5
 """Cosine of the angle between the normals over which two rims belong together. Chosen: half of it changes the distance
@@ -95,7 +95,7 @@ def full_sectors(
 
 
 @kernel("b1(f8[:,::1], i8, f8[::1], f8, i8[::1], i8)")
-def meets_wall(samples: Floats, p: int, step: Floats, length: float, found: Integers, count: int) -> bool:
+def meets_side(samples: Floats, p: int, step: Floats, length: float, found: Integers, count: int) -> bool:
     """Tell whether a sample beside a step (3,) from p on faces along it: both ends then lie at the edge of a slot."""
     for n in range(count):
         r = found[n]
@@ -178,7 +178,7 @@ def bridge(
             tangents(samples[q, 3:6], other)
             if not is_open(sectors[q], (sector(other, step) + SECTORS // 2) % SECTORS):
                 continue
-            if meets_wall(samples, p, step, length, found, count):
+            if meets_side(samples, p, step, length, found, count):
                 continue
             for piece in range(1, pieces):
                 if total < len(places):

@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..cuberille.leak_test import SURE, close_leaks
-from ..cuberille.neighbors import once_each
-from ..cuberille.parting import joint
-from ..cuberille.partition import cubes_over
-from ..measure.tree import Tree
-from ..model.cubes import cells_of, keys_of
-from ..pointcloud.stars import cells_between
-from ..stage import Stage
-from .samples import NOISE
+from ...cuberille.leak_test import SURE, close_leaks
+from ...cuberille.neighbors import once_each
+from ...cuberille.parting import joint
+from ...cuberille.partition import cubes_over
+from ...measure.tree import Tree
+from ...model.cubes import cells_of, keys_of
+from ...pointcloud.stars import cells_between
+from ...stage import Stage
+from ..samples import NOISE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from ..model.mesh import TriMesh
-    from ..pointcloud.samples import Samples
-    from ..progress import Progress
-    from ..settings import Settings
-    from .cloud import Shell
+    from ...model.mesh import TriMesh
+    from ...pointcloud.samples import Samples
+    from ...progress import Progress
+    from ...settings import Settings
+    from ..cloud import Shell
 
     Floats = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def _handles(shell: Shell) -> int:
 def _disagreement(shell: Shell, other: Shell, origin: Floats) -> str:
     """Say how many handles two shells have, and where they are farthest from one another."""
     middles, others = (one.lowest + one.cell * (one.leak_test.faces.cells + 0.5) for one in (shell, other))
-    farthest = middles[cKDTree(others).query(middles)[0].argmax()] + origin
+    farthest = middles[np.argmax(cKDTree(others).query(middles)[0])] + origin
     counts = f"{_handles(shell)} with those of {shell.cell.min():.3g}, {_handles(other)} with {other.cell.min():.3g}"
     return f"cubes of two sizes disagree about the handles, {counts}, most around {place_in_words(farthest)}"
 

@@ -1,0 +1,1 @@
+"""The shell of cubes of a cloud."""
