@@ -16,7 +16,7 @@ from ...measure.tree import Tree
 from ...model.cubes import cells_of, keys_of
 from ...pointcloud.stars import cells_between
 from ...stage import Stage
-from ..samples import NOISE
+from .samples import NOISE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ...pointcloud.samples import Samples
     from ...progress import Progress
     from ...settings import Settings
-    from ..cloud import Shell
+    from .shell import Shell
 
     Floats = NDArray[np.float64]
 

@@ -1,1 +1,0 @@
-"""The shell of cubes of a cloud."""
