@@ -62,10 +62,10 @@ class Shell:
     closing: int
     added: int
 
-    def buried(self) -> NDArray[np.int64]:
-        """List the cubes with points that lie `DEEP` cubes and more below the outside, cavities aside, (d, 3)."""
-        deep = self.blocks.cells(self.occupied & ~self.blocks.grown(~self.solid, DEEP))
-        return deep[~np.isin(keys_of(deep), keys_of(self.within))]
+    def buried(self, deep: int = DEEP) -> NDArray[np.int64]:
+        """List the cubes with points that lie so many cubes and more below the outside, cavities aside, (d, 3)."""
+        cells = self.blocks.cells(self.occupied & ~self.blocks.grown(~self.solid, deep))
+        return cells[~np.isin(keys_of(cells), keys_of(self.within))]
 
 
 def close_shell(cells: NDArray[np.int64], closing: int, *, threads: int = 0) -> Shell:

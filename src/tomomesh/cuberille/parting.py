@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..kernels.cuberille.cells import label_components
 from ..model.cubes import keys_of
-from .closing import close_shell
+from .closing import DEEP, close_shell
 from .neighbors import neighbor_table
 
 if TYPE_CHECKING:
@@ -57,13 +57,16 @@ def close_apart(joined: Shell, cells: NDArray[np.int64]) -> Shell | None:
     return replace(joined, solid=solid, witnesses=witnesses, added=sum(one.added for one in each))
 
 
-def joint(shell: Shell) -> NDArray[np.int64] | None:
-    """Return the cube (3,) around which most points lie deep inside of the surface; None where no joint is told of."""
-    buried = shell.buried()
+def joint(shell: Shell, finer: int = 1) -> NDArray[np.int64] | None:
+    """Return the cube (3,) around which most points lie deep inside of the surface; None where no joint is told of.
+
+    Of a shell of cubes that are so many times finer, deep is as many times more cubes, and few the square of it.
+    """
+    buried = shell.buried(DEEP * finer)
     if len(buried) == 0:
         return None
-    beside = cKDTree(buried).query_ball_point(buried, BESIDE, return_length=True)
-    few = beside.max() < FEW and len(buried) < MANY * int(shell.blocks.count(shell.occupied).sum())
+    beside = cKDTree(buried).query_ball_point(buried, BESIDE * finer, return_length=True)
+    few = beside.max() < FEW * finer**2 and len(buried) < MANY * int(shell.blocks.count(shell.occupied).sum())
     return None if few else np.asarray(buried[beside.argmax()])
 
 

@@ -17,6 +17,7 @@ from ..model.mesh import QuadMesh, TriMesh
 from ..pointcloud.filling import holes
 from ..results import Surface
 from ..stage import Stage, folded, measured
+from .clouds.joints import follows
 from .clouds.points import interpolated, place_found
 from .clouds.samples import lowest_corner, settle
 from .clouds.shell import Shell, shell_around, walls_of
@@ -79,7 +80,8 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
         encloses=enclosed if walls.value == 1 else None,
     )  # fmt: skip
     fitted = fit_found(trace, len(smoothed.vertices), taken_back=taken_back, filled=filled)
-    return folded(surface, settled, shell, walls, rough, rest, apart, fitted, place_found(points))
+    followed = follows(shell.value, mesh, samples, origin, threads=settings.run.threads)
+    return folded(surface, settled, shell, walls, rough, rest, apart, fitted, followed, place_found(points))
 
 
 def _smoothed(shell: Shell, settings: Settings) -> Rough:

@@ -24,6 +24,9 @@ TANGENT = 0.41421356237309503
 STEEP = 0.5
 """Slope over which a bridge would leave the surface at its end. Chosen: half of it changes the distance by +6.8 %,
 twice by 0.0 %."""
+ALONG, BESIDE = 0.7, 2.5
+"""Cosine of the angle between a bridge and the normal of a sample from which this lies on a side that turns away from
+the bridge, as that of a slot does, and how far beside the bridge it is looked for, times the spacing."""
 SAME_SIDE = 0.5
 """Cosine of the angle between the normals over which two rims belong together. Chosen: half of it changes the distance
 by +0.1 %, twice by +5.3 %."""
@@ -89,6 +92,23 @@ def full_sectors(
                 for axis in range(3):
                     step[axis] = samples[q, axis] - samples[p, axis]
                 sectors[p] |= 1 << sector(axes, step)
+
+
+@kernel("b1(f8[:,::1], i8, f8[::1], f8, i8[::1], i8)")
+def meets_side(samples: Floats, p: int, step: Floats, length: float, found: Integers, count: int) -> bool:
+    """Tell whether a sample beside a step (3,) from p on faces along it: both ends then lie at the edge of a slot."""
+    for n in range(count):
+        r = found[n]
+        along = across = facing = 0.0
+        for axis in range(3):
+            there = samples[r, axis] - samples[p, axis]
+            along += there * step[axis] / length
+            across += there**2
+            facing += samples[r, 3 + axis] * step[axis] / length
+        beside = across - along**2 < (BESIDE * samples[p, 6]) ** 2
+        if beside and 0.0 < along < length and abs(facing) > ALONG:
+            return True
+    return False
 
 
 @kernel("i8(f8[:,::1], i8[::1], i4[::1], f8[::1], i8[::1], f8, f8, f8[:,::1], i8, i8)")
@@ -157,6 +177,8 @@ def bridge(
                 continue
             tangents(samples[q, 3:6], other)
             if not is_open(sectors[q], (sector(other, step) + SECTORS // 2) % SECTORS):
+                continue
+            if meets_side(samples, p, step, length, found, count):
                 continue
             for piece in range(1, pieces):
                 if total < len(places):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,6 @@ import numpy as np
 
 from ...cuberille.leak_test import SURE, close_leaks
 from ...cuberille.neighbors import once_each
-from ...cuberille.parting import joint
 from ...cuberille.partition import cubes_over, is_flat
 from ...errors import GeometryError
 from ...model.cubes import cells_of
@@ -21,6 +21,7 @@ from ...pointcloud.forecast import require_room
 from ...pointcloud.solid import fills_solid
 from ...stage import Stage, folded, timed
 from ..sections import WIDE, count_walls, shell_found, walls_found
+from .joints import apart, may_join, place_in_words
 from .samples import ACROSS, cell_edges, lowest_corner, require_parts, too_wide
 
 if TYPE_CHECKING:
@@ -74,6 +75,8 @@ class Shell:
     leak_test: LeakTest
     doubt: str = ""
     """Where inside and outside were told apart by the normals alone, in words."""
+    finer: int = 1
+    """How many times finer its cubes are than usual."""
 
     @property
     def is_thin(self) -> bool:
@@ -102,18 +105,12 @@ def shell_around(points: Points, samples: Samples, settings: Settings, progress:
     if unsure and (settings.cubes.fill_holes or merged or not _is_open(_borders(shell, samples, settings), samples)):
         other = _by_normals(shell, samples, lowest_corner(points), settings, progress)
         shell = other if other.leak_test.is_better_than(shell.leak_test) else shell
+    if settings.cubes.closing is None and may_join(shell):
+        origin = lowest_corner(points)
+        normals = partial(_by_normals, samples=samples, origin=origin, settings=settings, progress=progress)
+        shell = apart(shell, samples, origin, settings, progress, normals)
     told = shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
-    said = (shell.doubt, _joined(shell, lowest_corner(points)))
-    return folded(shell, told, Stage(None, warnings=tuple(one for one in said if one)))
-
-
-def _joined(shell: Shell, origin: Floats) -> str:
-    """Say where points lie deep inside of the surface; nothing where none do."""
-    place = joint(shell.leak_test.shell) if shell.leak_test.tight and not shell.doubt else None
-    if place is None:
-        return ""
-    where = _place(shell.lowest + shell.cell * (place + 0.5) + origin)
-    return f"points lie deep inside of the surface around {where}: what is nearer than the cubes can part was joined"
+    return folded(shell, told, Stage(None, warnings=(shell.doubt,) if shell.doubt else ()))
 
 
 def _tightest(count: int, samples: Samples, settings: Settings, progress: Progress) -> Shell:
@@ -153,7 +150,7 @@ def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settin
     share = float(made_up(middles, samples, found.cell).mean())
     if found.met < MET or (share > MADE_UP and not settings.cubes.fill_holes):
         return shell
-    where = _place(found.doubtful + origin)
+    where = place_in_words(found.doubtful + origin)
     doubt = f"the shell of cubes does not hold: the normals tell inside from outside, least surely around {where}"
     return Shell(np.full(3, found.cell), found.lowest, found.cubes, shell.spanned, found.leak_test, doubt)
 
@@ -201,7 +198,7 @@ def walls_of(shell: Shell, samples: Samples, points: Points, origin: Floats, set
         )  # fmt: skip
     if shell.is_thin and not _is_open(found, samples):
         return walls_found(1, BOTH_SIDES)
-    where = [f"a gap of {gap.size:.4g} around {_place(gap.place + origin)}" for gap in found[:1]]
+    where = [f"a gap of {gap.size:.4g} around {place_in_words(gap.place + origin)}" for gap in found[:1]]
     raise GeometryError(
         ("the points look like an open surface: " if found else "")
         + "the outside leaks into the shell of cubes, so its surface would have two walls",
@@ -209,7 +206,3 @@ def walls_of(shell: Shell, samples: Samples, points: Points, origin: Floats, set
         expected="points all around the object, without gaps as wide as its holes",
         hint="--fill-holes to cap what is open, --open for a sheet with borders, or --allow-leaks",
     )
-
-
-def _place(place: Floats) -> str:
-    return "(" + ", ".join(f"{c:.6g}" for c in place) + ")"

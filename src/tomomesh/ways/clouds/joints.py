@@ -1,0 +1,158 @@
+"""What the cubes of a cloud join though its points lie apart: parted by smaller cubes, or told of by their place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...cuberille.leak_test import SURE, close_leaks
+from ...cuberille.neighbors import once_each
+from ...cuberille.parting import joint
+from ...cuberille.partition import cubes_over
+from ...measure.tree import Tree
+from ...model.cubes import cells_of, keys_of
+from ...pointcloud.stars import cells_between
+from ...stage import Stage
+from .samples import NOISE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from ...model.mesh import TriMesh
+    from ...pointcloud.samples import Samples
+    from ...progress import Progress
+    from ...settings import Settings
+    from .shell import Shell
+
+    Floats = NDArray[np.float64]
+
+SMALL, FINER = 0.5, 2
+"""Edge of the small cubes, sampling distances, and how many times finer than others that is, about."""
+SMALLER = 0.75
+"""The same, edges of the cubes before, over which nothing is gained: where noise asks for large ones."""
+CLOSINGS = (0, 1, 2)
+"""Closings of the small cubes that are tried: two of them span what one of the others does."""
+BURIED = 1.5
+"""Distance from the surface, sampling distances, from which a sample has no say in it."""
+FEWER = 0.5
+"""Share of the samples without a say of another shell that may be left for this one to be taken instead."""
+LOST = 0.001
+"""The same, over all samples, that may be without a say in addition: a loop of a lace is more."""
+OFF, TURNED = 0.25, 0.5
+"""Distance from the mesh, sampling distances, and cosine of the angle between the normals, over and under which it
+passes a sample by: all that are joined do both, a rounded edge only one."""
+PASSED, BESIDE = 24, 4.0
+"""Samples passed by that tell of a joint, within how many sampling distances of one of them: 36 and more where turns of
+a coil were joined, at most 17 in the clouds of docs/clouds.md (cat, skull, fandisk; measured)."""
+
+
+def may_join(shell: Shell) -> bool:
+    """Tell whether a shell has handles, or points deep inside: what is near one another may have been joined."""
+    test = shell.leak_test
+    return test.tight and (test.faces.handles > 0 or joint(test.shell) is not None)
+
+
+def apart(
+    shell: Shell, samples: Samples, origin: Floats, settings: Settings, progress: Progress,
+    by_normals: Callable[[Shell], Shell],
+) -> Shell:  # fmt: skip
+    """Return a shell, or one that joins less: of small cubes, or of what the normals say is inside.
+
+    The normals are asked where points still lie deep inside, or cubes of the two sizes disagree about the handles;
+    but not in noise, of which small cubes make handles.
+    """
+    small, noisy = of_small_cubes(shell, samples, settings, progress), _is_noisy(samples)
+    first, second = (small, shell) if is_nearer(small, shell, samples, fewer=noisy) else (shell, small)
+    agree = noisy or _handles(first) == _handles(second) or not second.leak_test.tight
+    if agree and joint(first.leak_test.shell, first.finer) is None:
+        return first
+    third = by_normals(first)
+    if is_nearer(third, first, samples, fewer=True):
+        return third
+    sure = agree or (third is not first and _handles(third) == _handles(first))
+    return first if sure else replace(first, doubt=_disagreement(first, second, origin))
+
+
+def _handles(shell: Shell) -> int:
+    return shell.leak_test.faces.handles
+
+
+def _disagreement(shell: Shell, other: Shell, origin: Floats) -> str:
+    """Say how many handles two shells have, and where they are farthest from one another."""
+    middles, others = (one.lowest + one.cell * (one.leak_test.faces.cells + 0.5) for one in (shell, other))
+    farthest = middles[np.argmax(cKDTree(others).query(middles)[0])] + origin
+    counts = f"{_handles(shell)} with those of {shell.cell.min():.3g}, {_handles(other)} with {other.cell.min():.3g}"
+    return f"cubes of two sizes disagree about the handles, {counts}, most around {place_in_words(farthest)}"
+
+
+def of_small_cubes(shell: Shell, samples: Samples, settings: Settings, progress: Progress) -> Shell:
+    """Return the shell of small cubes that hold the triangles between neighbors; the one before where it leaks."""
+    spacing, noise = float(np.median(samples.spacing)), float(np.median(samples.noise))
+    cell = np.full(3, max(SMALL * spacing, NOISE[1] * noise))
+    if settings.cubes.cell_mm or cell[0] > SMALLER * shell.cell.min():
+        return shell
+    threads = settings.run.threads
+    lowest, keys = cubes_over(np.concatenate([samples.positions, shell.spanned.places]), cell)
+    between = cells_between(samples, lowest, cell, threads=threads, progress=progress)
+    cells = cells_of(once_each(np.concatenate([keys, keys_of(between)])))
+    cavities = settings.cubes.surface != "outer"
+    test = close_leaks(cells, CLOSINGS, cavities=cavities, threads=threads, progress=progress)
+    return replace(shell, cell=cell, lowest=lowest, cubes=len(cells), leak_test=test, finer=FINER)
+
+
+def is_nearer(other: Shell, shell: Shell, samples: Samples, *, fewer: bool) -> bool:
+    """Tell whether another shell is surely tight, loses no part, and has other (or fewer) handles or joins less."""
+    if other is shell or other.leak_test.two_sided < SURE:
+        return False
+    handles, before = _handles(other), _handles(shell)
+    left, had = _without_say(other, samples), _without_say(shell, samples)
+    if left > had + LOST * len(samples.positions):
+        return False
+    return handles < before or not fewer if handles != before else left < FEWER * had
+
+
+def _is_noisy(samples: Samples) -> bool:
+    """Tell whether noise leaves no room for the small cubes."""
+    return NOISE[1] * float(np.median(samples.noise)) > SMALL * float(np.median(samples.spacing))
+
+
+def _without_say(shell: Shell, samples: Samples) -> int:
+    faces = shell.leak_test.faces
+    away = cKDTree(shell.lowest + shell.cell * (faces.cells + 0.5)).query(samples.positions)[0]
+    return int(np.count_nonzero(away > BURIED * float(np.median(samples.spacing))))
+
+
+def follows(shell: Shell, mesh: TriMesh, samples: Samples, origin: Floats, *, threads: int = 0) -> Stage[None]:
+    """Say where points lie deep inside of a mesh, or it passes them by."""
+    if not shell.leak_test.tight or shell.doubt:
+        return Stage(None)
+    deep = joint(shell.leak_test.shell, shell.finer)
+    inside = None if deep is None else shell.lowest + shell.cell * (deep + 0.5)
+    place = passed_by(mesh, samples, threads=threads) if inside is None else inside
+    if place is None:
+        return Stage(None)
+    where = f"points lie deep inside of the surface around {place_in_words(place + origin)}"
+    return Stage(None, warnings=(f"{where}: what is nearer than the cubes can part was joined",))
+
+
+def place_in_words(place: Floats) -> str:
+    """Say where a place (3,) is."""
+    return "(" + ", ".join(f"{c:.6g}" for c in place) + ")"
+
+
+def passed_by(mesh: TriMesh, samples: Samples, *, threads: int = 0) -> Floats | None:
+    """Return the sample (3,) around which a mesh passes most samples by; None where it follows all but a few."""
+    away, face = Tree.of_faces(mesh, threads=threads).nearest(samples.positions, threads=threads)
+    facing = mesh.face_vectors[face]
+    across = np.abs((facing * samples.normals).sum(axis=1)) / np.maximum(np.linalg.norm(facing, axis=1), 1e-300)
+    spacing = float(np.median(samples.spacing))
+    passed = samples.positions[(away > OFF * spacing) & (across < TURNED)]
+    if len(passed) < PASSED:
+        return None
+    beside = cKDTree(passed).query_ball_point(passed, BESIDE * spacing, return_length=True)
+    return np.asarray(passed[beside.argmax()]) if beside.max() >= PASSED else None

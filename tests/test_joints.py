@@ -1,0 +1,153 @@
+"""What lies near something else is parted from it: two objects, and two sheets of one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from scipy.spatial import Delaunay
+
+from conftest import law, seeds
+from test_clouds import assert_sound, on_box, on_sphere
+from tomomesh import reconstruct_points
+from tomomesh.kernels.pointcloud.stars import beside, fill_triangle, spread_out
+from tomomesh.pointcloud.bridges import bridges
+from tomomesh.pointcloud.samples import settle_points
+from tomomesh.pointcloud.stars import cells_between
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+
+def spacing_of(area: float, count: int) -> float:
+    return float(np.sqrt(area / count))
+
+
+def beside_another(cloud: Floats, apart: float) -> Floats:
+    """Points of an object, and of the same one beside it along x."""
+    return np.concatenate([cloud, cloud + np.array([np.ptp(cloud[:, 0]) + apart, 0, 0])])
+
+
+def on_coil(count: int, apart: float, radius: float = 0.15, turns: int = 3) -> Floats:
+    """Points on a tube about a helix of radius 1, whose turns are sampling distances apart, and on its round ends."""
+    s = spacing_of(turns * 2 * np.pi * 2 * np.pi * radius, count)
+    rise = (2 * radius + apart * s) / (2 * np.pi)
+    rng = np.random.default_rng(1)
+    t, around, kept = rng.random((3, 2 * count)) * 2 * np.pi
+    near = kept / (2 * np.pi) < (1 + radius * np.cos(around)) / (1 + radius)
+    t, around = turns * t[near][:count], around[near][:count]
+    out = np.column_stack([np.cos(t), np.sin(t), 0 * t])
+    along = np.column_stack([-np.sin(t), np.cos(t), np.full(len(t), rise)]) / np.hypot(1, rise)
+    up = np.cross(out, along)
+    axis = np.column_stack([np.cos(t), np.sin(t), rise * t])
+    tube = axis + radius * (np.cos(around)[:, None] * out + np.sin(around)[:, None] * up)
+    end = 2 * np.pi * turns
+    caps = []
+    for place, way in (((1, 0, 0), (0, -1, -rise)), ((1, 0, rise * end), (0, 1, rise))):
+        ball = on_sphere(int(4 * np.pi * radius**2 / s**2), radius)
+        caps.append(ball[ball @ np.array(way) > 0] + np.array(place))
+    return np.concatenate([tube, *caps])
+
+
+class TestObjects:
+    @pytest.mark.parametrize("apart", [3.0, 4.0])
+    def test_boxes_are_two(self, apart: float) -> None:
+        cloud = beside_another(on_box(5_000), apart * spacing_of(24, 5_000))
+        quality = assert_sound(reconstruct_points(cloud), components=2)
+        assert quality["volume_mm3"] == pytest.approx(16, rel=0.01)
+
+    @pytest.mark.parametrize("apart", [2.0, 3.0])
+    def test_spheres_are_two(self, apart: float) -> None:
+        cloud = beside_another(on_sphere(5_000), apart * spacing_of(400 * np.pi, 5_000))
+        assert_sound(reconstruct_points(cloud), components=2)
+
+    @pytest.mark.parametrize("apart", [0.5, 1.0])
+    def test_nearer_boxes_are_told_of_by_their_place(self, apart: float) -> None:
+        cloud = beside_another(on_box(5_000), apart * spacing_of(24, 5_000))
+        surface = reconstruct_points(cloud)
+        assert surface.report["quality"]["components"] == 2 or any(
+            "around (" in one for one in surface.report["warnings"]
+        )
+
+
+class TestSheetsOfOneObject:
+    @pytest.mark.parametrize("apart", [2.0, 3.0])
+    def test_the_turns_of_a_coil_stay_apart(self, apart: float) -> None:
+        quality = assert_sound(reconstruct_points(on_coil(6_000, apart)))
+        tube, ends = np.pi * 0.15**2 * 3 * 2 * np.pi, 4 / 3 * np.pi * 0.15**3
+        assert quality["volume_mm3"] == pytest.approx(tube + ends, rel=0.03)
+
+    def test_a_shell_of_two_walls_keeps_both(self) -> None:
+        cloud = np.concatenate([on_sphere(6_100, 10), on_sphere(3_900, 8)])
+        surface = reconstruct_points(cloud)
+        assert surface.report["quality"]["components"] == 2
+        assert surface.report["quality"]["volume_mm3"] == pytest.approx(4 / 3 * np.pi * (1000 - 512), rel=0.01)
+
+
+class TestBridges:
+    def test_none_leads_over_a_slot(self) -> None:
+        """Two boxes with coplanar tops: what lies flat at both ends may still not be a hole."""
+        apart = 3 * spacing_of(24, 5_000)
+        samples = settle_points(beside_another(on_box(5_000), apart))
+        x = bridges(samples, 0.05).places[:, 0]
+        assert not ((x > 1 + 0.3 * apart) & (x < 1 + 0.7 * apart)).any()
+
+    def test_one_leads_over_a_hole(self) -> None:
+        cloud = on_sphere(5_000)
+        samples = settle_points(cloud[np.hypot(cloud[:, 0], cloud[:, 1]) + 100 * (cloud[:, 2] < 0) > 1.0])
+        places = bridges(samples, 0.25).places
+        assert ((np.hypot(places[:, 0], places[:, 1]) < 0.5) & (places[:, 2] > 0)).any()
+
+
+class TestStars:
+    @given(seeds)
+    @law(60)
+    def test_are_the_triangles_of_delaunay(self, seed: int) -> None:
+        places = np.random.default_rng(seed).uniform(-1, 1, (24, 2))
+        places[0] = 0
+        corners, neighbors = Delaunay(places).vertex_neighbor_vertices
+        hull = np.unique(Delaunay(places).convex_hull)
+        if 0 in hull:
+            return
+        known = set(neighbors[corners[0] : corners[1]].tolist())
+        others = np.ascontiguousarray(places[1:])
+        first = one = int(np.argmin((others**2).sum(axis=1)))
+        found: list[int] = []
+        while one >= 0 and len(found) < len(others):
+            found.append(one + 1)
+            one = beside(others, len(others), one, 1.0)
+            if one == first:
+                break
+        assert len(found) == len(set(found))
+        assert set(found) == known
+
+    def test_lays_no_neighbor_of_the_sheet_across(self) -> None:
+        flat = [(x, y, z, 0, 0, 1, 1) for z in (0.0, 2.0) for x in range(-2, 3) for y in range(-2, 3)]
+        rows = np.array(flat, float)
+        found, places = np.arange(len(rows)), np.empty((len(rows), 2))
+        count = spread_out(rows, 12, found, len(rows), places)
+        assert sorted(found[:count]) == [n for n in range(25) if n != 12]
+        assert np.allclose(np.abs(places[:count]), np.abs(rows[found[:count], :2][:, ::-1]))
+
+    def test_places_on_a_triangle_leave_no_gap(self) -> None:
+        rows = np.zeros((3, 7))
+        rows[1, 0], rows[2, 1] = 3.0, 2.0
+        places = np.empty((500, 3))
+        count = fill_triangle(rows, 0, 1, 2, 0.2, places, 0)
+        inside = np.random.default_rng(0).dirichlet((1, 1, 1), 300) @ rows[:, :3]
+        away = np.linalg.norm(inside[:, None] - places[:count], axis=2).min(axis=1)
+        assert away.max() < 0.2
+        assert places[:count].min() >= 0
+        assert (places[:count, 0] / 3 + places[:count, 1] / 2).max() < 1 + 1e-12
+
+    def test_cubes_of_a_plane_are_all_of_them(self) -> None:
+        rng = np.random.default_rng(0)
+        flat = np.column_stack([rng.uniform(0, 40, (1_600, 2)), np.full(1_600, 0.5)])
+        cells = cells_between(settle_points(flat), np.zeros(3), np.full(3, 0.5))
+        inner = cells[((cells[:, :2] >= 6) & (cells[:, :2] < 74)).all(axis=1)]
+        assert set(cells[:, 2]) <= {0, 1}  # the plane is where they meet
+        assert len(np.unique(inner[:, :2], axis=0)) >= 0.999 * 68 * 68  # but for corners that are grazed
