@@ -13,7 +13,7 @@ from ..cuberille.neighbors import once_each
 from ..cuberille.parting import joint
 from ..cuberille.partition import cubes_over, is_flat
 from ..dynamics.low_pass import OneRing
-from ..dynamics.membrane import capped
+from ..dynamics.membrane import capped, carried_on
 from ..dynamics.moving_least_squares import SurfaceFit, fit_to_surface
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError
@@ -58,9 +58,9 @@ closing of two joins what lies nearer than four cubes, about what the shorter br
 MET = 0.8
 """Share of the samples that must lie at a surface for it to be theirs: .96 and more do on the scans
 that were measured. Chosen: half of it changes no case of few points, thin parts and holes; over 1 none is theirs."""
-MADE_UP = 0.2
+MADE_UP = 0.25
 """Share of a surface without samples from which it is refused, unless holes are to be filled: a third of a hemisphere's
-is, and a scan from four sides leaves a sixth. Half of it refuses nothing more of what was tried, twice takes a
+is, and a sixth of a cube's that lacks a side: halfway. Half of it refuses scans of a capsule and a cube, twice takes a
 hemisphere."""
 OPEN = 0.4
 """Width of a border over that of all samples, from which they are of an open surface: .48 and more at the ends of tubes
@@ -286,7 +286,7 @@ def _fitted(
     mesh, filled = TriMesh(fitted.vertices, fitted.faces), fitted.filled
     if shell.doubt:
         filled = filled | holes(mesh, samples, edge)
-        mesh = mesh.moved(capped(mesh, filled)) if settings.cubes.fill_holes else mesh
+        mesh = mesh.moved((capped if settings.cubes.fill_holes else carried_on)(mesh, filled))
     return Rest(mesh, any_of(filled[mesh.faces]), fitted)
 
 
