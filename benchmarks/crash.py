@@ -48,7 +48,8 @@ def forked(line: list[str], writes: Path | None = None) -> int:
     child = os.fork()
     if child:
         return child
-    from tomomesh.cli import main, outputs
+    from tomomesh.cli import main
+    from tomomesh.cli.outputs import write as outputs
 
     write = outputs.write_surface
 

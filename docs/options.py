@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tomomesh.cli.parameter_options import spellings
+from tomomesh.cli.options.parameters import spellings
 from tomomesh.settings import LAYERS, MANY, UNSET, asked_by, limits_of, parameters
 
 if TYPE_CHECKING:

@@ -1,8 +1,9 @@
-// What clients on Node.js make of files: `node clients.mjs gltf-validator|three FILE...` prints one JSON for each.
+// What clients on Node.js make of files: `node clients.mjs gltf-validator|three|@niivue/niivue FILE...` prints one JSON
+// for each.
 // Their packages are found as require finds them, in NODE_PATH too.
-import { readFileSync } from "node:fs";
+import { existsSync, readFileSync } from "node:fs";
 import { createRequire } from "node:module";
-import { extname } from "node:path";
+import { extname, join } from "node:path";
 import { pathToFileURL } from "node:url";
 
 const require = createRequire(import.meta.url);
@@ -40,8 +41,20 @@ async function loaded(data, suffix) {
   return { array: position.array.constructor.name, places, index, shown, metalness, roughness };
 }
 
+const READERS = { ".ply": "readPLY", ".stl": "readSTL", ".obj": "readOBJ", ".off": "readOFF", ".gii": "readGII" };
+
+async function viewed(data, suffix) {
+  const home = require.resolve.paths(client).map((folder) => join(folder, client)).find(existsSync);
+  const { exports } = JSON.parse(readFileSync(join(home, "package.json"))); // it has no entry for require
+  const { NVMeshLoaders } = await import(pathToFileURL(join(home, exports["."].import)));
+  const { positions, indices, colors } = await NVMeshLoaders[READERS[suffix]](new Uint8Array(data).buffer);
+  return { places: Array.from(positions), index: Array.from(indices), fractions: colors && Array.from(colors) };
+}
+
+const TOLD = { "gltf-validator": validated, three: loaded, "@niivue/niivue": viewed };
+
 const [client, ...files] = process.argv.slice(2);
 for (const file of files) {
   const data = readFileSync(file);
-  console.log(JSON.stringify(client === "three" ? await loaded(data, extname(file)) : await validated(data)));
+  console.log(JSON.stringify(await TOLD[client](data, extname(file))));
 }

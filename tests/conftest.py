@@ -22,6 +22,8 @@ from tomomesh.model.cubes import keys_of
 from tomomesh.model.mesh import QuadMesh
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
 Number = TypeVar("Number", int, float)
@@ -58,6 +60,21 @@ def size(compiled: Number, plain: Number) -> Number:
 def law(examples: int) -> settings:
     """Try a law on a number of examples."""
     return settings(max_examples=size(examples, max(examples // 5, 3)))
+
+
+@pytest.fixture
+def fewer_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measure a surface at fewer places where the kernels do not run as machine code."""
+    monkeypatch.setattr("tomomesh.measure.report.SAMPLES", size(20_000, 200))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
+    """An empty folder for outputs, in which nothing unfinished may be left."""
+    made = tmp_path / "out"
+    made.mkdir()
+    yield made
+    assert not [path.name for path in made.iterdir() if path.name.startswith(".")]
 
 
 seeds = st.integers(0, 2**32 - 1)

@@ -143,3 +143,37 @@ class TestVolume:
         report = reconstruct_points(ellipsoid(9), stacks="none").report
         assert report["points"]["interpolated"] == 0
         assert report["quality"]["volume_mm3"] < 0.97 * VOLUME
+
+
+def half_ellipsoid(planes: int, aside: tuple[float, float, float]) -> Floats:
+    """Cut the ellipsoid by half planes about the z axis: what one side of each plane shows."""
+    angles = 2 * np.pi * np.arange(planes) / planes
+    cuts = [(ellipse(angle, np.array(aside)), np.array([np.cos(angle), np.sin(angle), 0])) for angle in angles]
+    return np.concatenate([points[points @ ahead >= 0] for points, ahead in cuts])
+
+
+@pytest.mark.skipif(not COMPILED, reason="surfaces take minutes without the compiler")
+@pytest.mark.parametrize("aside", [(0.0, 0.0, 0.0), (5.0, -4.0, 8.0)])
+@pytest.mark.parametrize("planes", [7, 8, 9, 11, 13, 15, 20])
+def test_half_planes_need_no_other_half(planes: int, aside: tuple[float, float, float]) -> None:
+    points = half_ellipsoid(planes, aside)
+    found = half_planes(points)
+    assert found is not None
+    assert len(found.angles) == planes
+    volume, genus = volume_of(points)
+    assert volume == pytest.approx(VOLUME, rel=0.02)
+    assert genus == 0
+
+
+@pytest.mark.skipif(not COMPILED, reason="surfaces take minutes without the compiler")
+@pytest.mark.parametrize("planes", [11, 15, 24])
+def test_loops_about_an_axis_are_a_torus_and_a_part_of_one_is_not_closed(planes: int) -> None:
+    turn = np.linspace(0, 2 * np.pi, 2000, endpoint=False)
+    loop = np.stack([20 + 6 * np.cos(turn), np.zeros(2000), 6 * np.sin(turn)], axis=1)
+    ways = [Rotation.from_euler("z", angle).as_matrix().T for angle in 2 * np.pi * np.arange(planes) / planes]
+    drawn = [evenly(loop @ way, 0.8) for way in ways]
+    volume, genus = volume_of(np.concatenate(drawn))
+    assert volume == pytest.approx(2 * np.pi**2 * 20 * 36, rel=0.01)
+    assert genus == 1
+    for left_out in (planes // 3, planes // 2):
+        assert half_planes(np.concatenate(drawn[left_out:])) is None

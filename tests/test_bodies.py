@@ -190,6 +190,47 @@ class TestStructures:
         assert found.report["stack"]["bodies"] == pieces
         assert found.report["quality"]["volume_mm3"] == pytest.approx(true, rel=0.02)
 
+    @pytest.mark.parametrize("gap", [5, 7.5, 10, 12.5, 30, 200, 2000])
+    @pytest.mark.parametrize("aside", [0, 6, 14])
+    def test_balls_end_as_round_as_they_are(self, tmp_path: Path, gap: float, aside: float) -> None:
+        two = sphere(10, 2.5) + sphere(10, 2.5, (aside, 0, 17.5 + gap))
+        found = of_structures(tmp_path, {"two": two})
+        assert (found.report["quality"]["components"], found.report["warnings"]) == (2, [])
+        assert found.report["stack"]["slices"] == 16
+        assert found.report["quality"]["volume_mm3"] == pytest.approx(2 * ball_of(10), rel=0.02)
+
+    @pytest.mark.parametrize("gone", [1, 2])
+    def test_a_neck_without_slices_stays_a_neck(self, tmp_path: Path, gone: int) -> None:
+        heights = 2.5 * np.arange(-4, 10)
+        peanut = [polygon(np.sqrt(100 - min(z * z, (z - 15) ** 2)), z) for z in heights if abs(z - 7.5) < 17.5]
+        thin = [polygon(max(4.0, np.sqrt(max(100 - z * z, 0.0))), z) for z in 2.5 * np.arange(-3, 12)]
+        for whole, cut in ((peanut, 6), (thin, 7)):
+            del whole[cut : cut + gone]
+            found = of_structures(tmp_path, {"one": whole})
+            assert found.report["quality"]["components"] == 1
+
+    @pytest.mark.parametrize("up", [1, -1])
+    @pytest.mark.parametrize(("legs", "runs"), [(2, 1), (2, 2), (3, 1)])  # up to three slices without a leg
+    def test_legs_that_are_drawn_in_turns_join_their_trunk(self, tmp_path: Path, legs: int, runs: int, up: int) -> None:
+        apart, step, below = 15.0, 2.5, 12
+        places = apart * (np.arange(legs) - (legs - 1) / 2)
+        drawn = [polygon(6.0, step * k, center=(places[k // runs % legs], 0)) for k in range(below)]
+        trunk = apart * (legs - 1) / 2 + 6
+        drawn += [polygon(trunk, step * k) for k in range(below, below + 8)]
+        found = of_structures(tmp_path, {"trousers": [ring * [1, 1, up] for ring in drawn]})
+        assert (found.report["quality"]["components"], found.report["quality"]["genus"]) == (1, 0)
+        cylinders = np.pi * step * (8 * trunk**2 + below * legs * 36)
+        assert found.report["quality"]["volume_mm3"] == pytest.approx(cylinders, rel=0.08)
+
+    def test_two_that_become_one_become_two_in_turns(self, tmp_path: Path) -> None:
+        side = [(-1) ** k * 10.0 for k in range(8)]
+        drawn = [
+            polygon(7.0, 2.5 * k, center=(x, 0)) for k, x in zip([*range(8), *range(13, 21)], 2 * side, strict=True)
+        ]
+        drawn += [polygon(15.0, 2.5 * k) for k in range(8, 13)]
+        found = of_structures(tmp_path, {"one": drawn})
+        assert (found.report["quality"]["components"], found.report["quality"]["genus"]) == (1, 0)
+
     @pytest.mark.parametrize("off", [0.0005, 0.002, 0.01, 0.05])
     def test_heights_that_jitter(self, tmp_path: Path, off: float) -> None:
         rng = np.random.default_rng(3)
@@ -274,7 +315,7 @@ class TestPlanes:
         column, width = np.zeros(6, np.int64), np.full(6, 20.0)
         heights = np.array([6.01, 0.0, 3.0, 0.02, 6.0, 2.98])
         np.testing.assert_array_equal(planes_within(heights, column, width), [2, 0, 1, 0, 2, 1])
-        assert slices_at(heights) == 3
+        assert slices_at(heights, 20.0) == 3
 
     def test_a_wide_gap_joins_no_slices(self) -> None:
         heights = np.array([0, 2.5, 5, 47.5, 50, 52.5])

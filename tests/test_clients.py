@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -17,7 +18,7 @@ import trimesh
 from conftest import sphere
 from test_io_mesh_formats import colors_of, lopsided, volume_of
 from tomomesh.cli import main
-from tomomesh.io import write_mesh, write_points
+from tomomesh.io import keeps, write_mesh, write_points
 from tomomesh.io.colors import linear
 from tomomesh.model.points import PointSet
 
@@ -41,8 +42,9 @@ def asked_of_node(client: str, *files: Path) -> list[dict[str, Any]]:
     """Return what a client on Node.js says of some files."""
     if NODE is None:
         pytest.skip("Node.js is not installed")
-    known = [NODE, "--eval", f"require.resolve('{client}')"]
-    if subprocess.run(known, capture_output=True, check=False).returncode:
+    asked = [NODE, "--print", "require.resolve.paths('it').join('\\n')"]
+    folders = subprocess.run(asked, capture_output=True, check=True, text=True).stdout.splitlines()
+    if not any(Path(folder, client).is_dir() for folder in folders):
         pytest.skip(f"Node.js finds no package {client}: npm install {client}, and NODE_PATH where it went")
     command = [NODE, str(SCRIPT), client, *map(str, files)]
     told = subprocess.run(command, capture_output=True, check=True, text=True).stdout
@@ -65,6 +67,13 @@ def of_three(path: Path) -> Read:
     return places, faces, None if shown is None else np.stack([shown >> n & 255 for n in (16, 8, 0)], axis=1)
 
 
+def of_niivue(path: Path) -> Read:
+    (found,) = asked_of_node("@niivue/niivue", path)
+    places, faces = (np.array(found[name]).reshape(-1, 3) for name in ("places", "index"))
+    colors = found.get("fractions")
+    return places, faces, None if colors is None else np.rint(255 * np.array(colors).reshape(-1, 3)).astype(np.uint8)
+
+
 def of_meshio(path: Path) -> Read:
     meshio = pytest.importorskip("meshio", reason="the package meshio is not installed")
     found = meshio.read(path)
@@ -83,15 +92,24 @@ def of_vtk(path: Path) -> Read:
 
     readers = {
         ".stl": geometry.vtkSTLReader, ".ply": ply.vtkPLYReader, ".vtp": xml.vtkXMLPolyDataReader,
-        ".obj": obj.vtkOBJReader, ".off": geometry.vtkOFFReader,
+        ".obj": obj.vtkOBJReader, ".off": geometry.vtkOFFReader, ".glb": geometry.vtkGLTFReader,
     }  # fmt: skip
     reader = readers[path.suffix]()
     reader.SetFileName(str(path))
     reader.Update()
-    found = reader.GetOutput()
+    found = _placed_by_nodes(reader.GetOutput()) if path.suffix == ".glb" else reader.GetOutput()
     colors = found.GetPointData().GetArray("RGB")
     faces = vtk_to_numpy(found.GetPolys().GetConnectivityArray()).reshape(-1, 3)
     return vtk_to_numpy(found.GetPoints().GetData()), faces, None if colors is None else vtk_to_numpy(colors)
+
+
+def _placed_by_nodes(scene: Any) -> Any:
+    """Return the one mesh of VTK's blocks."""
+    filters = pytest.importorskip("vtkmodules.vtkFiltersGeometry", reason="the package vtk is not installed")
+    one = filters.vtkCompositeDataGeometryFilter()
+    one.SetInputData(scene)
+    one.Update()
+    return one.GetOutput()
 
 
 def of_lib3mf(path: Path) -> Read:
@@ -103,7 +121,22 @@ def of_lib3mf(path: Path) -> Read:
     assert items.MoveNext()
     body = model.GetMeshObjectByID(items.GetCurrent().GetObjectResource().GetResourceID())
     vertices = np.array([list(one.Coordinates) for one in body.GetVertices()])
-    return vertices, np.array([list(one.Indices) for one in body.GetTriangleIndices()]), None
+    faces = np.array([list(one.Indices) for one in body.GetTriangleIndices()])
+    assert body.IsManifoldAndOriented()
+    return vertices, faces, _colors_of_3mf(model, body, faces)
+
+
+def _colors_of_3mf(model: Any, body: Any, faces: NDArray[np.int64]) -> NDArray[np.uint8] | None:
+    """Return what lib3mf has for the corners, which is one color a vertex where we wrote it."""
+    if not body.GetObjectLevelProperty()[2]:
+        return None
+    found = np.zeros((faces.max() + 1, 3), np.uint8)
+    for corners, told in zip(faces, body.GetAllTriangleProperties(), strict=True):
+        group = model.GetColorGroupByID(told.ResourceID)
+        for corner, number in zip(corners, told.PropertyIDs, strict=True):
+            color = group.GetColor(number)
+            found[corner] = color.Red, color.Green, color.Blue
+    return found
 
 
 def of_nibabel(path: Path) -> Read:
@@ -113,17 +146,16 @@ def of_nibabel(path: Path) -> Read:
 
 
 CLIENTS: dict[str, tuple[Callable[[Path], Read], ...]] = {
-    ".stl": (of_trimesh, of_vtk, of_meshio, of_three),
-    ".ply": (of_trimesh, of_vtk, of_meshio, of_three),
-    ".obj": (of_trimesh, of_vtk, of_three),
-    ".off": (of_trimesh, of_vtk, of_meshio),
+    ".stl": (of_trimesh, of_vtk, of_meshio, of_three, of_niivue),
+    ".ply": (of_trimesh, of_vtk, of_meshio, of_three, of_niivue),
+    ".obj": (of_trimesh, of_vtk, of_three, of_niivue),
+    ".off": (of_trimesh, of_vtk, of_meshio, of_niivue),
     ".vtp": (of_vtk,),
     ".3mf": (of_trimesh, of_lib3mf),
-    ".glb": (of_trimesh, of_three),
-    ".gii": (of_nibabel,),
+    ".glb": (of_trimesh, of_vtk, of_three),
+    ".gii": (of_nibabel, of_niivue),
 }
-"""Suffix to what opens it. Of packages for Python, VTK alone opens .vtp, which 3D Slicer, ParaView and PyVista use,
-and nibabel alone .gii."""
+"""Suffix to what opens it. Of packages for Python, VTK alone opens .vtp, which 3D Slicer, ParaView and PyVista use."""
 PAIRS: Iterable[tuple[str, Callable[[Path], Read]]] = [
     (suffix, one) for suffix, all_ in CLIENTS.items() for one in all_
 ]
@@ -186,6 +218,12 @@ class TestGlb:
         assert set(found["shown"]) == {20 << 16 | 60 << 8 | 180}
         assert (found["metalness"], found["roughness"]) == (0, 1)
 
+    def test_trimesh_has_a_color_for_it(self, tmp_path: Path) -> None:
+        """Its `to_color`, which its viewer asks, knows no material but one that names its color."""
+        write_mesh(lopsided(), tmp_path / "m.glb")
+        (found,) = trimesh.load(tmp_path / "m.glb").geometry.values()
+        assert (np.asarray(found.visual.to_color().vertex_colors) == 255).all()
+
     def test_colors_are_light(self) -> None:
         """IEC 61966-2-1's own inverse brings each back."""
         levels = np.arange(256)
@@ -212,6 +250,15 @@ def _cloud_of_a_pole(tmp_path: Path) -> Path:
     return tmp_path / "pole.xyz"
 
 
+@pytest.fixture(name="cloud_of_colors")
+def _cloud_of_colors(tmp_path: Path) -> Path:
+    """Return a ball whose points have colors and a field."""
+    places = sphere(600)
+    fields = {name: np.full(len(places), 90, np.uint8) for name in ("red", "green", "blue")} | {"conf": places[:, 0]}
+    write_points(replace(PointSet.from_positions(places), attributes=fields), tmp_path / "colors.ply")
+    return tmp_path / "colors.ply"
+
+
 class TestPly:
     def test_three_draws_what_is_written_with_32_bits(self, tmp_path: Path) -> None:
         """Its geometries take the numbers as they stand, and WebGL has none of 64 bits."""
@@ -236,6 +283,18 @@ class TestPly:
         assert meshio.read(tmp_path / "p.ply").points.dtype == np.float32
         np.testing.assert_array_equal(of_vtk_points(tmp_path / "p.vtp"), points.positions.astype(np.float32))
 
+    @pytest.mark.parametrize("kind", ["i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8", "?"])
+    def test_meshio_and_vtk_read_a_field_of_any_kind(self, tmp_path: Path, kind: str) -> None:
+        """Such as the 16-bit intensity of a LAS file; meshio's names of types are fewer, and its bytes have a sign."""
+        meshio = pytest.importorskip("meshio", reason="the package meshio is not installed")
+        mesh = lopsided()
+        field = (np.arange(len(mesh.vertices)) % 120).astype(kind)
+        write_mesh(mesh, tmp_path / "m.ply", vertex_fields={"f": field})
+        write_points(replace(PointSet.from_positions(mesh.vertices), attributes={"f": field}), tmp_path / "p.ply")
+        for name in ("m", "p"):
+            np.testing.assert_array_equal(meshio.read(tmp_path / f"{name}.ply").point_data["f"], field)
+        np.testing.assert_allclose(of_vtk(tmp_path / "m.ply")[0], mesh.vertices, rtol=1e-5)
+
     def test_meshio_opens_a_surface_without_filled_faces(self, tmp_path: Path, cloud_of_a_pole: Path) -> None:
         """It knows no property of faces."""
         assert main(["surface", str(cloud_of_a_pole), "-o", str(tmp_path / "m.ply"), "--quiet"]) == 0
@@ -257,13 +316,34 @@ def of_vtk_points(path: Path) -> NDArray[Any]:
 class TestGifti:
     def test_positions_alone_have_a_coordinate_system(self, tmp_path: Path) -> None:
         mesh = lopsided()
-        write_mesh(mesh, tmp_path / "m.surf.gii", vertex_fields={**colors_of(mesh), "depth": mesh.vertices[:, 2]})
-        arrays = ElementTree.parse(tmp_path / "m.surf.gii").getroot().findall("DataArray")
+        write_mesh(mesh, tmp_path / "m.gii", vertex_fields={**colors_of(mesh), "depth": mesh.vertices[:, 2]})
+        arrays = ElementTree.parse(tmp_path / "m.gii").getroot().findall("DataArray")
         systems = {one.get("Intent"): len(one.findall("CoordinateSystemTransformMatrix")) for one in arrays}
         assert systems == {
             "NIFTI_INTENT_POINTSET": 1, "NIFTI_INTENT_TRIANGLE": 0, "NIFTI_INTENT_RGB_VECTOR": 0,
             "NIFTI_INTENT_NONE": 0,
         }  # fmt: skip
+
+    def test_a_surface_for_workbench_holds_positions_and_triangles_alone(self, tmp_path: Path) -> None:
+        """Workbench opens no .surf.gii with another array."""
+        mesh, path = lopsided(), tmp_path / "M.Surf.GII"
+        write_mesh(mesh, path, vertex_fields={**colors_of(mesh), "depth": mesh.vertices[:, 2]})
+        assert not keeps(path, "depth")
+        arrays = ElementTree.parse(path).getroot().findall("DataArray")
+        assert [one.get("Intent") for one in arrays] == ["NIFTI_INTENT_POINTSET", "NIFTI_INTENT_TRIANGLE"]
+        write_mesh(mesh, tmp_path / "bare.gii")
+        assert path.read_bytes() == (tmp_path / "bare.gii").read_bytes()
+
+    def test_workbench_opens_it(self, tmp_path: Path, cloud_of_colors: Path) -> None:
+        tool = shutil.which("wb_command")
+        if tool is None:
+            pytest.skip("wb_command is not installed (Debian's connectome-workbench)")
+        assert main(["surface", str(cloud_of_colors), "-o", str(tmp_path / "m.surf.gii"), "--quiet"]) == 0
+        command = [tool, "-file-information", str(tmp_path / "m.surf.gii")]
+        told = subprocess.run(command, capture_output=True, check=True, text=True).stdout
+        said = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in told.splitlines())}
+        assert (said["Type"], said["Normal Vectors Correct"]) == ("Surface", "true")
+        assert int(said["Number of Vertices"]) == len(of_nibabel(tmp_path / "m.surf.gii")[0])
 
     def test_gifti_tool_calls_it_valid(self, tmp_path: Path) -> None:
         tool = shutil.which("gifti_tool")

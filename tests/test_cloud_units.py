@@ -19,7 +19,7 @@ from tomomesh.cli import main
 from tomomesh.errors import GeometryError
 from tomomesh.io import read_points
 from tomomesh.settings import Settings
-from tomomesh.ways.points import take_points
+from tomomesh.ways.clouds.points import take_points
 from writers import needed
 
 if TYPE_CHECKING:

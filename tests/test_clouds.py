@@ -83,7 +83,7 @@ class TestCleanClouds:
     def test_a_large_straight_cloud_gets_larger_cubes(self, monkeypatch: pytest.MonkeyPatch) -> None:
         cells = []
         for many in (32_000, 10_000):
-            monkeypatch.setattr("tomomesh.ways.samples.MANY", many)
+            monkeypatch.setattr("tomomesh.ways.clouds.samples.MANY", many)
             surface = reconstruct_points(on_torus(32_000))
             assert_sound(surface, genus=1)
             cells.append(surface.report["cubes"]["cell_mm"][0] / surface.report["points"]["spacing_mm"])

@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 
 from tomomesh import io
-from tomomesh.cli import formats
-from tomomesh.cli.formats import either
-from tomomesh.cli.options import build_parser
+from tomomesh.cli.options import build_parser, formats
+from tomomesh.cli.options.formats import either
 from tomomesh.cli.shell import _actions
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from test_end_to_end import ball
-from tomomesh import segment
+from tomomesh import reconstruct, segment
 from tomomesh.model.volume import Volume
 
 
@@ -48,3 +48,18 @@ class TestGrayLevels:
         for one in (levels, np.where(ball() > 50, 7, 0)):
             told = segment(Volume.from_stored(one.astype(np.uint8), np.eye(4)), network="none").report["warnings"]
             assert not any("--select" in warning for warning in told)
+
+
+class TestMasks:
+    """A mask among gray levels is told; labels are masks, and nothing is to be said of that."""
+
+    def test_labels_are_not_told_to_be_a_mask(self) -> None:
+        mask = np.where(ball() > 50, 7, 0).astype(np.uint8)
+        alone = reconstruct(Volume.from_stored(mask, np.eye(4)), select=(7,), network="none").report
+        beside = reconstruct(
+            Volume.from_stored(ball(), np.eye(4)), labels=Volume.from_stored(mask, np.eye(4)), select=(7,)
+        ).report
+        gray = reconstruct(Volume.from_stored(mask, np.eye(4)), lower=3, network="none").report
+        assert [alone["warnings"], beside["warnings"]] == [[], []]
+        assert any("those of a mask" in warning for warning in gray["warnings"])
+        assert not alone["voxels"]["interpolated"]

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from studies import write_nifti
-from tomomesh import reconstruct
+from tomomesh import compare_with_study, reconstruct
 from tomomesh.cli import main
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.model.volume import Volume
@@ -92,6 +93,27 @@ class TestSolid:
         filled, _ = filled_slices(sparse, volume_of(sparse, np.diag([1.0, 1.0, 1.0, 1.0])))
         assert (filled.voxels > 0).sum() == pytest.approx(body.sum(), rel=0.01)
 
+    @pytest.mark.parametrize("step", [2, 3, 5])
+    @pytest.mark.parametrize("spacing", [(1, 1, 1), (0.7, 0.7, 2.0), (0.5, 0.8, 1.0)])
+    @pytest.mark.parametrize("name", [*BODIES, "pole", "one pixel", "two pixels", "fin"])
+    def test_what_was_drawn_stays(self, name: str, spacing: tuple[float, float, float], step: int) -> None:
+        k, j, i = np.indices((SIZE,) * 3) - 31
+        thin = {
+            "pole": k**2 + j**2 + i**2 <= 15**2,
+            "one pixel": (j == 3) & (i == -4) & (np.abs(k) <= 15),
+            "two pixels": (j == 3) & (np.abs(i - 0.5) < 1) & (np.abs(k) <= 15),
+            "fin": (j == 0) & (np.abs(i) <= 9) & (np.abs(k) <= 15),
+        }
+        body = thin[name] if name in thin else BODIES[name][0]
+        sparse = thinned(body, step, 1)
+        filled, _ = filled_slices(sparse, volume_of(sparse, np.diag([*spacing, 1.0])))
+        drawn = sparse.any(axis=(1, 2))
+        np.testing.assert_array_equal(filled.voxels[drawn] > 0, sparse[drawn])
+        first, last = np.flatnonzero(drawn)[[0, -1]]
+        assert (filled.voxels[first : last + 1] > 0).any(axis=(1, 2)).all()
+        if name in thin:
+            assert ndimage.label(filled.voxels > 0)[1] == 1
+
     @pytest.mark.parametrize(("name", "genus"), [("ball", 0), ("fork", 0), ("standing torus", 1)])
     def test_the_mesh_is_one_smooth_solid(self, name: str, genus: int) -> None:
         body = BODIES[name][0]
@@ -119,6 +141,45 @@ class TestSolid:
         assert (filled.voxels > 0).sum() == pytest.approx(body.sum(), rel=0.01)
 
 
+def ball_at(x: float, z: float = 0.0, radius: float = 11.0) -> NDArray[np.bool_]:
+    inside: NDArray[np.bool_] = (X - x) ** 2 + J**2 + (K - z) ** 2 <= radius**2
+    return inside
+
+
+class TestSeveralBodies:
+    """Each is filled between its own slices, wherever those of the others lie."""
+
+    @pytest.mark.parametrize("axis", [0, 1])
+    @pytest.mark.parametrize(
+        ("steps", "first"), [((4, 4), (0, 2)), ((4, 8), (0, 2)), ((3, 5), (1, 0)), ((8, 1), (0, 0)), ((4, 4), (1, 1))]
+    )
+    def test_side_by_side(self, steps: tuple[int, int], first: tuple[int, int], axis: int) -> None:
+        one, other = ball_at(-14), ball_at(15)
+        sparse = thinned(one, steps[0], first[0], axis) | thinned(other, steps[1], first[1], axis)
+        filled, told = filled_slices(sparse, volume_of(sparse, np.diag([1.0, 1.0, 1.0, 1.0])))
+        inside = filled.voxels > 0
+        assert ndimage.label(inside)[1] == 2
+        for body, half in ((one, slice(None, 32)), (other, slice(32, None))):
+            assert inside[:, :, half].sum() == pytest.approx(body.sum(), rel=0.04)
+        assert ("slices", "rows")[axis] in told
+
+    @pytest.mark.parametrize("apart", [26, 32, 40])
+    def test_over_each_other(self, apart: int) -> None:
+        both = ball_at(0, -apart / 2, 9.0) | ball_at(0, apart / 2, 9.0)
+        sparse = thinned(both, 3)
+        inside = filled_slices(sparse, volume_of(sparse, np.diag([1.0, 1.0, 1.0, 1.0])))[0].voxels > 0
+        assert ndimage.label(inside)[1] == 2
+        assert inside.sum() == pytest.approx(both.sum(), rel=0.04)
+
+    def test_legs_in_turns_join_their_trunk(self) -> None:
+        left, right = rod((0, 0, 0), (-16, 0, 24), 7), rod((0, 0, 0), (16, 0, 24), 7)
+        trunk = rod((0, 0, -24), (0, 0, 0), 9)
+        sparse = thinned(left, 8, 3) | thinned(right, 8, 7) | thinned(trunk, 4, 3)
+        inside = filled_slices(sparse, volume_of(sparse, np.diag([1.0, 1.0, 1.0, 1.0])))[0].voxels > 0
+        assert ndimage.label(inside)[1] == 1
+        assert inside.sum() == pytest.approx((left | right | trunk).sum(), rel=0.05)
+
+
 class TestRecognised:
     def test_whole_bodies_and_two_that_taper_are_no_gaps(self) -> None:
         for body, _ in BODIES.values():
@@ -143,6 +204,16 @@ class TestRecognised:
             reconstruct(volume_of(thinned(body, 40, 31)), select=(1,), fill_slices=True)
         with pytest.raises(UsageError, match="--select"):
             reconstruct(volume_of(body), fill_slices=True, lower=0.5)
+
+    def test_a_comparison_tells_of_them_too(self) -> None:
+        body = BODIES["ball"][0]
+        mesh = reconstruct(volume_of(body), select=(1,)).mesh
+        sparse = volume_of(thinned(body, 8))
+        missed = compare_with_study(mesh, sparse, select=(1,))
+        filled = compare_with_study(mesh, sparse, select=(1,), fill_slices=True)
+        assert any("--fill-slices interpolates them" in note for note in missed["notes"])
+        assert any("they were interpolated" in note for note in filled["notes"])
+        assert missed["dice"] < 0.3 < 0.95 < filled["dice"]
 
     def test_the_command_line_has_it(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
         write_nifti(tmp_path / "l.nii", thinned(BODIES["ball"][0], 4).astype(np.uint8), SPACING)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -87,11 +88,32 @@ CLOUDS: dict[str, Callable[[Path], object]] = {
     "a.off": mesh,
     "a.stl": mesh,
 }
+
+
+def mixed_ply(path: Path) -> None:
+    """Triangles and squares, in which rows differ in length, behind an element with a list."""
+    head = "ply\nformat binary_little_endian 1.0\nelement camera 1\nproperty list uchar short views\nelement vertex 6\n"
+    head += "property float x\nproperty double y\nproperty float z\nelement face 40\n"
+    head += "property list uchar int vertex_indices\nproperty uchar flag\nend_header\n"
+    vertices = b"".join(struct.pack("<fdf", *place) for place in MESH.vertices[:6].tolist())
+    faces = b"".join(struct.pack(f"<B{n}iB", n, *range(n), 7) for n in (3, 4) * 20)
+    path.write_bytes(head.encode() + struct.pack("<B2h", 2, 1, 2) + vertices + faces)
+
+
+def strip_ply(path: Path) -> None:
+    places = "\n".join(f"{x} {y} {z}" for x, y, z in MESH.vertices[:6])
+    head = "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+    head += "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+    path.write_text(f"{head}{places}\n11 0 1 2 3 4 -1 5 3 1 0 2\n")
+
+
 MESHES: dict[str, Callable[[Path], object]] = {
     "a.stl": mesh,
     "text.stl": lambda path: path.write_text(_bytes(BALL.export(file_type="stl_ascii")).decode()),
     "a.ply": mesh,
     "text.ply": of_trimesh(encoding="ascii"),
+    "mixed.ply": mixed_ply,
+    "strip.ply": strip_ply,
     "a.obj": mesh,
     "a.off": mesh,
 }

@@ -26,7 +26,7 @@ WALLS = {
     "model/contours.py", "segmentation/contours/walls.py", "segmentation/space.py",  # of tissue
     "followed.py", "segmentation/outlines.py", "ways/choice.py",
     "measure/thickness.py", "settings/printing.py",  # of a solid
-    "judgement.py", "ways/cloud.py", "ways/cubes.py", "ways/sections.py",  # the report's *two walls*
+    "judgement.py", "ways/clouds/shell.py", "ways/cubes.py", "ways/sections.py",  # the report's *two walls*
 }  # fmt: skip
 """Modules that may name walls. Nothing else has any: not a cell, a ray, a sheet or a contour's triangles."""
 SEVERAL = {"Components", "Net", "Part", "Rest", "Segmentation", "Shell", "Shown", "Slices", "Stack"}

@@ -148,8 +148,8 @@ class TestWrite:
         for name, values in expected.items():
             np.testing.assert_array_equal(back.attributes[name], values)
             if suffix == ".ply":
-                stored = {"return": np.int32, "valid": np.uint8}
-                assert back.attributes[name].dtype == stored.get(name, values.dtype)
+                stored = {"b1": np.uint8, "u1": np.uint8, "f4": np.float32, "f8": np.float64}
+                assert back.attributes[name].dtype == stored.get(values.dtype.str[1:], np.int32)
 
     def test_trimesh_sees_the_colors(self, tmp_path: Path) -> None:
         write_points(replace(POINTS, attributes=ATTRIBUTES), tmp_path / "c.ply")

@@ -124,6 +124,7 @@ class TestPaths:
         (tmp_path / "b.nii").write_text("x")
         (tmp_path / ".c").write_text("x")
         with pytest.raises(
-            FormatError, match=r"0 of 3 files are images.*1 \.nii files, 1 hidden, 1 of an unknown kind"
+            FormatError,
+            match=r"0 of 3 files are images.*1 \.nii files, 1 hidden, 1 of an unknown kind.*the file of the volume",
         ):
             read_volume(tmp_path)

@@ -126,6 +126,22 @@ class TestPlaces:
         assert_in_place(volume)
         assert "along their normal" in volume.notes[0]
 
+    @pytest.mark.parametrize("shared", [False, True])
+    def test_groups_that_say_other_things_leave_places_to_the_header(self, tmp_path: Path, shared: bool) -> None:
+        data = frames(AXIAL, STEP * np.arange(5), CAPTURE, SpacingBetweenSlices=STEP)
+        scale = Dataset()
+        scale.RescaleSlope, scale.RescaleIntercept = 1, 0
+        group = Dataset()
+        group.PixelValueTransformationSequence = Sequence([scale])
+        data.PerFrameFunctionalGroupsSequence = Sequence([Dataset() if shared else group for _ in range(5)])
+        data.SharedFunctionalGroupsSequence = Sequence([group] if shared else [])
+        volume = read_volume(save(data, tmp_path / "f.dcm"))
+        assert_in_place(volume)
+        assert any("placed by SpacingBetweenSlices" in note for note in volume.notes)
+        del data.SpacingBetweenSlices
+        with pytest.raises(GeometryError, match="where its first frame lies, but no other"):
+            read_volume(save(data, tmp_path / "f.dcm"))
+
     def test_slice_locations_place_frames_where_they_begin_with_the_first(self, tmp_path: Path) -> None:
         for first in (0.0, AXIAL[2, 3]):
             data = frames(AXIAL, -STEP * np.arange(5), CAPTURE)

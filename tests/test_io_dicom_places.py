@@ -28,6 +28,7 @@ from tomomesh.errors import GeometryError
 from tomomesh.io import read_volume
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 AXIAL = AFFINES["axial"]
@@ -98,6 +99,81 @@ class TestMillimeters:
         volume = read_volume(write_series(tmp_path / "s", sampled(turned), turned, longer))
         assert not any("tilt" in note for note in volume.notes)
         np.testing.assert_allclose(volume.spacing_mm, (0.5, 0.5, 1.25), rtol=1e-4)
+
+    @pytest.mark.parametrize("turn", [(0.2, -0.3, 0.4), (0.0, 0.0, 0.1), (1.4, 0.3, 0.0)])
+    @pytest.mark.parametrize("digits", [2, 3])
+    def test_directions_with_few_decimals_are_made_straight(
+        self, tmp_path: Path, turn: tuple[float, float, float], digits: int
+    ) -> None:
+        turned = affine_of(rotation(*turn), (0.5, 0.7, 1.25), (-8.0, -8.0, 0.0))
+
+        def rounded(data: Dataset, k: int) -> None:
+            data.ImageOrientationPatient = [round(float(value), digits) for value in data.ImageOrientationPatient]
+
+        volume = read_volume(write_series(tmp_path / "s", sampled(turned), turned, rounded))
+        across = volume.grid.affine[:3, :2] / [0.5, 0.7]
+        np.testing.assert_allclose(across.T @ across, np.eye(2), atol=1e-5)
+        np.testing.assert_allclose(across, rotation(*turn)[:, :2], atol=0.011 * 10.0 ** (2 - digits))
+        assert any("made straight" in note for note in volume.notes) <= (digits == 2)
+
+    @pytest.mark.parametrize("off", [-0.03, -0.01, 0.01, 0.03])
+    @pytest.mark.parametrize("angle", [False, True])
+    def test_two_hundredths_are_taken_and_told(self, tmp_path: Path, off: float, angle: bool) -> None:
+        turned = AFFINES["oblique"]
+
+        def edit(data: Dataset, k: int) -> None:
+            rows, columns = np.array(data.ImageOrientationPatient, float).reshape(2, 3)
+            both = (rows + off * columns, columns) if angle else ((1 + off) * rows, columns)
+            data.ImageOrientationPatient = [float(f"{value:.10f}") for value in np.concatenate(both)]
+
+        path = write_series(tmp_path / "s", sampled(turned), turned, edit)
+        if abs(off) > 0.02:
+            with pytest.raises(GeometryError, match="directions of the slices are invalid"):
+                read_volume(path)
+        else:
+            volume = read_volume(path)
+            assert any("0.01 off unit vectors at right angles" in note for note in volume.notes)
+            np.testing.assert_allclose(volume.spacing_mm, sorted((0.5, 0.7, 2.0)), rtol=1e-3)
+
+    @pytest.mark.parametrize(("digits", "notes"), [(3, 1), (5, 0)])
+    def test_spacings_that_were_rounded_in_some_slices(self, tmp_path: Path, digits: int, notes: int) -> None:
+        exact = 0.48828125
+        affine = affine_of(np.eye(3), (exact, exact, 2.0), (-3.0, 11.0, 40.0))
+
+        def rounded(which: int) -> Callable[[Dataset, int], None]:
+            def edit(data: Dataset, k: int) -> None:
+                data.PixelSpacing = [round(exact, digits) if k % 2 == which else exact] * 2
+
+            return edit
+
+        one, other = (
+            read_volume(write_series(tmp_path / f"s{which}", sampled(affine), affine, rounded(which)))
+            for which in (0, 1)
+        )
+        np.testing.assert_allclose(one.spacing_mm, (exact, exact, 2), atol=4e-4)
+        assert len([note for note in one.notes if "PixelSpacing differs by up to 0.00028 mm" in note]) == notes
+        np.testing.assert_allclose(other.spacing_mm, one.spacing_mm, atol=4e-4)
+
+    def test_spacings_that_differ_by_more_are_refused(self, tmp_path: Path) -> None:
+        def other(data: Dataset, k: int) -> None:
+            data.PixelSpacing = [0.5, 0.501] if k == 3 else [0.5, 0.5]
+
+        with pytest.raises(GeometryError, match="differ in PixelSpacing"):
+            read_volume(write_series(tmp_path / "s", STORED, AXIAL, other))
+
+    def test_the_first_file_decides_nothing(self, tmp_path: Path) -> None:
+        rng = np.random.default_rng(3)
+        noise = rng.uniform(-1e-4, 1e-4, (5, 6))
+
+        def jittered(data: Dataset, k: int) -> None:
+            data.ImageOrientationPatient = [
+                float(a) + e for a, e in zip(data.ImageOrientationPatient, noise[k], strict=True)
+            ]
+
+        one = read_volume(write_series(tmp_path / "s", STORED, AXIAL, jittered))
+        for path, name in zip(sorted((tmp_path / "s").iterdir()), "cbeda", strict=True):
+            path.rename(path.with_name(name))
+        np.testing.assert_array_equal(read_volume(tmp_path / "s").affine, one.affine)
 
     @pytest.mark.parametrize("order", [[0, 1, 2, 3, 4], [3, 0, 4, 1, 2]])
     def test_frames_of_an_enhanced_file_are_sorted_too(self, tmp_path: Path, order: list[int]) -> None:

@@ -16,6 +16,7 @@ from tomomesh.errors import UsageError
 from tomomesh.io import read_volume
 from tomomesh.segmentation.window import choose_window
 from tomomesh.settings import Settings, WindowSettings
+from writers import needed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,6 +47,30 @@ class TestUnit:
     def test_a_ct_is_in_hounsfield_units_where_it_says_so_or_nothing(self, tmp_path: Path, said: str | None) -> None:
         edit = ct() if said is None else ct(RescaleType=said)
         assert read_volume(write_series(tmp_path / "s", AIR, AXIAL, edit)).unit == "HU"
+
+    @pytest.mark.parametrize(("said", "known"), [("US", True), ("MGML", False)])
+    def test_a_ct_by_gdcm_may_say_so_for_want_of_another_word(self, tmp_path: Path, said: str, known: bool) -> None:
+        def edit(data: Dataset, k: int) -> None:
+            ct(RescaleType=said)(data, k)
+            data.file_meta.ImplementationVersionName = "GDCM 3.2.5"
+
+        volume = read_volume(write_series(tmp_path / "s", AIR, AXIAL, edit))
+        assert volume.unit != "HU"
+        assert any("GDCM" in note for note in volume.notes) == known
+
+    def test_a_ct_by_simpleitk_is_one_of_them(self, tmp_path: Path) -> None:
+        sitk = needed("SimpleITK")
+        (tmp_path / "s").mkdir()
+        writer = sitk.ImageFileWriter()
+        writer.KeepOriginalImageUIDOn()
+        for k, plane in enumerate(AIR):
+            image = sitk.GetImageFromArray(plane[None])
+            told = {"0008|0060": "CT", "0028|1052": "0", "0028|1053": "1", "0020|0032": f"0\\0\\{2 * k}"}
+            for key, value in {**told, "0020|000e": "1.2.3.4", "0020|0013": str(k)}.items():
+                image.SetMetaData(key, value)
+            writer.SetFileName(str(tmp_path / "s" / f"{k}.dcm"))
+            writer.Execute(image)
+        assert any("GDCM" in note for note in read_volume(tmp_path / "s").notes)
 
     @pytest.mark.parametrize("said", ["US", "MGML", "OD", "Z_EFF", "HU_MOD", "ED", "EDW", "PCT", "OTHER"])
     def test_a_ct_of_another_scale_is_not(self, tmp_path: Path, said: str, capsys: pytest.CaptureFixture[str]) -> None:

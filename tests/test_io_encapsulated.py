@@ -6,6 +6,7 @@ import io
 import json
 import shutil
 import subprocess
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -126,6 +127,29 @@ class TestWritten:
         assert found["dice"] > 0.99
         assert found["against"]["notes"] == []
 
+    @pytest.mark.parametrize(("code", "size"), [("um", 1e-3), ("[in_i]", 25.4), ("cm", 10.0), ("furlong", 1.0)])
+    def test_the_unit_is_the_one_that_it_states(self, study: Path, tmp_path: Path, code: str, size: float) -> None:
+        assert made(study, tmp_path / "m.dcm") == 0
+        data = pydicom.dcmread(tmp_path / "m.dcm")
+        data.MeasurementUnitsCodeSequence[0].CodeValue = code
+        data.save_as(tmp_path / "other.dcm")
+        assert main(["print", str(tmp_path / "other.dcm"), "-o", str(tmp_path / "part.stl"), "--quiet"]) == 0
+        one, other = read_mesh(tmp_path / "m.dcm"), read_mesh(tmp_path / "part.stl")
+        np.testing.assert_allclose(np.ptp(other.vertices, axis=0), size * np.ptp(one.vertices, axis=0), rtol=1e-5)
+
+    def test_dcmtk_makes_one_that_we_read(self, study: Path, tmp_path: Path) -> None:
+        """It states micrometers where it is not told."""
+        tool = shutil.which("stl2dcm")
+        if tool is None:
+            pytest.skip("dcmtk is not installed")
+        assert made(study, tmp_path / "m.stl") == 0
+        for name, told in (("um", []), ("mm", ["--measurement-units", "UCUM", "mm", "mm"])):
+            path = tmp_path / f"{name}.dcm"
+            source = ["--study-from", str(next(study.iterdir()))]
+            subprocess.run([tool, *source, *told, str(tmp_path / "m.stl"), str(path)], capture_output=True, check=True)
+            assert frame_of_file(path) == {"unit": name, "frame": "LPS"}
+            np.testing.assert_array_equal(read_mesh(path).vertices, read_mesh(tmp_path / "m.stl").vertices)
+
     def test_a_lone_file_of_a_study_is_no_mesh_to_compare_with(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
@@ -157,6 +181,16 @@ class TestRefused:
         assert made(write_series(tmp_path / "s", ball(), AFFINE, as_ct), tmp_path / "m.dcm") == UsageError.exit_code
         assert "UID = missing" in capsys.readouterr().err
 
+    def test_a_study_in_several_frames_of_reference(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        def moved(data: Dataset, k: int) -> None:
+            in_archive(data, k)
+            data.FrameOfReferenceUID = f"1.2.826.{7 + k // 8}"
+
+        study = write_series(tmp_path / "moved", ball(), AFFINE, moved)
+        assert made(study, tmp_path / "m.dcm") == UsageError.exit_code
+        assert "FrameOfReferenceUID = several" in capsys.readouterr().err
+        assert made(study, tmp_path / "m.stl") == 0
+
     def test_what_does_not_go_with_it(self, study: Path, tmp_path: Path) -> None:
         assert made(study, tmp_path / "m.stl", "--patient") == UsageError.exit_code
         assert made(study, tmp_path / "m.dcm", "--scale", "0.5") == UsageError.exit_code
@@ -183,6 +217,24 @@ class TestRefused:
         assert made(study, tmp_path / "m.dcm", "--patient", "--report", str(report)) == 0
         said = "".join(capsys.readouterr()) + report.read_text() + repr(read_volume(study))
         assert not any(value in said for value in PERSONAL.values() if len(value) > 3)
+
+    @pytest.mark.filterwarnings("ignore:Invalid value for VR")  # of the study that is made here
+    def test_nor_where_the_patients_fields_break_the_rules(
+        self, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        """An old birth date with points in it: copied as it is, and never in a warning or a log."""
+
+        def old(data: Dataset, k: int) -> None:
+            in_archive(data, k)
+            data.PatientBirthDate = "1970.01.02"
+
+        study = write_series(tmp_path / "old", ball(), AFFINE, old)
+        caplog.clear()
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert made(study, tmp_path / "m.dcm", "--patient") == 0
+        assert pydicom.dcmread(tmp_path / "m.dcm").PatientBirthDate == "1970.01.02"
+        assert "1970" not in caplog.text
 
     def test_a_mesh_of_python_needs_its_study_too(self, tmp_path: Path) -> None:
         corner = TriMesh(np.eye(4, 3, -1), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))

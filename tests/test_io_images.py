@@ -13,6 +13,7 @@ from tomomesh.errors import FormatError, GeometryError, ResourceError
 from tomomesh.io import read_volume
 from tomomesh.io.files import limits
 from tomomesh.settings import ReadSettings
+from writers import needed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -45,6 +46,25 @@ class TestStack:
         voxels = read_volume(write_stack(tmp_path / "s", stored, suffix), settings=SPACING).voxels
         np.testing.assert_array_equal(voxels, stored)
         assert voxels.dtype.isnative
+
+    @pytest.mark.parametrize("kind", ["i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8"])
+    @pytest.mark.parametrize("order", ["<", ">"])
+    def test_tiff_slices_hold_the_numbers_of_a_tiff_stack(self, tmp_path: Path, kind: str, order: str) -> None:
+        tifffile = needed("tifffile")
+        stored = (STORED % 100).astype(kind)
+        stored[0, 0, 0] = -0.5 if kind[0] == "f" else np.iinfo(kind).max if kind[0] == "u" else np.iinfo(kind).min // 2
+        (tmp_path / "s").mkdir()
+        for k, pixels in enumerate(stored):
+            tifffile.imwrite(tmp_path / "s" / f"{k}.tif", pixels, photometric="minisblack", byteorder=order)
+        tifffile.imwrite(tmp_path / "s.tif", stored, photometric="minisblack", byteorder=order)
+        for path in (tmp_path / "s", tmp_path / "s.tif"):
+            np.testing.assert_array_equal(read_volume(path, settings=SPACING).voxels, stored)
+
+    def test_a_tiff_that_pillow_does_not_know_may_have_one_page_alone(self, tmp_path: Path) -> None:
+        needed("tifffile").imwrite(tmp_path / "0.tif", STORED.astype(np.float64), photometric="minisblack")
+        (tmp_path / "1.tif").write_bytes((tmp_path / "0.tif").read_bytes())
+        with pytest.raises(FormatError, match="several pages"):
+            read_volume(tmp_path, settings=SPACING)
 
     def test_color_has_three_channels(self, tmp_path: Path) -> None:
         colors = np.stack([STORED % 251, STORED % 7, STORED % 13, STORED * 0 + 255], axis=-1).astype(np.uint8)

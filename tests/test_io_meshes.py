@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as hnp
 from studies import shared
 from tomomesh.errors import EmptyError, FormatError, OutputError, UsageError
 from tomomesh.io import read_mesh, read_points, write_mesh
-from tomomesh.io.meshes.weld import weld
+from tomomesh.io.meshes.cells import weld
 from tomomesh.model.mesh import TriMesh
 
 if TYPE_CHECKING:

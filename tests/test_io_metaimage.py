@@ -56,6 +56,19 @@ class TestMetaImage:
         for name in ("big.mha", "text.mha", "end.mhd", "start.mhd"):
             assert_in_place(read_volume(tmp_path / name))
 
+    @pytest.mark.parametrize(("unit", "mm"), [("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("?", 1.0)])
+    def test_a_unit_is_brought_to_millimeters(self, tmp_path: Path, unit: str, mm: float) -> None:
+        text = self.header(f"DistanceUnits = {unit}\n")
+        (tmp_path / "s.mha").write_bytes(text + sampled(AFFINES["axial"]).tobytes())
+        volume = read_volume(tmp_path / "s.mha")
+        np.testing.assert_allclose(volume.affine[:3], AFFINES["axial"][:3] * mm)
+        assert (f"coordinates were brought to millimeters: x {mm:g}" in volume.notes) == (mm != 1)
+
+    def test_another_unit_is_refused(self, tmp_path: Path) -> None:
+        (tmp_path / "s.mha").write_bytes(self.header("DistanceUnits = s\n") + sampled(AFFINES["axial"]).tobytes())
+        with pytest.raises(GeometryError, match="DistanceUnits = s"):
+            read_volume(tmp_path / "s.mha")
+
     def test_lists_and_patterns_of_data_files(self, tmp_path: Path) -> None:
         stored = sampled(AFFINES["axial"])
         for k, pixels in enumerate(stored):

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import nibabel
 import numpy as np
+import pytest
 
-from studies import AFFINES, LPS_TO_RAS, TURNED, sampled
+from studies import AFFINES, LPS_TO_RAS, TURNED, assert_in_place, sampled
 from tomomesh.io import read_volume
 from tomomesh.settings import ReadSettings
 from writers import with_nibabel
@@ -25,6 +26,11 @@ class TestMgh:
         image, volume = nibabel.load(path), read_volume(path)
         np.testing.assert_allclose(volume.grid.affine, LPS_TO_RAS @ image.affine, atol=1e-4)
         np.testing.assert_array_equal(volume.grid.restore(volume.voxels).T, np.asarray(image.dataobj))
+
+    @pytest.mark.parametrize(("suffix", "named"), [(".mgh", ".mgz"), (".mgz", ".mgh")])
+    def test_whether_it_is_packed_is_seen_in_its_bytes(self, tmp_path: Path, suffix: str, named: str) -> None:
+        path = with_nibabel(suffix)(tmp_path, sampled(AFFINES["oblique"]), AFFINES["oblique"])
+        assert_in_place(read_volume(path.rename(tmp_path / f"t{named}")))
 
     def test_a_file_without_a_frame_has_freesurfers_and_says_so(self, tmp_path: Path) -> None:
         path = with_nibabel(".mgh")(tmp_path, sampled(AFFINES["axial"]), AFFINES["axial"])

@@ -111,6 +111,17 @@ class TestMillimeters:
         assert voxels.shape == (*SHAPE, 3)
         np.testing.assert_array_equal(voxels[0, 0], [[10, 20, b] for b in range(9)])
 
+    @pytest.mark.parametrize(("suffix", "named"), [(".nii", ".nii.gz"), (".nii.gz", ".nii")])
+    def test_whether_it_is_packed_is_seen_in_its_bytes(self, tmp_path: Path, suffix: str, named: str) -> None:
+        write_nifti(tmp_path / f"s{suffix}", sampled(AFFINES["oblique"]), AFFINES["oblique"])
+        assert_in_place(read_volume((tmp_path / f"s{suffix}").rename(tmp_path / f"t{named}")))
+
+    def test_vectors_are_told_from_frames(self, tmp_path: Path) -> None:
+        stored = np.zeros((4, 5, 6, 1, 3), np.float32)
+        nibabel.save(nibabel.Nifti1Image(stored, np.eye(4)), tmp_path / "s.nii")
+        with pytest.raises(FormatError, match="several values a voxel"):
+            read_volume(tmp_path / "s.nii")
+
     def test_one_frame_in_four_dimensions_is_squeezed(self, tmp_path: Path) -> None:
         stored = sampled(AFFINES["axial"]).T[..., None]
         nibabel.save(nibabel.Nifti1Image(stored, LPS_TO_RAS @ AFFINES["axial"]), tmp_path / "4.nii")

@@ -54,6 +54,37 @@ class TestNrrd:
         assert_in_place(volume)
         np.testing.assert_allclose(volume.grid.affine, SHEARED, atol=1e-9)
 
+    @pytest.mark.parametrize(
+        "units", [["um", "um", "um"], ["mm", "um", "cm"], ["microns", "", "???"], ["in", "m", "nm"]]
+    )
+    @pytest.mark.parametrize("more", [0, 1])
+    def test_spacings_have_a_unit_of_each_axis(self, tmp_path: Path, units: list[str], more: int) -> None:
+        size = [
+            {"um": 1e-3, "microns": 1e-3, "cm": 10, "in": 25.4, "m": 1e3, "nm": 1e-6}.get(unit, 1) for unit in units
+        ]
+        spacings = [mm / one for mm, one in zip((0.5, 0.7, 2.0), size, strict=True)]
+        header = {"spacings": spacings + [1.0] * more, "units": units + ["s"] * more}
+        kinds = {"kinds": ["space"] * 3 + ["time"]} if more else {}
+        stored = sampled(np.diag([0.5, 0.7, 2.0, 1.0])).T
+        needed("nrrd").write(str(tmp_path / "s.nrrd"), stored[..., None] if more else stored, {**header, **kinds})
+        volume = read_volume(tmp_path / "s.nrrd")
+        np.testing.assert_allclose(volume.spacing_mm, (0.5, 0.7, 2.0))
+        assert_in_place(volume)
+
+    def test_a_unit_that_is_none_of_length_is_refused(self, tmp_path: Path) -> None:
+        header = {"spacings": [1.0, 1.0, 1.0], "units": ["mm", "mm", "sec"]}
+        needed("nrrd").write(str(tmp_path / "s.nrrd"), sampled(np.eye(4)).T, header)
+        with pytest.raises(GeometryError, match="units = mm mm sec"):
+            read_volume(tmp_path / "s.nrrd")
+
+    def test_no_directions_at_all_are_a_missing_spacing(self, tmp_path: Path) -> None:
+        path = self.write(tmp_path / "s.nrrd", AFFINES["axial"], **{"space directions": None})
+        text = path.read_bytes().replace(b"space: ", b"space directions: none none none\nspace: ", 1)
+        path.write_bytes(text)
+        with pytest.raises(GeometryError, match="--spacing x y z"):
+            read_volume(path)
+        assert read_volume(path, settings=SPACING).spacing_mm == SPACING.spacing
+
     @pytest.mark.parametrize("encoding", ["raw", "gzip", "bzip2", "ascii"])
     @pytest.mark.parametrize("endian", ["little", "big"])
     @pytest.mark.parametrize("suffix", [".nrrd", ".nhdr"])

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from pydicom.dataelem import DataElement
+from pydicom.dataelem import DataElement, RawDataElement
+from pydicom.tag import Tag
 
 from faults import changed, fault_of
 from structure_sets import circle, keyhole, sphere, structure_set, torus, written
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 BALL, TORUS = 4 / 3 * np.pi * 20**3, 2 * np.pi**2 * 20 * 8**2
 EVEN = sphere(20, 2.5)
+CONTOUR_DATA = Tag(0x3006, 0x0050)
 
 
 def surface_of(folder: Path, contours: Any, kind: str = "CLOSED_PLANAR") -> Surface:
@@ -38,6 +40,57 @@ def surface_of(folder: Path, contours: Any, kind: str = "CLOSED_PLANAR") -> Surf
     assert surface.report["quality"]["sound"]
     assert surface.report["quality"]["self_intersections"] == 0
     return surface
+
+
+class TestSpelling:
+    """Decimal strings as programs write them."""
+
+    @pytest.mark.parametrize("spelled", [" {:.3f}", "{:.3f} ", "{:+.3f}", "{:.6E}", "{:.3f}\n"])
+    @pytest.mark.parametrize("end", ["", "\\", "\0"])
+    def test_corners_are_their_numbers(self, tmp_path: Path, spelled: str, end: str) -> None:
+        data = structure_set({"one": EVEN})
+        for contour in data.ROIContourSequence[0].ContourSequence:
+            text = "\\".join(spelled.format(value) for value in contour.ContourData) + end
+            packed = text.encode() + b" " * (len(text) % 2)
+            contour._dict[CONTOUR_DATA] = RawDataElement(CONTOUR_DATA, "DS", len(packed), packed, 0, False, True)
+        found = read_points(save(data, tmp_path / "spelled.dcm"))
+        plain = read_points(written({"one": EVEN}, tmp_path / "plain.dcm"))
+        np.testing.assert_allclose(found.positions, plain.positions, rtol=0, atol=1e-3)
+
+    @pytest.mark.filterwarnings("ignore:Invalid value for VR CS")
+    def test_kinds_in_small_letters_are_kinds(self, tmp_path: Path) -> None:
+        found = read_points(written({"one": EVEN}, tmp_path / "small.dcm", "closed_planar"))
+        plain = read_points(written({"one": EVEN}, tmp_path / "plain.dcm"))
+        np.testing.assert_array_equal(found.positions, plain.positions)
+
+    def test_what_there_is_in_place_of_closed_contours_is_named(self, tmp_path: Path) -> None:
+        with pytest.raises(EmptyError, match=f"{len(EVEN)} OPEN_NONPLANAR"):
+            read_points(written({"one": EVEN}, tmp_path / "open.dcm", "OPEN_NONPLANAR"))
+
+
+class TestThickness:
+    """One contour alone as a slab, thin or thick beside its width."""
+
+    @pytest.mark.parametrize("thickness", [0.5, 3.0, 30.0, 60.0])
+    @pytest.mark.parametrize("name", ["circle", "square", "ring"])
+    def test_volume(self, tmp_path: Path, name: str, thickness: float) -> None:
+        corners = np.array([[-10.0, -10, 3], [10, -10, 3], [10, 10, 3], [-10, 10, 3]])
+        drawn, area = {
+            "circle": ([circle(12.0, 3.0)], np.pi * 144),
+            "square": ([corners], 400.0),
+            "ring": ([circle(12.0, 3.0), circle(6.0, 3.0)], np.pi * 108),
+        }[name]
+        settings = CloudSettings(thickness=thickness)
+        points = read_points(written({"one": drawn}, tmp_path / "plan.dcm"), settings=settings)
+        report = reconstruct_points(points, thickness=thickness).report
+        assert report["quality"]["volume_mm3"] == pytest.approx(area * thickness, rel=0.04)
+
+    @pytest.mark.parametrize("count", [6, 8, 72])
+    def test_few_points_are_enough(self, count: int) -> None:
+        turn = 2 * np.pi * np.arange(count) / count
+        ring = np.column_stack([10 * np.cos(turn), 10 * np.sin(turn), np.zeros(count)])
+        report = reconstruct_points(ring, thickness=40.0).report
+        assert report["quality"]["volume_mm3"] == pytest.approx(np.pi * 4000, rel=0.02)
 
 
 class TestTruth:

@@ -139,10 +139,25 @@ class TestBits:
         assert volume.voxels.dtype == np.uint8
 
     @pytest.mark.parametrize("photometric", ["minisblack", "miniswhite"])
-    def test_a_folder_of_bits_has_the_same_inside(self, tmp_path: Path, photometric: str) -> None:
+    def test_a_folder_of_bits_is_the_same_mask(self, tmp_path: Path, photometric: str) -> None:
         for k, pixels in enumerate(self.MASK):
             needed("tifffile").imwrite(tmp_path / f"s{k}.tif", pixels, photometric=photometric)
-        np.testing.assert_array_equal(read_volume(tmp_path, settings=SPACING).voxels, self.MASK * 255)
+        volume = read_volume(tmp_path, settings=SPACING)
+        np.testing.assert_array_equal(volume.voxels, self.MASK)
+        assert volume.voxels.dtype == np.uint8
+        assert "pixels of one bit: a mask of 0 and 1" in volume.notes
+
+    @pytest.mark.parametrize("compression", [None, "group4", "packbits"])
+    def test_a_folder_by_pillow_too(self, tmp_path: Path, compression: str | None) -> None:
+        for k, pixels in enumerate(self.MASK):
+            Image.fromarray(pixels).save(tmp_path / f"s{k}.tif", compression=compression)
+        np.testing.assert_array_equal(read_volume(tmp_path, settings=SPACING).voxels, self.MASK)
+
+    def test_a_folder_of_bits_and_bytes_is_refused(self, tmp_path: Path) -> None:
+        for k, pixels in enumerate(self.MASK):
+            Image.fromarray(pixels if k else pixels.astype(np.uint8)).save(tmp_path / f"s{k}.tif")
+        with pytest.raises(FormatError, match=r"another kind.*pixels = bool.*uint8"):
+            read_volume(tmp_path, settings=SPACING)
 
     @pytest.mark.parametrize("compression", [None, "group4"])
     def test_pages_of_pillow_too(self, tmp_path: Path, compression: str | None) -> None:
@@ -166,6 +181,53 @@ def test_planar_colors_are_colors(tmp_path: Path, told: Any) -> None:
     needed("tifffile").imwrite(tmp_path / "s.tif", colors, photometric="rgb", planarconfig="separate", **told)
     volume = read_volume(tmp_path / "s.tif", settings=SPACING)
     np.testing.assert_array_equal(volume.voxels, np.moveaxis(colors, 1, -1))
+
+
+class TestPages:
+    """As tifffile's users write them: one by one, with previews, and with axes of one."""
+
+    def pages(self, folder: Path, stored: Any, **told: Any) -> Path:
+        with needed("tifffile").TiffWriter(folder / "s.tif", **told) as file:
+            for pixels in stored:
+                file.write(pixels, photometric="minisblack")
+        return folder / "s.tif"
+
+    def test_that_were_written_one_by_one(self, tmp_path: Path) -> None:
+        assert_in_place(read_volume(self.pages(tmp_path, TestTiff.STORED), settings=SPACING))
+
+    def test_of_several_sizes_or_kinds_or_stacks_are_refused(self, tmp_path: Path) -> None:
+        one = TestTiff.STORED
+        for stored in ([*one, one[0][:-1]], [*one, one[0].astype(np.int32)], [one, one]):
+            with pytest.raises(FormatError, match="several images"):
+                read_volume(self.pages(tmp_path, stored), settings=SPACING)
+
+    def test_of_several_scenes_are_refused(self, tmp_path: Path) -> None:
+        with pytest.raises(FormatError, match="several images"):
+            read_volume(self.pages(tmp_path, TestTiff.STORED, ome=True), settings=SPACING)
+
+    def test_beside_a_preview(self, tmp_path: Path) -> None:
+        with needed("tifffile").TiffWriter(tmp_path / "s.tif") as file:
+            file.write(TestTiff.STORED, photometric="minisblack")
+            file.write(np.zeros((3, 3), np.uint8), photometric="minisblack", subfiletype=1)
+        assert_in_place(read_volume(tmp_path / "s.tif", settings=SPACING))
+
+    @pytest.mark.parametrize("shape", [(1, 1, -1), (-1, 1), (1, -1)])
+    def test_with_axes_of_one(self, tmp_path: Path, shape: tuple[int, ...]) -> None:
+        stored = TestTiff.STORED.reshape(*shape, *TestTiff.STORED.shape[1:])
+        needed("tifffile").imwrite(tmp_path / "s.tif", stored, photometric="minisblack")
+        assert_in_place(read_volume(tmp_path / "s.tif", settings=SPACING))
+
+    def test_in_two_axes_are_refused(self, tmp_path: Path) -> None:
+        needed("tifffile").imwrite(tmp_path / "s.tif", np.stack([TestTiff.STORED] * 2), photometric="minisblack")
+        with pytest.raises(FormatError, match="several frames"):
+            read_volume(tmp_path / "s.tif", settings=SPACING)
+
+    def test_of_channels_are_told(self, tmp_path: Path) -> None:
+        needed("tifffile").imwrite(
+            tmp_path / "s.tif", np.stack([TestTiff.STORED] * 2, 1), imagej=True, metadata={"axes": "ZCYX"}
+        )
+        with pytest.raises(FormatError, match="several channels"):
+            read_volume(tmp_path / "s.tif", settings=SPACING)
 
 
 class TestUnits:
@@ -222,9 +284,12 @@ class TestUnits:
     ("unit", "expected"),
     [
         *[(unit, 1e-3) for unit in ("µm", "μm", "um", "micron", "Microns", "micrometre", r"\u00b5m", r"\u00B5m\0")],
-        *[(unit, 1.0) for unit in ("mm", "Millimeters", "millimetre", " mm ")],
-        *[(unit, 25.4) for unit in ("in", "inch", "Inches", '"')],
-        *[(unit, None) for unit in ("Mm", "ms", "pixel", "", "sec", r"\u00B5", "reference frame")],
+        *[(unit, 1e-3) for unit in ("UM", "Um", "µM", "MICRON", r"\u00B5", "Âµm", "[µm]")],
+        *[(unit, 1.0) for unit in ("mm", "Millimeters", "millimetre", " mm ", "MM", "mm.", "(mm)", "mm^")],
+        *[(unit, 25.4) for unit in ("in", "inch", "Inches", '"', "IN", "in.")],
+        *[(unit, 1e-7) for unit in ("A", "Å", "Angstroms")],
+        *[(unit, 10.0) for unit in ("cm", "CM", "Cm")],
+        *[(unit, None) for unit in ("Mm", "Pm", "ms", "pixel", "", "sec", "a", "mm^3", "reference frame")],
     ],
 )
 def test_units_as_writers_spell_them(unit: str, expected: float | None) -> None:

@@ -14,8 +14,8 @@ import pytest
 from test_io_nrrd import BALL, CORE, SHELL, layered, segment
 from tomomesh import io
 from tomomesh.cli import main
-from tomomesh.cli.faults import COMMANDS, USUAL
 from tomomesh.cli.options import build_parser
+from tomomesh.cli.options.likely import COMMANDS, USUAL
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -9,7 +9,7 @@ import pytest
 
 from tomomesh.cli import main
 from tomomesh.cli.options import build_parser
-from tomomesh.cli.parameter_options import joined
+from tomomesh.cli.options.parameters import joined
 
 ROI = ["-1", "2.5", "-3", "4", "5e1", "66"]
 

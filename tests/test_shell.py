@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tomomesh.cli import main
-from tomomesh.cli.options import SHELLS, build_parser
+from tomomesh.cli.options import build_parser
+from tomomesh.cli.options.commands import SHELLS
 from tomomesh.cli.shell import _actions, completion, manual
 
 if TYPE_CHECKING:

@@ -297,6 +297,6 @@ class TestCommand:
         def broken(*_: Any, **__: Any) -> bytes:
             raise MemoryError
 
-        monkeypatch.setattr("tomomesh.cli.pictures.film", broken)
+        monkeypatch.setattr("tomomesh.cli.outputs.pictures.film", broken)
         assert main(["network", "square", "--neurons", "9", "--film", "--quiet", "-o", str(tmp_path / "n")]) != 0
         assert {path.suffix for path in (tmp_path / "n").iterdir()} == {".png"}

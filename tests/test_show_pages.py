@@ -14,7 +14,7 @@ from PIL import Image
 
 from tomomesh import Volume, reconstruct
 from tomomesh.cli import main
-from tomomesh.cli.pictures import pictures
+from tomomesh.cli.outputs.pictures import pictures
 from tomomesh.model.lattice import lattice
 from tomomesh.model.points import PointSet
 from tomomesh.settings import Settings

@@ -43,6 +43,10 @@ TOLD = {
     "dashes between": [f"slice-{n + 1}.png" for n in range(20)],
     "hexadecimal": [f"s{n:02x}.png" for n in range(40)],
     "hexadecimal without zeros": [f"s{n:X}.png" for n in range(40)],
+    "fractions in some names": [f"z{n / 2:.2f}.png".replace(".00", "") for n in range(24)],
+    "fractions and a step of one": ["s1.png", "s1.5.png", "s2.png", "s2.5.png", "s3.png", "s10.png", "s10.5.png"],
+    "letters behind": [f"s{n}{letter}.png" for n in range(9, 12) for letter in "ab"],
+    "a stray": [*(f"s{n}.png" for n in range(9, 12)), "s11_2.png"],
     "two runs": [f"{run}_{n + 1}.png" for run in (1, 2) for n in range(12)],
 }
 TOLD["p for a point"] = [name.replace("ppng", ".png") for name in TOLD["p for a point"]]
@@ -69,6 +73,7 @@ def test_slices_are_in_the_order_of_their_numbers(names: list[str]) -> None:
         ([f"z{n / 4:g}.png" for n in (1, 2, 5)], "missing among the names: 0.75, 1:"),
         (["s1.png", "s2.png", "s9000000000000.png"], "missing among the names: 3, 4, 5, 6, 7, 8, ...:"),
         ([f"z{n}.png" for n in (0, 1, 2.3, 3)], "0.7 to 1.3 apart"),
+        ([f"s{n}.png" for n in (1, 1.5, 2, 3, 4, 5)], "0.5 to 1 apart"),
         (["s1.png", "s01.png", "s2.png"], "the same number"),
         (["s1e+999.png", "s1e+99999.png", "s0e+00.png"], "exponents"),
     ],

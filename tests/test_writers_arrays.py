@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from studies import AFFINES, assert_in_place, gray_at, indices_of, sampled
 from tomomesh.errors import FormatError
@@ -123,6 +124,28 @@ class TestTifffile:
         np.testing.assert_allclose(volume.affine, self.AFFINE, rtol=1e-5)
         np.testing.assert_array_equal(volume.voxels, stored)
 
+    def test_masks_in_a_folder(self, tmp_path: Path) -> None:
+        mask = sampled(self.AFFINE) > 0
+        for writer in ("tifffile", "Pillow", "SimpleITK"):
+            (tmp_path / writer).mkdir()
+            for k, pixels in enumerate(mask):
+                path = tmp_path / writer / f"{k}.tif"
+                if writer == "tifffile":
+                    needed("tifffile").imwrite(path, pixels)
+                elif writer == "Pillow":
+                    Image.fromarray(pixels).save(path, compression="group4")
+                else:
+                    sitk = needed("SimpleITK")
+                    sitk.WriteImage(sitk.GetImageFromArray(pixels.astype(np.uint8)), str(path))
+            np.testing.assert_array_equal(read_volume(tmp_path / writer, settings=MM).voxels, mask)
+
+    def test_pages_that_are_written_one_by_one(self, tmp_path: Path) -> None:
+        stored = sampled(self.AFFINE)
+        with needed("tifffile").TiffWriter(tmp_path / "s.tif") as file:
+            for pixels in stored:
+                file.write(pixels)
+        np.testing.assert_array_equal(read_volume(tmp_path / "s.tif", settings=MM).voxels, stored)
+
     def test_a_mask(self, tmp_path: Path) -> None:
         mask = sampled(self.AFFINE) > 0
         needed("tifffile").imwrite(tmp_path / "s.tif", mask)
@@ -137,6 +160,14 @@ class TestPynrrd:
                   "space origin": affine[:3, 3], "encoding": encoding}  # fmt: skip
         needed("nrrd").write(str(tmp_path / "s.nrrd"), sampled(affine).T, header)
         in_place_at(read_volume(tmp_path / "s.nrrd"), affine)
+
+    def test_spacings_with_units(self, tmp_path: Path) -> None:
+        header = {"spacings": [500.0, 700.0, 0.2], "units": ["um", "um", "cm"]}
+        stored = sampled(np.diag([0.5, 0.7, 2.0, 1.0]))
+        needed("nrrd").write(str(tmp_path / "s.nrrd"), stored.T, header)
+        volume = read_volume(tmp_path / "s.nrrd")
+        np.testing.assert_allclose(volume.affine, np.diag([0.5, 0.7, 2.0, 1.0]))
+        np.testing.assert_array_equal(volume.voxels, stored)
 
     def test_layers_of_segments(self, tmp_path: Path) -> None:
         affine = AFFINES["axial"]

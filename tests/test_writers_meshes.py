@@ -97,6 +97,21 @@ class TestColumns:
         (tmp_path / "c.csv").write_text(text)
         assert read_points(tmp_path / "c.csv").positions.tolist() == [[1, 2, 3], [4, 5, 6]]
 
+    @pytest.mark.parametrize("text", [
+        '"x","y","z"\n"1","2","3"\n"4","5","6"\n', "// made by somebody\n1 2 3\n4 5 6 // the last\n",
+        "% made by somebody\n% x y z\n1 2 3\n4 5 6\n", "%z y x\n3 2 1\n6 5 4\n", "//\n\n1 2 3\n4 5 6",
+        '"z";"y";"x"\n"3,0";"2,0";"1,0"\n"6,0";"5,0";"4,0"\n',
+    ])  # fmt: skip
+    @pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "utf-16"])
+    def test_with_comments_and_quotes(self, tmp_path: Path, text: str, code: str) -> None:
+        (tmp_path / "c.csv").write_text(text, encoding=code)
+        assert read_points(tmp_path / "c.csv").positions.tolist() == [[1, 2, 3], [4, 5, 6]]
+
+    @pytest.mark.parametrize("suffix", ["xyzn", "xyzrgb"])
+    def test_of_open3d(self, tmp_path: Path, suffix: str) -> None:
+        (tmp_path / f"c.{suffix}").write_text("1 2 3 0 0 1\n4 5 6 0 1 0\n")
+        assert read_points(tmp_path / f"c.{suffix}").positions.tolist() == [[1, 2, 3], [4, 5, 6]]
+
     def test_three_of_other_names_are_told(self, tmp_path: Path) -> None:
         (tmp_path / "c.csv").write_text("left,back,high\n1,2,3\n")
         cloud = read_points(tmp_path / "c.csv")
@@ -170,7 +185,9 @@ class TestObj:
         (tmp_path / "m.obj").write_text("\n".join(rows))
         assert volume_of(tmp_path / "m.obj") == pytest.approx(TORUS.volume)
 
-    @pytest.mark.parametrize("line", ["f 1 2 0", "f 1 2", "f 1 2 99", "f -1 -2 -99", "f a b c", "v 1 2"])
+    @pytest.mark.parametrize(
+        "line", ["f 1 2 0", "f 1 2", f"f 1 2 {9**30}", "f 1 2 99", "f -1 -2 -99", "f a b c", "v 1 2"]
+    )
     def test_what_cannot_be_is_refused(self, tmp_path: Path, line: str) -> None:
         (tmp_path / "m.obj").write_text("\n".join(["v 0 0 0", "v 1 0 0", "v 0 1 0", "v 0 0 1", "f 1 2 3", line]))
         with pytest.raises(FormatError):
@@ -190,16 +207,21 @@ class TestStl:
         lambda text: text.replace("\n", "\r\n"), lambda text: text.replace("endfacet", "end facet"),
         lambda text: text.replace("solid part\n", "solid a facet of vertex 1 2 3\n", 1),
         lambda text: "  " + text, lambda text: text.replace("endsolid part", "endsolid"),
+        lambda text: text.replace("\n", "\r"), lambda text: text.replace("\n", " "), lambda text: "\ufeff" + text,
+        lambda text: text.replace("\n", "\t").replace(" ", "\t"), lambda text: text.replace("\n", "\n\n"),
+        lambda text: text.replace("part\n", "\n"), lambda text: text.replace("\n", " ").replace("part", ""),
+        lambda text: text.replace("part\n", "part of a solid\r"),
     ])  # fmt: skip
     def test_text(self, tmp_path: Path, change: Any) -> None:
         (tmp_path / "m.stl").write_bytes(change(self.text()).encode())
         assert volume_of(tmp_path / "m.stl") == pytest.approx(24)
 
-    def test_text_of_several_solids(self, tmp_path: Path) -> None:
+    @pytest.mark.parametrize("end", ["\n", "\r\n", "\r", " "])
+    def test_text_of_several_solids(self, tmp_path: Path, end: str) -> None:
         moved = self.text("b", "endsolid b").split("\n")
         moved = [f"  vertex {float(line.split()[1]) + 10} {' '.join(line.split()[2:])}" if "vertex" in line else line
                  for line in moved]  # fmt: skip
-        (tmp_path / "m.stl").write_text(self.text() + "\n".join(moved))
+        (tmp_path / "m.stl").write_bytes((self.text() + "\n".join(moved)).replace("\n", end).encode())
         assert volume_of(tmp_path / "m.stl") == pytest.approx(48)
 
     @pytest.mark.parametrize("head", [b"anything", b"solid of some program", b"solid facet outer loop vertex"])

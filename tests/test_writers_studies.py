@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from segmentations import by_highdicom, palette, sources
-from studies import AFFINES, LPS_TO_RAS, assert_in_place, sampled, save, write_series
+from studies import AFFINES, LPS_TO_RAS, assert_in_place, sampled, save, set_pixels, write_series
 from tomomesh.io import read_volume
 from tomomesh.model.volume import Volume
 from writers import as_image, needed
@@ -99,6 +99,51 @@ def by_dcm2niix(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
     return folder / "s.nii.gz"
 
 
+def nrrd_by_dcm2niix(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
+    series = write_series(folder / "series", stored, affine)
+    command = [tool("dcm2niix"), "-e", "y", "-z", "y", "-f", "s", "-o", str(folder), str(series)]
+    subprocess.run(command, check=True, capture_output=True)
+    return folder / "s.nhdr"
+
+
+def by_vtk(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
+    """An sform from a matrix of directions and origin, and a qform of the image, which stands upright, beside it."""
+    vtk = needed("vtk")
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+
+    image, matrix = vtk.vtkImageData(), vtk.vtkMatrix4x4()
+    spacing = np.linalg.norm(affine[:3, :3], axis=0)
+    image.SetDimensions(*stored.shape[::-1])
+    image.SetSpacing(*spacing)
+    image.GetPointData().SetScalars(numpy_to_vtk(stored.ravel(), deep=True))
+    placed = LPS_TO_RAS @ affine
+    placed[:3, :3] /= spacing
+    for row, column in np.ndindex(4, 4):
+        matrix.SetElement(row, column, placed[row, column])
+    writer = vtk.vtkNIFTIImageWriter()
+    writer.SetFileName(str(folder / "s.nii"))
+    writer.SetInputData(image)
+    writer.SetSFormMatrix(matrix)
+    writer.Write()
+    return folder / "s.nii"
+
+
+def converted_by_highdicom(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
+    """Slices of a CT in one file, with the functional groups that their headers give."""
+    hd = needed("highdicom")
+    from pydicom.uid import generate_uid
+
+    slices = sources(SHAPE, affine)
+    for k, data in enumerate(slices):
+        set_pixels(data, stored[k])
+        data.RescaleSlope, data.RescaleIntercept, data.RescaleType = 1, 0, "HU"
+        data.ImageType, data.KVP, data.Manufacturer = ["ORIGINAL", "PRIMARY", "AXIAL"], 120, "maker"
+        data.PatientPosition, data.AcquisitionDate, data.AcquisitionTime = "HFS", "20260101", "120000"
+        data.ContentDate, data.ContentTime = data.AcquisitionDate, data.AcquisitionTime
+    made = hd.legacy.LegacyConvertedEnhancedCTImage(slices, generate_uid(), 1, generate_uid(), 1)
+    return save(made, folder / "ct.dcm")
+
+
 def map_by_highdicom(folder: Path, stored: NDArray[Any], affine: Floats) -> Path:
     """Real numbers in a parametric map: floating-point pixels behind functional groups."""
     hd = needed("highdicom")
@@ -125,6 +170,9 @@ STUDIES: dict[str, Writer] = {
     "SimpleITK, `.mha`": by_simpleitk(".mha"),
     "SimpleITK, DICOM slices": slices_by_simpleitk,
     "dcm2niix": by_dcm2niix,
+    "dcm2niix, NRRD": nrrd_by_dcm2niix,
+    "VTK, NIfTI": by_vtk,
+    "highdicom, converted enhanced CT": converted_by_highdicom,
     "highdicom, parametric map": map_by_highdicom,
 }
 

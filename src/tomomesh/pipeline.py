@@ -15,7 +15,7 @@ from .settings import Settings
 from .stage import Stage, folded
 from .ways import choose_way, way_of
 from .ways.choice import take_way
-from .ways.points import take_points
+from .ways.clouds.points import take_points
 
 if TYPE_CHECKING:
     from collections.abc import Collection

@@ -42,7 +42,8 @@ def compare_with_study(
     Returns
     -------
     dict
-        Dice's coefficient, and mean, percentiles and maximum of the distances both ways (see docs/report.md).
+        Dice's coefficient, and mean, percentiles and maximum of the distances both ways (see docs/report.md); ``notes``
+        has what was decided and what is in doubt.
 
     Raises
     ------
@@ -65,9 +66,11 @@ def compare_with_study(
     (1.0, 0.0, 0.0)
     """
     settings = _settled((settings or Settings()).replace(**changes), volume, labels)
-    kept = select_study(volume, labels, settings).value
+    selected = select_study(volume, labels, settings)
+    kept = selected.value
     found = compare_with_voxels(mesh, kept.mask, kept.study, threads=settings.run.threads)
-    return {**found, "chosen_by": chosen_by(settings)}
+    told = [*selected.stats["study"]["notes"], *selected.warnings]
+    return {**found, "chosen_by": chosen_by(settings), "notes": told}
 
 
 def _settled(settings: Settings, volume: Volume, labels: Volume | None) -> Settings:

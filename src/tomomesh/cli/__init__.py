@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 
 from . import shell
 from .faults import as_error, is_full
-from .options import TOLD, build_parser
-from .parameter_options import joined
+from .options import build_parser
+from .options.commands import TOLD
+from .options.parameters import joined
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""What a mesh is compared with, each in its own unit and frame, and what is said of it."""
+"""What a mesh is compared with, each in its own unit and frame."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def compared(chosen: Namespace, mesh: TriMesh, settings: Settings) -> dict[str, 
     found = compare_with_study(_in_lps(mesh, named, study.grid), study, settings)
     notes = () if "frame" in stated else (f"{chosen.mesh} names no frame, and is taken for LPS (--mesh-frame)",)
     what = "labels" if settings.window.select else "window"
-    return {"against": what, **found, "frame": named["frame"], "notes": [*notes, *study.notes]}
+    return {"against": what, **found, "frame": named["frame"], "notes": [*notes, *found["notes"]]}
 
 
 def _with_mesh(path: str, mesh: TriMesh, stated: dict[str, str]) -> dict[str, Any]:
@@ -61,21 +61,3 @@ def _with_mesh(path: str, mesh: TriMesh, stated: dict[str, str]) -> dict[str, An
 
 def _in_lps(mesh: TriMesh, named: dict[str, str], grid: Grid | None = None) -> TriMesh:
     return io.in_lps(mesh, unit=named["unit"], frame=named["frame"], grid=grid)
-
-
-def of_agreement(report: dict[str, Any]) -> list[str]:
-    """Say in a table how near a mesh is to what it should equal."""
-    if "against" not in report:
-        return []
-    what = {"mesh": "the other", "labels": "the labels", "window": "the window"}[report["against"]["against"]]
-    dice = "none, as what is open has no inside" if report["dice"] is None else f"{report['dice']:.4f}"
-    rows = {f"to {what}": "", f"from {what}": "back_"}
-    return [
-        f"against   {what}: Dice {dice}",
-        f"          {'distance':24}{'mean':>10}{'95 %':>10}{'largest':>10}",
-        *(
-            f"          {row:24}" + "".join(f"{report[f'{way}{key}_mm']:10.4g}" for key in ("mean", "p95", "max"))
-            for row, way in rows.items()
-        ),
-        *(f"note      {note}" for note in report["against"]["notes"]),
-    ]

@@ -14,7 +14,7 @@ from .. import io
 from ..errors import BatchError, UsageError, printable
 from . import summary
 from .faults import as_error
-from .outputs import check_files, check_folder, check_frame, make_folder
+from .outputs.checks import check_files, check_folder, check_frame, make_folder
 from .records import COLUMNS, finished, record_of, row_of
 
 if TYPE_CHECKING:

@@ -6,37 +6,39 @@ import json
 import time
 from argparse import Namespace
 from dataclasses import fields, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import io
-from ..errors import UnreadableError, UsageError, printable
+from ..errors import UsageError, printable
 from ..settings import Settings, option_of, parameters
 from . import summary
 from .against import compared, is_mesh
 from .bars import Bars
 from .batch import reconstruct_each
-from .faults import require_kind
-from .outputs import (
+from .options.likely import require_kind
+from .outputs.checks import (
     OF_STUDIES,
     check_archive,
     check_files,
     check_folder,
     check_frame,
     check_outputs,
-    draw,
     make_folder,
+)
+from .outputs.parts import frame_of_mesh, frame_of_part
+from .outputs.write import (
+    draw,
+    draw_network,
     write_documents,
-    write_picture,
     write_points,
     write_stage_one,
     write_surface,
 )
-from .parts import frame_of_mesh, frame_of_part
-from .sources import gathered, numbered, read_study, sources_of, window_of_picture
+from .sources import gathered, numbered, read_study, region_of, sources_of
 from .streams import streamed
 
 if TYPE_CHECKING:
+    from ..model.mesh import TriMesh
     from ..results import Surface
 
 
@@ -151,24 +153,11 @@ def _network(chosen: Namespace) -> None:
     check_files(chosen)
     from ..effect import without_effect
     from ..som.region import train_region
-    from ..som.shapes import SHAPES, shape
-    from .pictures import film_of_network, pictures_of_network
 
-    given = chosen.region in SHAPES
-    if not given and not Path(chosen.region).exists():
-        regions = f"{' | '.join(SHAPES)} | a PNG or TIFF file"
-        raise UnreadableError("there is no such region", file=chosen.region, expected=regions)
-    notes: list[str] = []
-    inputs, area = shape(chosen.region) if given else (window_of_picture(chosen.region, settings, notes), 1.0)
+    inputs, area, notes = region_of(chosen.region, settings)
     trained = train_region(inputs, settings.network, seed=settings.run.seed, pixel_area=area)
     make_folder(folder)
-    title = f"A network over a {chosen.region if given else 'picture'}"
-    axes = slice(None if given else 2)  # a neuron's place in a picture is its column and row
-    for name, figure in pictures_of_network(trained, title, axes):
-        write_picture(figure, folder / f"{name}.png")
-    if chosen.film:
-        with io.replacing(folder / "02-film.gif") as file:
-            file.write(film_of_network(trained, settings, area, title, axes))
+    draw_network(folder, chosen, trained, settings, area)
     warnings = notes + without_effect(settings, given_of(chosen), input="color")  # a picture may be in color
     report = {"network": trained.measures, "settings": settings.to_dict(), "warnings": warnings}
     write_documents(chosen, report, settings)
@@ -190,10 +179,7 @@ def _check(chosen: Namespace) -> None:
     from ..measure.winding import linings
 
     settings = settings_of(chosen)
-    of_study = given_of(chosen).keys() - {entry.name for entry in fields(settings.printing)}
-    if of_study and (not chosen.against or is_mesh(chosen.against)):
-        asked_for = ", ".join(map(option_of, sorted(of_study)))
-        raise UsageError("there is no study to choose voxels of", found=asked_for, expected="--against STUDY")
+    _refuse_voxels_of_nothing(chosen, settings)
     mesh = io.read_mesh(chosen.mesh)
     report = assess(mesh, cavities=linings(mesh))
     if chosen.against:
@@ -201,15 +187,27 @@ def _check(chosen: Namespace) -> None:
         report |= {key: found.pop(key) for key in [*found] if key == "dice" or key.endswith("_mm")}
         report["against"] = found
     if chosen.print_check:
-        from ..printing.part import PRINTED_MM, resized, turned
-        from ..printing.verdict import verdict
-
-        named = frame_of_mesh(chosen.mesh)
-        asked = turned(settings.printing, named["frame"])
-        report["print"] = verdict(resized(mesh, PRINTED_MM[named["unit"]]), asked)
+        report["print"] = _verdict(chosen, mesh, settings)
     if chosen.report:
         io.write_document(report, chosen.report)
     _say(report, None if chosen.json else summary.of_check(report))
+
+
+def _refuse_voxels_of_nothing(chosen: Namespace, settings: Settings) -> None:
+    of_study = given_of(chosen).keys() - {entry.name for entry in fields(settings.printing)}
+    if of_study and (not chosen.against or is_mesh(chosen.against)):
+        asked_for = ", ".join(map(option_of, sorted(of_study)))
+        raise UsageError("there is no study to choose voxels of", found=asked_for, expected="--against STUDY")
+
+
+def _verdict(chosen: Namespace, mesh: TriMesh, settings: Settings) -> dict[str, Any]:
+    """Tell whether a mesh can be printed, in the unit and frame that its file states."""
+    from ..printing.part import PRINTED_MM, resized, turned
+    from ..printing.verdict import verdict
+
+    named = frame_of_mesh(chosen.mesh)
+    asked = turned(settings.printing, named["frame"])
+    return verdict(resized(mesh, PRINTED_MM[named["unit"]]), asked)
 
 
 def _print(chosen: Namespace) -> None:
@@ -222,11 +220,13 @@ def _print(chosen: Namespace) -> None:
         named = frame_of_mesh(chosen.mesh, given_of(chosen).get("units"))
         asked = replace(settings, printing=turned(settings.printing, named["frame"]))
         part = make_part(mesh, asked, unit=named["unit"], progress=progress)
-        written = frame_of_part(named, settings.printing.scale)
+        named = frame_of_part(named, settings.printing.scale)
         io.write_mesh(
-            part.mesh, chosen.output, unit=written["unit"], frame=written["frame"], z_up=True,
+            part.mesh, chosen.output, unit=named["unit"], frame=named["frame"], z_up=True,
             precision=settings.run.precision,
         )  # fmt: skip
+    in_file = io.frame_in_file(chosen.output, **named)
+    written = {"unit": in_file.unit, "frame": in_file.name}
     report = {"print": part.report, "written": written, "settings": settings.to_dict()}
     if chosen.report:
         io.write_document(report, chosen.report)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import io
-from ..errors import UsageError
+from ..errors import UnreadableError, UsageError
 from ..io.names import shown
 
 if TYPE_CHECKING:
@@ -115,7 +115,26 @@ def read_study(chosen: Namespace, settings: Settings, progress: Bars) -> tuple[V
     return volume, labels
 
 
-def window_of_picture(path: str, settings: Settings, notes: list[str]) -> NDArray[np.float64]:
+def region_of(name: str, settings: Settings) -> tuple[NDArray[np.float64], float, list[str]]:
+    """Return the inputs of a test region or of a picture, the area that each stands for, and what is to be said.
+
+    Raises
+    ------
+    UnreadableError
+        For what is neither.
+    """
+    from ..som.shapes import SHAPES, shape
+
+    if name in SHAPES:
+        return *shape(name), []
+    if not Path(name).exists():
+        regions = f"{' | '.join(SHAPES)} | a PNG or TIFF file"
+        raise UnreadableError("there is no such region", file=name, expected=regions)
+    notes: list[str] = []
+    return _window_of_picture(name, settings, notes), 1.0, notes
+
+
+def _window_of_picture(path: str, settings: Settings, notes: list[str]) -> NDArray[np.float64]:
     """Return the window's pixels of one picture as (column, -row[, layer]), so that up stays up.
 
     Where no window was asked for, and what Otsu's threshold takes has most of the picture's border, that is the paper:

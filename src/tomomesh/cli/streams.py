@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from ..errors import OutputError, TomomeshError, UsageError, printable
 from ..io.files.private import private_folder
 from ..io.files.source import existing, existing_file, suffix_of
-from .formats import TEXTS
+from .options.formats import TEXTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

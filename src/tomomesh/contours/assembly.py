@@ -44,6 +44,9 @@ class Stack:
         Distance of slices where no part goes on as another.
     thickness : float or None
         Of a part that goes on as no other; a slice distance where it is None.
+    on_pixels : bool
+        Whether the voxels lie at whole multiples of their edge, as the pixels do that the parts were drawn on: between
+        pixels, a part of one of them has no depth.
     """
 
     parts: Sequence[Part]
@@ -51,6 +54,7 @@ class Stack:
     edge: float
     least: float
     thickness: float | None = None
+    on_pixels: bool = False
 
     @cached_property
     def body(self) -> NDArray[np.int64]:
@@ -180,7 +184,8 @@ class Stack:
     @property
     def low(self) -> Floats:
         """Center of the first voxel, in the stack's own frame."""
-        return self.box[0] - MARGIN * self.edge
+        low = self.box[0] - MARGIN * self.edge
+        return np.floor(low / self.edge) * self.edge if self.on_pixels else low
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -47,7 +47,7 @@ class Ending:
         """
         if fall <= 0:
             return cls(step / 2)
-        zero = 2 / (fall + np.sqrt(max(fall**2 + 4 * bend, 0.0)))
+        zero = pole(fall, bend)
         if zero <= 1:
             return cls(step * zero, fall * zero, bend * zero**2, 1.0)
         reach = (1 + fall + bend) / 2
@@ -76,6 +76,11 @@ class Ending:
         u = min(t, 1.0)
         lost = self.rest * t**self.power if t < 1 and self.power < STEEPEST else 0.0
         return max(1 - self.fall * u - self.bend * u * u - lost, 0.0)
+
+
+def pole(fall: float, bend: float) -> float:
+    """Return where nothing is left of  1 - fall t - bend t^2,  which falls no slower than a cone."""
+    return float(2 / (fall + np.sqrt(max(fall**2 + 4 * bend, 0.0)))) if fall > 0 else np.inf
 
 
 def parabola(gaps: tuple[float, ...], squares: tuple[float, ...]) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from ..model.points import NEURON, RING, SIDE, STRUCTURE
 from .direction import FEWEST, axes_across, common_normal
 from .levels import typical_gap
 from .rings import holes
-from .slices import LAYERS, PARTED, Slices
+from .slices import ACROSS, LAYERS, PARTED, Slices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -60,11 +60,12 @@ def known_slices(points: PointSet, thickness: float | None = None) -> Slices | N
     rank = np.lexsort((levels, groups))
     labels = np.where(neuron, np.argsort(rank)[labels], -1)
     heights, groups = levels[rank], groups[rank]
-    gap = max(typical_gap(heights[groups == one]) for one in np.unique(groups)) or (thickness or 0.0) / LAYERS
+    width = max(float(np.ptp(one, axis=0).max()) for one in rings)
+    gap = max(typical_gap(heights[groups == one], width) for one in np.unique(groups)) or (thickness or 0.0) / LAYERS
     if max(float(np.ptp(height[one])) for one in grouped) > 2 * PARTED * gap or gap <= 0:
         return None
     sides = np.concatenate([side_lengths(one) for one in rings])
-    spacing = min(float(np.median(sides)), gap)
+    spacing = min(float(np.median(sides)), gap, *([width / ACROSS] if len(heights) == 1 else []))
     found = Slices(origin, axes_across(normal), heights, groups, labels, spacing, complete=structure is None)
     return replace(found, rings=_oriented(points, grouped, found))
 

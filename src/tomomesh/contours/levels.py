@@ -51,7 +51,7 @@ def columns_of(low: Floats, high: Floats) -> NDArray[np.int64]:
     return np.asarray(rank[found])
 
 
-def tolerance(heights: Floats, width: float = np.inf) -> float:
+def tolerance(heights: Floats, width: float) -> float:
     """Return how far heights of one plane may differ: `ONE_PLANE` of the widest gap for which that parts them cleanly.
 
     Parameters
@@ -74,8 +74,8 @@ def tolerance(heights: Floats, width: float = np.inf) -> float:
     return 0.0
 
 
-def typical_gap(heights: Floats, width: float = np.inf) -> float:
-    """Return the median distance of the planes that heights (n,) are on; 0 for one."""
+def typical_gap(heights: Floats, width: float) -> float:
+    """Return the median distance of the planes that heights (n,) of contours of a width are on; 0 for one."""
     rising = np.sort(heights)
     gaps = np.diff(rising)
     wide = gaps[gaps > tolerance(rising, width)]
@@ -107,6 +107,6 @@ def planes_within(heights: Floats, column: NDArray[np.int64], width: Floats, lea
     return planes
 
 
-def slices_at(heights: Floats) -> int:
-    """Count the slices that planes of several columns are on."""
-    return 1 + int((np.diff(np.sort(heights)) > SAME_HEIGHT * typical_gap(heights)).sum())
+def slices_at(heights: Floats, width: float) -> int:
+    """Count the slices that planes of several columns, and contours of a width, are on."""
+    return 1 + int((np.diff(np.sort(heights)) > SAME_HEIGHT * typical_gap(heights, width)).sum())

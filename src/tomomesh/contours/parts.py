@@ -64,6 +64,11 @@ class Part:
         return 2 * self.moments.area / sum(float(side_lengths(curve).sum()) for curve in self.curves)
 
 
+def width_of(parts: Sequence[Part]) -> float:
+    """Return the extent of the widest part."""
+    return max(float((part.high - part.low).max()) for part in parts)
+
+
 def shared_area(one: Part, other: Part, shift: Floats, pixel: float) -> float:
     """Return the area that a shifted part has in common with another, to about a pixel of the outlines."""
     low, high = np.minimum(one.low + shift, other.low), np.maximum(one.high + shift, other.high)

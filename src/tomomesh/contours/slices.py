@@ -50,6 +50,9 @@ twice by +1.2 %; with twice of the second, or half of the third, the stack is no
 LAYERS = 4
 """Voxels that a slice alone is thick at least. Chosen: half of it rounds the edges of a slab off, twice of it takes
 eight times the memory."""
+ACROSS = 16
+"""Voxels that a slice alone is wide at least, where it is thick and has few points. Chosen: of a square 20 wide and 30
+thick 0.0 % of the volume is missing, with half of it 2.9 %, without it 5.9 %; with twice of it there is 0.7 % more."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,8 @@ class Slices:
         The contours of each plane, where they are known: seen against the normal, the inside on their left.
     complete : bool
         Whether every plane between two was looked at all over: what is not there ends, and was not left out.
+    sparse : bool
+        Whether nothing was looked at between two planes, however far apart they are.
     """
 
     origin: Floats
@@ -83,6 +88,7 @@ class Slices:
     spacing: float
     rings: tuple[tuple[Floats, ...], ...] = ()
     complete: bool = False
+    sparse: bool = False
 
     @property
     def normal(self) -> Floats:
@@ -144,7 +150,7 @@ def one_slice(positions: Floats, thickness: float) -> Slices | None:
     alone = np.zeros(1, np.int64)
     return Slices(
         origin, axes_across(normal), np.array([height.mean()]), alone, np.zeros(len(positions), np.int64),
-        min(apart, thickness / LAYERS),
+        min(apart, thickness / LAYERS, float(np.ptp(local, axis=0).max()) / ACROSS),
     )  # fmt: skip
 
 
@@ -171,21 +177,24 @@ def _planes(
     np.maximum.at(high, contour, placed[:, :2])
     height = np.bincount(contour, placed[:, 2]) / count
     column = columns_of(low, high)
-    plane = planes_within(height, column, (high - low).max(axis=1))
+    width = (high - low).max(axis=1)
+    plane = planes_within(height, column, width)
     full = np.bincount(plane, count) >= FEWEST
     labels = np.where(full, np.cumsum(full) - 1, -1)[plane][contour]
     group = np.zeros(len(full), np.int64)
     group[plane] = column
-    return (labels, group[full]) if _are_stack(placed, labels, group[full], spacing) else None
+    return (labels, group[full]) if _are_stack(placed, labels, group[full], spacing, float(width.max())) else None
 
 
-def _are_stack(placed: Floats, labels: NDArray[np.int64], groups: NDArray[np.int64], spacing: float) -> bool:
+def _are_stack(
+    placed: Floats, labels: NDArray[np.int64], groups: NDArray[np.int64], spacing: float, width: float
+) -> bool:
     """Tell whether points in planes are contours: near them, far apart, on curves, and closed."""
     if np.bincount(groups, minlength=1).max() < SLICES or np.mean(labels < 0) > STRAYS:
         return False
     taken, label = placed[labels >= 0], labels[labels >= 0]
     heights = np.bincount(label, taken[:, 2]) / np.bincount(label)
-    gaps = np.array([typical_gap(heights[groups == one]) for one in range(groups.max() + 1)])[groups][label]
+    gaps = np.array([typical_gap(heights[groups == one], width) for one in range(groups.max() + 1)])[groups][label]
     gap = np.median(gaps[gaps > 0])
     looked_at = np.unique(np.linspace(0, len(heights) - 1, LOOKED_AT).astype(int))
     planar = [np.unique(taken[label == k, :2], axis=0) for k in looked_at]

@@ -17,7 +17,7 @@ from ..settings import FitSettings
 from .assembly import Stack
 from .curves import DENSE, chord, fine_curve
 from .levels import slices_at, typical_gap
-from .parts import Part
+from .parts import Part, width_of
 from .rings import Outline, nested, outline
 from .shape_interpolation import filled_between
 from .tracks import link_parts
@@ -146,7 +146,8 @@ def contour_surface(
     measured = _along(stack, slices) if slices.rings else points
     away, _ = cKDTree(measured).query(centers, distance_upper_bound=MEASURED * stack.step)
     return ContourSurface(
-        edges, rest, np.isinf(away), stack, slices_at(slices.heights), sum(len(outlined.rings) for outlined in found),
+        edges, rest, np.isinf(away), stack, slices_at(slices.heights, width_of(stack.parts)),
+        sum(len(outlined.rings) for outlined in found),
         sum(len(outlined.open) for outlined in found), max(outlined.reach for outlined in found), asked, levels.size,
     )  # fmt: skip
 
@@ -159,7 +160,8 @@ def solid_between(
     Parameters
     ----------
     slices : Slices
-        With `rings`; the pixels are as wide as its `spacing`, or wider where there would be too many.
+        With `rings`; the pixels are as wide as its `spacing`, and lie at whole multiples of it, or wider where there
+        would be too many.
     heights : (K,) float array
         Of the layers, rising.
     threads : int
@@ -176,7 +178,7 @@ def solid_between(
         Where fewer than two slices enclose anything.
     """
     drawn, found = _drawn(np.empty((0, 3)), slices, False, threads, progress)
-    stack = _stack(drawn, found, slices, slices.spacing, None)
+    stack = replace(_stack(drawn, found, slices, slices.spacing, None), on_pixels=True)
     return _levels(stack, threads, progress, heights), stack.low[:2], stack.edge
 
 
@@ -255,8 +257,8 @@ def _stack(
     ]
     if len({part.plane for part in parts}) < (2 if thickness is None else 1):
         raise EmptyError("the contours enclose nothing", expected="at least two slices with closed contours")
-    links = link_parts(parts, slices.groups, edge, complete=slices.complete)
-    stack = Stack(parts, links, edge, typical_gap(slices.heights) or thickness or 0.0, thickness)
+    links = link_parts(parts, slices.groups, edge, complete=slices.complete, sparse=slices.sparse)
+    stack = Stack(parts, links, edge, typical_gap(slices.heights, width_of(parts)) or thickness or 0.0, thickness)
     while np.prod(stack.shape) > MOST_VOXELS:
         stack = replace(stack, edge=COARSER * stack.edge)
     return stack

@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..measure.matching import SHARED, matched, similar
+from .endings import parabola, pole
 from .parts import shared_area
 
 if TYPE_CHECKING:
@@ -43,7 +44,9 @@ class Link:
     above: tuple[int, ...]
 
 
-def link_parts(parts: Sequence[Part], groups: NDArray[np.int64], pixel: float, *, complete: bool) -> list[Link]:
+def link_parts(
+    parts: Sequence[Part], groups: NDArray[np.int64], pixel: float, *, complete: bool, sparse: bool = False
+) -> list[Link]:
     """Find which parts go on as which.
 
     A part goes on in the nearest plane of its group that holds something it overlaps, or something like it nearby;
@@ -61,13 +64,15 @@ def link_parts(parts: Sequence[Part], groups: NDArray[np.int64], pixel: float, *
         Finest detail that matters.
     complete : bool
         Whether what is not on the next plane ends.
+    sparse : bool
+        Whether a part may go on in the next plane of its group however far that is.
 
     Returns
     -------
     list of Link
         Those below what begins, those between, those above what ends; by rising plane.
     """
-    near = _Neighbors(parts, _layers(parts, groups), pixel, complete)
+    near = _Neighbors(parts, _layers(parts, groups), pixel, complete, sparse)
     sought = _sought(near)
     pairs = [pair for key in sorted(sought) for pair in near.successors(*sought[key])]
     pairs += _branches(near, sought, pairs)
@@ -97,8 +102,10 @@ def _sought(near: _Neighbors) -> dict[tuple[int, int], tuple[list[int], list[int
 class _Neighbors:
     """What lies over and under each part."""
 
-    def __init__(self, parts: Sequence[Part], groups: list[list[list[int]]], pixel: float, complete: bool) -> None:
-        self.parts, self.groups, self.pixel, self.complete = parts, groups, pixel, complete
+    def __init__(
+        self, parts: Sequence[Part], groups: list[list[list[int]]], pixel: float, complete: bool, sparse: bool
+    ) -> None:
+        self.parts, self.groups, self.pixel, self.complete, self.sparse = parts, groups, pixel, complete, sparse
         self.place = {n: (g, k) for g, layers in enumerate(groups) for k, layer in enumerate(layers) for n in layer}
         self.on = {parts[layer[0]].plane: layer for layers in groups for layer in layers}
         self.known: dict[tuple[int, int], int] = {}
@@ -137,17 +144,21 @@ class _Neighbors:
     def onward(self, n: int, way: int) -> int:
         """Return the plane in which a part goes on; -1 where it ends."""
         over, within = (self.beyond(n, way, least) for least in (OVER, WITHIN))
-        if any(self._reach(n, m, way) for m in over):
+        if any(self.reaches(n, m, way) for m in over):
             return self.parts[over[0]].plane
         if over != within and any(self.gap(n, m) <= NEXT * self._nearest(n) for m in within):
             return self.parts[within[0]].plane
         return -1
 
-    def _reach(self, n: int, m: int, way: int) -> bool:
+    def reaches(self, n: int, m: int, way: int) -> bool:
         """Tell whether two parts are near enough to be of one body, though slices be missing between them."""
         if self.are_next(n, m, way):
             return True
         gap = self.gap(n, m)
+        if max(self._pole(n, way), self._pole(m, -way)) < gap / 2:
+            return False
+        if self.sparse and not self._are_turns(n, m):
+            return True
         near = gap <= MISSING * self._step(n, m, way)
         tapers = self._taper(n, way), self._taper(m, -way)
         return near and min(tapers) >= gap / 2 and (self._meet(n, m, way) or self._meet(m, n, -way))
@@ -167,9 +178,18 @@ class _Neighbors:
         return self.complete or self.gap(n, m) <= NEXT * self._step(n, m, way)
 
     def _step(self, n: int, m: int, way: int) -> float:
-        """Return the distance of slices on the far sides of two parts; of any neighbors, where they have no such."""
+        """Return the distance of slices on the far sides of two parts; of any neighbors, where they have no such.
+
+        Of two distances it is the wider one where the planes between are other parts': those are contoured in turns.
+        """
         far = [self.gap(one, other) for one, w in ((n, -way), (m, way)) for other in self.beyond(one, w, OVER)[:1]]
-        return min(far) if far else min(self._nearest(n), self._nearest(m))
+        if not far:
+            return min(self._nearest(n), self._nearest(m))
+        return max(far) if self._are_turns(n, m) else min(far)
+
+    def _are_turns(self, n: int, m: int) -> bool:
+        """Tell whether a plane of their group lies between two parts."""
+        return abs(self.place[n][1] - self.place[m][1]) > 1
 
     def _nearest(self, n: int) -> float:
         """Return how far the nearest part is that one may go on as."""
@@ -184,6 +204,21 @@ class _Neighbors:
         m = max(inward, key=lambda one: self.parts[one].thickness)
         wider = self.parts[m].thickness - thick
         return self.gap(n, m) * thick / wider if wider > 0 else np.inf
+
+    def _pole(self, n: int, way: int) -> float:
+        """Return how far a part goes on before it ends as round as its last slices show it to be."""
+        key, inward = n, []
+        for _ in range(2):
+            beyond = self.beyond(key, -way, OVER)
+            if not beyond:
+                break
+            key = max(beyond, key=lambda one: self.parts[one].thickness)
+            inward.append(key)
+        if not inward:
+            return np.inf
+        gaps = tuple(self.gap(n, m) for m in inward)
+        squares = tuple((self.parts[m].thickness / self.parts[n].thickness) ** 2 for m in inward)
+        return pole(*parabola(gaps, squares))
 
     def successors(self, below: list[int], above: list[int]) -> list[tuple[int, int]]:
         """Pair the parts of two planes that seek each other."""
@@ -229,7 +264,7 @@ def _covering(near: _Neighbors, n: int, source: int | None, others: Sequence[int
         shift = share * (part.moments.center - near.parts[source].moments.center)
     shared = [shared_area(part, near.parts[m], shift, near.pixel) for m in others]
     best = int(np.argmax(shared))
-    joined = shared[best] > SHARED * part.moments.area and near.are_next(n, others[best], 1 if n < others[best] else -1)
+    joined = shared[best] > SHARED * part.moments.area and near.reaches(n, others[best], 1 if n < others[best] else -1)
     return others[best] if joined else -1
 
 

@@ -43,7 +43,7 @@ def capped(mesh: TriMesh, free: NDArray[np.bool_]) -> NDArray[np.float64]:
         the others stay.
     """
     links = adjacency(mesh.edges, len(free)).astype(np.float64)
-    moving = _held(links, free)
+    moving = _bordered(links, free)
     system = sparse.csr_array(sparse.diags_array(links.sum(axis=1)) - links)
     return _at_rest(system, mesh.vertices, moving)
 
@@ -64,7 +64,7 @@ def carried_on(mesh: TriMesh, free: NDArray[np.bool_]) -> NDArray[np.float64]:
         Where the square of the surface's own Laplacian is 0 at the free vertices (Botsch & Kobbelt 2004); the others
         stay.
     """
-    moving = _held(adjacency(mesh.edges, len(free)), free)
+    moving = _bordered(adjacency(mesh.edges, len(free)), free)
     for _ in range(PASSES if moving.any() else 0):
         stiff, areas = stiffness_of(mesh), np.maximum(areas_of(mesh), np.finfo(float).tiny)
         plate = sparse.csr_array(stiff @ sparse.diags_array(1 / areas) @ stiff)
@@ -72,7 +72,7 @@ def carried_on(mesh: TriMesh, free: NDArray[np.bool_]) -> NDArray[np.float64]:
     return mesh.vertices
 
 
-def _held(links: sparse.csr_array[np.float64], free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _bordered(links: sparse.csr_array[np.float64], free: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Tell which free vertices (n,) lie in a piece that has others."""
     _, piece = connected_components(links, directed=False)
     held = np.bincount(piece, ~free) > 0

@@ -11,7 +11,7 @@ from .clouds.write import POINT_WRITERS, write_points
 from .dicom import Listing, Series
 from .documents import read_settings, write_document, write_settings, write_table
 from .files.atomic import check_output, replacing
-from .frames import Frame, frame_of_study, in_lps
+from .frames import LENGTHS, RAS_ALONE, Frame, frame_in_file, frame_of_study, in_lps
 from .meshes.encapsulated import ARCHIVED, check_archived, is_archived, write_encapsulated
 from .meshes.frame import frame_of_file
 from .meshes.read import MESH_READERS, read_mesh
@@ -26,10 +26,12 @@ from .volumes.labels import LABEL_WRITERS, write_labels
 __all__ = [
     "ARCHIVED",
     "LABEL_WRITERS",
+    "LENGTHS",
     "MESH_READERS",
     "MESH_WRITERS",
     "POINT_READERS",
     "POINT_WRITERS",
+    "RAS_ALONE",
     "VOLUME_READERS",
     "Frame",
     "Listing",
@@ -38,6 +40,7 @@ __all__ = [
     "check_archived",
     "check_output",
     "find_studies",
+    "frame_in_file",
     "frame_of_file",
     "frame_of_study",
     "in_lps",

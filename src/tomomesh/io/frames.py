@@ -1,4 +1,4 @@
-"""The frames in which a study's mesh and points are written: from LPS millimeters at the border, and nowhere else."""
+"""The frames in which meshes and points are written: a study's from LPS millimeters, here and nowhere else."""
 
 from __future__ import annotations
 
@@ -9,13 +9,19 @@ import numpy as np
 
 from ..model.mesh import TriMesh
 from ..model.units import MM
+from .files.source import suffix_of
 from .volumes.nifti_frame import FLIP
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
     from ..model.points import PointSet
     from ..model.volume import Grid
+
+RAS_ALONE, LENGTHS = (".gii",), (".gii", ".3mf")
+"""Suffixes of meshes that are in RAS whatever is asked, and of those that are in millimeters."""
 
 
 @dataclass(frozen=True)
@@ -26,21 +32,21 @@ class Frame:
     ----------
     unit, name : str
         As files name them.
-    from_lps : (4, 4) float array
-        Patient millimeters, LPS, to its coordinates.
+    matrix : (4, 4) float array
+        Patient millimeters, LPS, or whatever else a mesh is in, to its coordinates.
     """
 
     unit: str
     name: str
-    from_lps: NDArray[np.float64]
+    matrix: NDArray[np.float64]
 
     def place(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Carry (n, 3) positions from LPS."""
-        return np.asarray(positions @ self.from_lps[:3, :3].T + self.from_lps[:3, 3])
+        """Carry (n, 3) positions."""
+        return np.asarray(positions @ self.matrix[:3, :3].T + self.matrix[:3, 3])
 
     def mesh(self, mesh: TriMesh) -> TriMesh:
         """Carry a mesh; where the frame is a mirror, the faces are turned, so that they look outward in it too."""
-        turned = slice(None, None, -1 if np.linalg.det(self.from_lps[:3, :3]) < 0 else 1)
+        turned = slice(None, None, -1 if np.linalg.det(self.matrix[:3, :3]) < 0 else 1)
         return TriMesh(self.place(mesh.vertices), np.ascontiguousarray(mesh.faces[:, turned]))
 
     def points(self, points: PointSet) -> PointSet:
@@ -92,3 +98,18 @@ def frame_of_study(name: str, grid: Grid) -> Frame:
     if name == "voxel":
         return Frame("voxel", "voxel", np.asarray(np.linalg.inv(grid.affine), np.float64))
     return Frame("mm", name.upper(), FLIP if name == "ras" else np.eye(4))
+
+
+def frame_in_file(path: str | Path, *, unit: str, frame: str) -> Frame:
+    """Return the frame of the numbers in a mesh file, from those of the mesh that is written.
+
+    Parameters
+    ----------
+    path : path
+        The output, whose format may have a frame and a unit of its own.
+    unit, frame : str
+        Those of the mesh; an unknown unit or frame stays as it is.
+    """
+    sized, turned = suffix_of(path) in LENGTHS and unit in MM, suffix_of(path) in RAS_ALONE and frame == "LPS"
+    affine = np.diag([*3 * [MM[unit] if sized else 1.0], 1.0])
+    return Frame("mm" if sized else unit, "RAS" if turned else frame, FLIP @ affine if turned else affine)

@@ -11,9 +11,10 @@ MM = {
 """Millimeters in a unit, by the name that it has here; a US survey foot is 1200/3937 m (NIST SP 811, B.6)."""
 
 SPELLED = {
-    "picometer": "pm", "ångström": "angstrom", "å": "angstrom", "nanometer": "nm", "micrometer": "um", "µm": "um",
-    "micron": "um", "millimeter": "mm", "centimeter": "cm", "decimeter": "dm", "meter": "m", "kilometer": "km",
-    "inch": "in", "inches": "in", '"': "in", "foot": "ft", "feet": "ft", "ftus": "us-ft", "yard": "yd",
+    "picometer": "pm", "ångström": "angstrom", "å": "angstrom", "A": "angstrom", "nanometer": "nm",
+    "micrometer": "um", "µm": "um", "micron": "um", "µ": "um", "millimeter": "mm", "centimeter": "cm",
+    "decimeter": "dm", "meter": "m", "kilometer": "km", "inch": "in", "inches": "in", '"': "in", "foot": "ft",
+    "feet": "ft", "ftus": "us-ft", "mil": "thou", "yard": "yd",
 }  # fmt: skip
 """What else a unit is called: singular, in small letters, with American spelling and the micro sign."""
 
@@ -21,7 +22,13 @@ ESCAPED = re.compile(r"\\u([0-9a-fA-F]{4})")
 """A letter beyond ASCII, as ImageJ writes it into the text of a TIFF file."""
 
 SHORTEST_WORD = 3
-"""Letters from which on capitals and a final s mean nothing: among shorter ones, Mm is no mm, and the ms no m."""
+"""Letters from which on a final s means nothing: ms are no m."""
+
+OTHERS = ("Mm", "Pm")
+"""Where capitals mean another unit, of which no voxel is made; elsewhere people write them as they like."""
+
+AROUND = " \t\0.^()[]"
+"""What stands around a unit without a meaning."""
 
 
 def unit_named(word: str) -> str | None:
@@ -37,12 +44,12 @@ def unit_named(word: str) -> str | None:
     >>> [unit_named(word) for word in ("Microns", r"\u00B5m", "in", "pixel")]
     ['um', 'um', 'in', None]
     """
-    plain = ESCAPED.sub(lambda found: chr(int(found[1], 16)), word).strip().strip("\0")
-    plain = plain.replace("\u03bc", "\u00b5").replace("\u212b", "\u00c5")  # Greek mu; the sign of the Angstrom
-    plain = plain.lower() if len(plain) >= SHORTEST_WORD or plain == "\u00c5" else plain
-    plain = plain.replace("metre", "meter")
+    told = ESCAPED.sub(lambda found: chr(int(found[1], 16)), word).strip(AROUND)
+    told = told.replace("\u03bc", "\u00b5").replace("\u212b", "\u00c5")  # Greek mu; the sign of the Angstrom
+    told = told.replace("\u00c2\u00b5", "\u00b5")  # bytes of UTF-8 that were taken for Latin letters
+    plain = told if told in OTHERS else told.lower().replace("metre", "meter")
     singular = plain[:-1] if len(plain) > SHORTEST_WORD and plain.endswith("s") else plain
-    found = (SPELLED.get(one, one) for one in (plain, singular))
+    found = (SPELLED.get(one, one) for one in (told, plain, singular))
     return next((name for name in found if name in MM), None)
 
 

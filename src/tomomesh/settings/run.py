@@ -33,7 +33,7 @@ class RunSettings(Group):
     precision: int = param(
         64,
         "bits of the coordinates in .ply and .vtp, which some viewers want to be 32; 64 all the same where 32 would "
-        "let two vertices fall together",
+        "let vertices fall together or move visibly",
         choices=(64, 32),
     )
     local_origin: bool = param(

@@ -13,14 +13,14 @@ from ..model.volume import Grid, Volume
 from ..pointcloud.solid import FINE, depths, distance_within
 from ..results import Surface
 from ..stage import Stage, folded, measured, timed
-from .points import place_found
+from .clouds.points import place_found
 from .sections import body_of_voxels, boundary_found, points_found
 from .way import POINTS, Way, parameters
 
 if TYPE_CHECKING:
     from ..progress import Progress
     from ..settings import Settings
-    from .points import Points
+    from .clouds.points import Points
 
 MOST_VOXELS = 60_000_000
 """Voxels over which they are made larger, a cube of 391 to a side: only memory and detail depend on it."""

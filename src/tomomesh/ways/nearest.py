@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from ..cuberille.partition import sampling_distance
 from ..pointcloud.samples import distinct
 from ..stage import Stage, folded, measured
+from .clouds.points import place_found
 from .cubes import surface_on_cubes
-from .points import place_found
 from .sections import body_of_cubes, points_found
 from .way import CUBES, POINTS, SPRINGS, Way, parameters
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..progress import Progress
     from ..results import Surface
     from ..settings import Settings
-    from .points import Points
+    from .clouds.points import Points
 
 
 def surface_near_points(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:

@@ -161,8 +161,11 @@ def _course(trace: Trace) -> dict[str, Any]:
     }
 
 
-def boundary_found(found: Boundary, surface: VoxelSurface) -> Stage[None]:
-    """Tell of the boundary of voxels, and how its net came to rest."""
+def boundary_found(found: Boundary, surface: VoxelSurface, *, labels: bool = False) -> Stage[None]:
+    """Tell of the boundary of voxels, and how its net came to rest; a mask is what was asked for where it is `labels`.
+
+    Gray levels that are a mask's are warned of, for there was more to know.
+    """
     trace, stepped = surface.net_fit.trace, found.crossings.stepped
     steps = len(trace.speed)
     stats: dict[str, dict[str, Any]] = {
@@ -185,7 +188,7 @@ def boundary_found(found: Boundary, surface: VoxelSurface) -> Stage[None]:
     if steps:
         stats["fit"] |= {"speed": float(trace.speed[-1]), "acceleration": float(trace.acceleration[-1])}
     warnings: tuple[str, ...] = ()
-    if stepped and found.parts == 1:
+    if stepped and found.parts == 1 and not labels:
         warnings = ("the gray levels are those of a mask: the surface is evened out between the voxels",)
     elif steps and not trace.converged:
         warnings = (f"the mesh had not come to rest after {steps} steps",)

@@ -12,8 +12,8 @@ from ..opensurface.sheet import OpenSheet, open_sheet
 from ..pointcloud.bridges import bridges
 from ..results import Surface
 from ..stage import Stage, folded, timed
-from .points import place_found
-from .samples import cell_edges, lowest_corner, require_parts, settle
+from .clouds.points import place_found
+from .clouds.samples import cell_edges, lowest_corner, require_parts, settle
 from .sections import body_of_cubes, fit_found, shell_found, walls_found
 from .way import POINTS, Way, parameters
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..pointcloud.samples import Samples
     from ..progress import Progress
     from ..settings import Settings
-    from .points import Points
+    from .clouds.points import Points
 
 
 def surface_of_sheet(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:

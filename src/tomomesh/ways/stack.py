@@ -11,7 +11,7 @@ from ..contours.stack import ContourSurface, contour_surface
 from ..model.points import NEURON
 from ..results import Enclosed, Surface
 from ..stage import Stage, folded, measured
-from .points import place_found
+from .clouds.points import place_found
 from .sections import body_of_voxels, boundary_found, points_found
 from .way import Way, on_input, parameters
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..model.points import PointSet
     from ..progress import Progress
     from ..settings import Settings
-    from .points import Points
+    from .clouds.points import Points
 
 APART = 1.5
 """Distance of two slices of a stack of contours, in median ones, over which a result is warned of: half a slice more

@@ -5,7 +5,7 @@ from __future__ import annotations
 from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Any
 
-from ..summary import limit_in_words, of_way
+from ..summary.stage_one import limit_in_words, of_way
 from .series_table import TILTED, table_of
 
 if TYPE_CHECKING:

@@ -25,8 +25,13 @@ TRIPLES: tuple[tuple[frozenset[str], ...], ...] = (
     *(tuple(frozenset({f"{word}{n}"}) for n in range(3)) for word in ("points", "coords", "coordinates")),
     (EAST, NORTH, UP),
     (LONGITUDE, LATITUDE, UP),
+    (frozenset({"axis2"}), frozenset({"axis1"}), frozenset({"axis0"})),
 )
-"""What the three are called together: coordinates, a patient's axes, ParaView's columns, a surveyor's."""
+"""What the three are called together: coordinates, a patient's axes, ParaView's columns, a surveyor's, napari's, which
+count from the slowest."""
+
+FRAMES = {frozenset("r"): "RAS", frozenset("l"): "LPS"}
+"""The frame of a patient's axes, by the first of them."""
 
 NO_LENGTHS = {
     **dict.fromkeys(("deg", "degree", "degrees", "°"), "degree"),
@@ -40,11 +45,12 @@ NAME = re.compile(r"(?P<name>.*?)[\s_]*(?:[\[(/]\s*(?P<marked>[^\])]*?)\s*[\])]?
 
 @dataclass(frozen=True)
 class PositionColumns:
-    """The columns of the positions, from 0, their unit where it is named, and what is to be told about them."""
+    """The columns of the positions, from 0, their unit and frame where named, and what is to be told about them."""
 
     axes: tuple[int, ...] = (0, 1, 2)
     unit: str | None = None
     notes: tuple[str, ...] = ()
+    frame: str | None = None
 
 
 def positions_among(names: Sequence[str], *, file: str) -> PositionColumns:
@@ -77,10 +83,12 @@ def named_positions(names: Sequence[str]) -> PositionColumns | None:
             named = {units[place] for place in places}
             if triple[0] is LONGITUDE:
                 return PositionColumns(tuple(places), "degree")
+            frame = FRAMES.get(triple[0])
             if len(named) == 1:
-                return PositionColumns(tuple(places), named.pop())
+                return PositionColumns(tuple(places), named.pop(), frame=frame)
             told = ", ".join(sorted(unit or "none" for unit in named))
-            return PositionColumns(tuple(places), notes=(f"the columns name several units, {told}: none was taken",))
+            notes = (f"the columns name several units, {told}: none was taken",)
+            return PositionColumns(tuple(places), notes=notes, frame=frame)
     return None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ from ..files.atomic import replacing
 from ..files.limits import require_rows
 from ..files.source import first_bytes, whole
 from ..meshes.obj import VERTEX, unfolded
-from ..text import delimiter_of, first_row, parse_rows, read_lines, typed
+from ..text import content, decoded, delimiter_of, first_row, parse_rows, read_lines, typed
 from .columns import PositionColumns, named_positions, positions_among
 
 if TYPE_CHECKING:
@@ -29,6 +30,12 @@ if TYPE_CHECKING:
 LONGEST_HEAD = 1 << 16
 """Bytes at the beginning of a text in which its names are looked for."""
 
+COUNTING = (
+    "the first of the columns without names counts, as that of contours does, and was taken for x: a line of names, "
+    "as contour,x,y,z, says which are the positions",
+)
+"""What is said of it."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -40,7 +47,7 @@ class Table:
 
 
 def read_text(path: Path) -> Cloud:
-    """Read rows of numbers; one line of names may come first, also behind ``#`` or ``//``, and a count before it.
+    """Read rows of numbers; one line of names may come first, also as a comment, and a count before it.
 
     Columns that are named as positions are (`named_positions`), else the first three. The other columns
     that have a name and hold numbers are fields.
@@ -53,15 +60,29 @@ def read_text(path: Path) -> Cloud:
 
 
 def columns_frame(path: Path) -> dict[str, Any]:
-    """Return the unit that the names of the columns state, and what is to be told of them."""
-    lines = first_bytes(path, LONGEST_HEAD).decode("utf-8-sig", "replace").splitlines()
-    columns = _table(lines, str(path)).columns
-    return {"unit": columns.unit, "notes": columns.notes}
+    """Return the unit and the frame that the names of the columns state, and what is to be told of them."""
+    head = decoded(first_bytes(path, LONGEST_HEAD), "replace")
+    table = _table(head.splitlines() if len(head) < LONGEST_HEAD else head.splitlines()[:-1], str(path))
+    columns = table.columns
+    stated = {"frame": columns.frame} if columns.frame else {}
+    counting = COUNTING if not table.names and _counts(table.lines) else ()
+    return {"unit": columns.unit, "notes": columns.notes + counting} | stated
+
+
+def _counts(lines: list[str]) -> bool:
+    """Tell whether the first of more than three columns without names counts something, as contours: 0, 0, 1, 1, 1."""
+    delimiter = delimiter_of(lines)
+    rows = [line.split(delimiter) for line in lines if line.partition("#")[0].strip()]
+    firsts = [row[0].strip() for row in rows]
+    if len(rows) < 3 or min(map(len, rows)) < 4 or not all(map(str.isdecimal, firsts)):
+        return False
+    steps = np.diff([int(first) for first in firsts])
+    return bool(((steps == 0) | (steps == 1)).all())
 
 
 def _table(lines: list[str], file: str) -> Table:
     """Find the line of names: the first that is no comment, or a comment before it that names the positions."""
-    first = next((n for n, line in enumerate(lines) if line.split("#")[0].strip()), len(lines))
+    first = next((n for n, line in enumerate(lines) if content(line)), len(lines))
     for n in (*range(first), *((first,) if first < len(lines) else ())):
         names = _names(lines[n])
         if named_positions(names) or (names and n == first):
@@ -101,7 +122,7 @@ def without_counts(lines: list[str], file: str) -> list[str]:
 
 def _next_row(lines: list[str], start: int) -> int:
     """Return the number of the next line that holds anything."""
-    return next((n for n in range(start, len(lines)) if lines[n].partition("#")[0].strip()), len(lines))
+    return next((n for n in range(start, len(lines)) if content(lines[n])), len(lines))
 
 
 def _is_comment(line: str) -> bool:
@@ -115,8 +136,9 @@ def _names(line: str) -> list[str]:
 
     A line of names has three words at least, and no number among the first three.
     """
-    plain = line.strip().lstrip("#/").strip()
-    names = [word.strip().strip("\"'") for word in plain.split(delimiter_of([plain]))]
+    plain = line.strip().lstrip("#/%").strip()
+    words = re.split(r"\t+", plain) if "\t" in plain else plain.split(delimiter_of([plain]))
+    names = [word.strip().strip("\"'") for word in words]
     return names if len(names) >= 3 and not any(map(_is_number, names[:3])) else []
 
 

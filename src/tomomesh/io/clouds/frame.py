@@ -19,6 +19,7 @@ FRAMES: dict[str, Callable[[Path], dict[str, Any]]] = {
     ".las": las_frame,
     ".laz": las_frame,
     ".csv": columns_frame,
+    ".tsv": columns_frame,
     ".txt": columns_frame,
     ".xyz": columns_frame,
     ".asc": columns_frame,

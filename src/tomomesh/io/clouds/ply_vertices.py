@@ -10,13 +10,12 @@ from ...errors import FormatError
 from ..fields import AXES, split_fields
 from ..files.limits import require_bytes, require_rows
 from ..files.source import whole
-from ..meshes.ply import BYTE_ORDERS, TYPE_CODES, parse_header
+from ..meshes.ply import BYTE_ORDERS, parse_header
+from ..meshes.ply_rows import rows_of, start_of
 from ..text import parse_rows, typed
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from numpy.typing import NDArray
 
     from ..fields import Cloud, Fields
     from ..meshes.ply import PlyElement, PlyHeader
@@ -89,45 +88,10 @@ def _without_lists(line: str, vertex: PlyElement) -> str:
 def _binary_rows(
     data: bytes, header: PlyHeader, before: tuple[PlyElement, ...], vertex: PlyElement, file: str
 ) -> Fields:
-    order, start = BYTE_ORDERS[header.format], header.length
-    for element in before:
-        start = _rows(data, start, element, order, file)[1] if element.has_lists else start + element.least_bytes(False)
+    order, start = BYTE_ORDERS[header.format], start_of(data, header, before, file)
     if vertex.has_lists:
-        return _gathered(np.frombuffer(data, np.uint8), _rows(data, start, vertex, order, file)[0], vertex, order)
+        return rows_of(data, header, vertex.name, file)[0]
     kind = np.dtype(list(zip(vertex.names, vertex.types(order), strict=True)))
     require_bytes(vertex.count * kind.itemsize, len(data) - start, file=file)
     rows = np.frombuffer(data, kind, vertex.count, start)
     return {name: rows[name] for name in vertex.names}
-
-
-def _rows(data: bytes, start: int, element: PlyElement, order: str, file: str) -> tuple[NDArray[np.int64], int]:
-    """Return where the rows of an element with lists begin, the first at `start`, and where they end."""
-    from ...kernels.files.rows import row_starts
-
-    kinds, starts = element.types(order), np.empty(element.count, np.int64)
-    try:
-        items = [np.dtype(TYPE_CODES[words[2]]).itemsize if words[0] == "list" else 0 for words in element.properties]
-        if any(kind.kind == "f" for kind, item in zip(kinds, items, strict=True) if item):
-            raise ValueError(kinds)
-    except (KeyError, IndexError, ValueError):
-        raise FormatError("the lists cannot be understood", file=file, expected="whole numbers as lengths") from None
-    end = row_starts(
-        np.array(np.frombuffer(data, np.uint8)), start, np.array([kind.itemsize for kind in kinds]), np.array(items),
-        np.array([kind.kind == "i" for kind in kinds]), order == ">", starts,
-    )  # fmt: skip
-    if end < 0:
-        raise FormatError("the lists are broken, or the file is cut off", file=file, found=f"element = {element.name}")
-    return starts, end
-
-
-def _gathered(data: NDArray[np.uint8], at: NDArray[np.int64], element: PlyElement, order: str) -> Fields:
-    """Return the single properties of rows that begin at `at` and have lists between them."""
-    found: Fields = {}
-    for words, kind in zip(element.properties, element.types(order), strict=True):
-        values = data[at[:, None] + np.arange(kind.itemsize)].view(kind)[:, 0]
-        at = at + kind.itemsize
-        if words[0] == "list":
-            at = at + values.astype(np.int64) * np.dtype(TYPE_CODES[words[2]]).itemsize
-        else:
-            found[words[-1]] = values
-    return found

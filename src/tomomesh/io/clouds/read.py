@@ -36,12 +36,12 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
     Parameters
     ----------
     path : path
-        ``.ply`` (text or binary) and ``.vtp``; ``.xyz``, ``.asc``, ``.txt`` or ``.csv`` (the columns named x, y and z
-        or the like, else the first three; a count may come first); ``.pts`` and ``.ptx``; ``.npy`` with an (n, 3)
-        array or named fields; ``.npz`` with ``points`` or the like; ``.pcd``; ``.las``, ``.laz`` and ``.e57`` (with
-        the extra ``clouds``, which compressed ``.pcd`` needs too); or the vertices of ``.obj``, ``.off``, ``.3mf``,
-        ``.glb``, ``.gii`` and ``.stl`` (its equal positions become one vertex); or a DICOM RT Structure Set, of which
-        one structure's contours are taken.
+        ``.ply`` (text or binary) and ``.vtp``; ``.xyz``, ``.xyzn``, ``.xyzrgb``, ``.asc``, ``.txt``, ``.csv`` or
+        ``.tsv`` (the columns named x, y and z or the like, else the first three; a count may come first); ``.pts`` and
+        ``.ptx``; ``.npy`` with an (n, 3) array or named fields; ``.npz`` with ``points`` or the like; ``.pcd``;
+        ``.las``, ``.laz`` and ``.e57`` (with the extra ``clouds``, which compressed ``.pcd`` needs too); or the
+        vertices of ``.obj``, ``.off``, ``.3mf``, ``.glb``, ``.gii`` and ``.stl`` (its equal positions become
+        one vertex); or a DICOM RT Structure Set, of which one structure's contours are taken.
     settings : CloudSettings, optional
         What to do where the file leaves a choice.
 
@@ -98,6 +98,7 @@ POINT_READERS: dict[str, Callable[[Path], Cloud]] = {
     ".xyz": read_text,
     ".txt": read_text,
     ".csv": read_text,
+    ".tsv": read_text,
     ".npy": read_npy,
     ".npz": read_npz,
     ".pcd": read_pcd,
@@ -112,6 +113,8 @@ POINT_READERS: dict[str, Callable[[Path], Cloud]] = {
     ".gii": _read_vertices,
     ".vtp": read_vtp,
     ".asc": read_text,
+    ".xyzn": read_text,
+    ".xyzrgb": read_text,
     ".pts": read_pts,
     ".ptx": read_ptx,
 }

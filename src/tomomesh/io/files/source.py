@@ -183,8 +183,7 @@ def third_party(reader: str, file: str) -> Iterator[None]:
     Its own words stay out: they may hold patient data or a full path.
     """
     try:
-        with _unheard(logging.getLogger(reader)), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with unheard(reader):
             yield
     except TomomeshError:
         raise
@@ -200,13 +199,15 @@ def third_party(reader: str, file: str) -> Iterator[None]:
 
 
 @contextmanager
-def _unheard(logger: logging.Logger) -> Iterator[None]:
-    """Keep what a library logs, values of fields and paths among it, from the handlers of others and from stderr."""
-    propagate, nobody = logger.propagate, logging.NullHandler()
-    logger.propagate = False
+def unheard(library: str) -> Iterator[None]:
+    """Keep what a library warns of and logs, values of fields and paths among it, from others' handlers and stderr."""
+    logger, nobody = logging.getLogger(library), logging.NullHandler()
+    propagate, logger.propagate = logger.propagate, False
     logger.addHandler(nobody)
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
     finally:
         logger.removeHandler(nobody)
         logger.propagate = propagate

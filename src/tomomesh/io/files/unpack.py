@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import FormatError, ResourceError, UnreadableError
 from .limits import require_bytes, require_memory
+from .source import first_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 PLAIN, GZIP, ZLIB, BZIP2 = "raw", "gzip", "zlib", "bzip2"
+
+GZIP_MARK = b"\x1f\x8b"
+"""First bytes of a gzip stream (RFC 1952)."""
 
 RATIOS = {PLAIN: 1, GZIP: 1032, ZLIB: 1032, BZIP2: 2**21}
 """No stream of a packing holds more than this many times its own bytes: zlib's own limit (its technical details), and
@@ -50,6 +54,17 @@ class _Zlib(io.RawIOBase):
             if not packed:
                 raise EOFError
         return 0
+
+
+def packing_of(path: Path) -> str:
+    """Return ``GZIP`` or ``PLAIN``, by a file's first bytes: browsers unpack, and leave the name as it was.
+
+    Raises
+    ------
+    UnreadableError
+        Where the file may not be read.
+    """
+    return GZIP if first_bytes(path, len(GZIP_MARK)) == GZIP_MARK else PLAIN
 
 
 @contextmanager

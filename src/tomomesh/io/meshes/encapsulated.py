@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ... import __version__
 from ...errors import FormatError, TomomeshError, UsageError
 from ..files.atomic import check_output, replacing
-from ..files.source import third_party
+from ..files.source import third_party, unheard
 from .attributes import MeshAttributes
 from .stl import read_stl, stl_bytes
 
@@ -17,12 +17,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ...model.mesh import TriMesh
-    from .through_trimesh import Arrays
+    from .cells import Arrays
 
 ARCHIVED = (".dcm",)
 """Suffixes of meshes for an archive."""
-LENGTHS = ("mm", "cm", "m")
-"""Codes of the units of length (UCUM) that tomomesh knows."""
+UCUM = {name: name for name in ("nm", "um", "mm", "cm", "dm", "m", "km")} | {
+    "[in_i]": "in", "[ft_i]": "ft", "[ft_us]": "us-ft", "[yd_i]": "yd",
+}  # fmt: skip
+"""Code of a unit of length to its name here (The Unified Code for Units of Measure, tables 1, 6 and 7)."""
 ENCAPSULATED_STL = "1.2.840.10008.5.1.4.1.1.104.3"
 MIME = "model/stl"
 PLACE = ("StudyInstanceUID", "FrameOfReferenceUID", "PositionReferenceIndicator")
@@ -47,13 +49,14 @@ def check_archived(study: Mapping[str, Any], *, file: str) -> None:
     Raises
     ------
     UsageError
-        Where it is no DICOM, or names no frame of reference.
+        Where it is no DICOM, or names no frame of reference, or several.
     """
     lost = next((keyword for keyword in PLACE[:2] if not study.get(keyword)), "")
     if lost:
+        told = "several" if lost in study else "missing"
         raise UsageError(
-            "a mesh in the archive belongs to a DICOM study", file=file, found=f"{lost} = missing",
-            expected="a study of DICOM files that names its frame of reference", hint="another format, as .stl",
+            "a mesh in the archive belongs to a DICOM study", file=file, found=f"{lost} = {told}",
+            expected="a study of DICOM files that names its one frame of reference", hint="another format, as .stl",
         )  # fmt: skip
 
 
@@ -81,10 +84,10 @@ def write_encapsulated(mesh: TriMesh, path: str | Path, study: Mapping[str, Any]
     check_output(path, ARCHIVED)
     check_archived(study, file=str(path))
     document = stl_bytes(mesh, path, MeshAttributes("mm", "LPS", {}, {}))
-    data = _described(document, study, "named" if patient else "not named")
-    for keyword in PERSONAL:
-        setattr(data, keyword, study.get(keyword, "") if patient else "")
-    with replacing(path) as file:
+    with replacing(path) as file, unheard("pydicom"):  # which tells of a patient's fields that break its rules
+        data = _described(document, study, "named" if patient else "not named")
+        for keyword in PERSONAL:
+            setattr(data, keyword, study.get(keyword, "") if patient else "")
         data.save_as(file, enforce_file_format=True)
 
 
@@ -154,14 +157,14 @@ def is_archived(path: str | Path) -> bool:
 def encapsulated_frame(data: bytes, file: str) -> dict[str, str]:
     """Return the unit and the frame of a DICOM Encapsulated STL: the standard's, LPS, whatever wrote it.
 
-    The unit is one of `LENGTHS`; another, or none, is not named.
+    The unit is one of `UCUM`, as micrometers, which dcmtk writes where it is not told; another, or none, is not named.
     """
     import pydicom
 
     with third_party("pydicom", file):
         found = pydicom.dcmread(io.BytesIO(data), force=True, specific_tags=["MeasurementUnitsCodeSequence"])
         code = next((str(item.get("CodeValue")) for item in found.get("MeasurementUnitsCodeSequence") or []), "")
-    return {"frame": "LPS"} | ({"unit": code} if code in LENGTHS else {})
+    return {"frame": "LPS"} | ({"unit": UCUM[code]} if code in UCUM else {})
 
 
 def read_encapsulated(data: bytes, file: str) -> Arrays:

@@ -12,7 +12,7 @@ from ...model.units import MM
 from ..colors import named_colors
 from ..files.atomic import replacing
 from ..files.source import third_party
-from ..volumes.nifti_frame import FLIP
+from ..frames import frame_in_file
 from .attributes import single_precision
 
 if TYPE_CHECKING:
@@ -23,13 +23,24 @@ if TYPE_CHECKING:
     from ...model.mesh import TriMesh
     from ..fields import Fields
     from .attributes import MeshAttributes
-    from .through_trimesh import Arrays
+    from .cells import Arrays
 
 SCANNER, UNKNOWN = "NIFTI_XFORM_SCANNER_ANAT", "NIFTI_XFORM_UNKNOWN"
 
 
+SURFACE = ".surf.gii"
+"""Ending of a surface for Connectome Workbench, which opens none that holds more than positions and triangles."""
+
+
+def is_bare(path: str | Path) -> bool:
+    """Whether a file holds positions and triangles alone by its ending, and no fields."""
+    return str(path).lower().endswith(SURFACE)
+
+
 def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write 32-bit coordinates in millimeters, RAS where the mesh has a patient frame, and the fields at vertices.
+
+    A ``.surf.gii`` has no fields: Connectome Workbench would not open it.
 
     The array of positions says which: ``NIFTI_XFORM_SCANNER_ANAT``, else ``NIFTI_XFORM_UNKNOWN``. No other array has a
     frame (GIFTI 1.0, 2.3.4), though nibabel gives one to each; ITK and gifti_tool complain of them.
@@ -41,20 +52,20 @@ def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None
     """
     from nibabel.gifti import GiftiCoordSystem, GiftiDataArray, GiftiImage, GiftiMetaData
 
-    placed, patient = _ras(mesh.vertices, beside)
-    space, unit = SCANNER if patient else UNKNOWN, "mm" if beside.unit in MM else beside.unit
-    head = replace(beside, unit=unit, frame="RAS" if patient else beside.frame).head
+    frame = frame_in_file(path, unit=beside.unit, frame=beside.frame)
+    patient = (frame.unit, frame.name) == ("mm", "RAS")
+    space, head = SCANNER if patient else UNKNOWN, replace(beside, unit=frame.unit, frame=frame.name).head
     points = GiftiDataArray(
-        single_precision(placed, path, kind="GIFTI"),
+        single_precision(frame.place(mesh.vertices), path, kind="GIFTI"),
         intent="NIFTI_INTENT_POINTSET",
         datatype="NIFTI_TYPE_FLOAT32",
         coordsys=GiftiCoordSystem(space, space, np.eye(4)),
-        meta=GiftiMetaData(written_by=head, coordinates="RAS, mm" if patient else unit),
+        meta=GiftiMetaData(written_by=head, coordinates="RAS, mm" if patient else frame.unit),
     )
     others = [GiftiDataArray(mesh.faces.astype(np.int32), "NIFTI_INTENT_TRIANGLE", "NIFTI_TYPE_INT32")]
     others += [
         GiftiDataArray(values, intent, "NIFTI_TYPE_FLOAT32", meta=GiftiMetaData(Name=name))
-        for name, intent, values in _arrays(beside.vertex_fields)
+        for name, intent, values in _arrays({} if is_bare(path) else beside.vertex_fields)
     ]
     for array in others:
         array.coordsys = None
@@ -63,20 +74,13 @@ def write_gifti(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None
         file.write(image.to_xml())
 
 
-def _ras(vertices: NDArray[np.float64], beside: MeshAttributes) -> tuple[NDArray[np.float64], bool]:
-    """Return the positions in millimeters, RAS, and whether the frame is a patient's."""
-    placed = vertices * MM.get(beside.unit, 1.0)
-    if beside.frame == "LPS":
-        placed = placed * np.diag(FLIP)[:3]
-    return placed, beside.frame in ("LPS", "RAS") and beside.unit in MM
-
-
 def _arrays(fields: Fields) -> list[tuple[str, str, NDArray[np.float32]]]:
     """Return name, intent and values; the three colors are one array of fractions."""
     colors = named_colors(fields)
     others = {name: values for name, values in fields.items() if not colors or name not in colors[0]}
-    found = [("color", "NIFTI_INTENT_RGB_VECTOR", (colors[1] / 255).astype(np.float32))] if colors else []
-    return found + [(name, "NIFTI_INTENT_NONE", values.astype(np.float32)) for name, values in others.items()]
+    found = [(name, "NIFTI_INTENT_NONE", values.astype(np.float32)) for name, values in others.items()]
+    # last: niivue takes all that follows the triangles for the frames of one overlay, of which it shows the first
+    return found + ([("color", "NIFTI_INTENT_RGB_VECTOR", (colors[1] / 255).astype(np.float32))] if colors else [])
 
 
 def read_gifti(data: bytes, file: str) -> Arrays:

@@ -16,7 +16,7 @@ from ..colors import linear, named_colors
 from ..files.atomic import replacing
 from ..files.source import third_party
 from .attributes import single_precision
-from .weld import weld
+from .cells import weld
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ...model.mesh import TriMesh
     from ..fields import Fields
     from .attributes import MeshAttributes
-    from .through_trimesh import Arrays
+    from .cells import Arrays
 
 UPRIGHT = ((1, 0, 0), (0, 0, 1), (0, -1, 0))
 """Rows of the rotation that brings z to y."""
@@ -32,8 +32,12 @@ UPRIGHT = ((1, 0, 0), (0, 0, 1), (0, -1, 0))
 TURNS = {"LPS": UPRIGHT, "RAS": ((-1, 0, 0), (0, 0, 1), (0, 1, 0))}
 """Frame to the rows of its rotation to +x left, +y superior, +z anterior; others stay as they are."""
 
-PLAIN = {"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0}, "name": "plain"}
-"""A white, dull material, which colors at vertices are multiplied by; without one a mesh is metal."""
+WHITE = [1.0, 1.0, 1.0, 1.0]
+PLAIN = {
+    "pbrMetallicRoughness": {"baseColorFactor": WHITE, "metallicFactor": 0.0, "roughnessFactor": 1.0}, "name": "plain",
+}  # fmt: skip
+"""A dull material, which colors at vertices are multiplied by; without one a mesh is metal. White is what it is anyway,
+but trimesh shows no mesh whose material does not say so."""
 
 OF_VERTICES, OF_FACES = 34962, 34963
 """What a block of numbers is for (glTF 2.0, 5.11.5): OpenGL's ARRAY_BUFFER and ELEMENT_ARRAY_BUFFER."""

@@ -11,19 +11,17 @@ import numpy as np
 from ...errors import FormatError
 from ..colors import named_colors
 from ..files.atomic import replacing
-from .weld import weld
+from .cells import fans, weld
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
-    from .through_trimesh import Arrays
+    from .cells import Arrays
 
-VERTEX, FACE = (["v"], ["V"]), (["f"], ["F"])
-"""The words that begin the lines of vertices and of faces."""
+VERTEX, FACE = (["v"], ["V"]), (["f"], ["F"], ["fo"])
+"""The words that begin the lines of vertices and of faces; old files name outlines of faces apart."""
 
 
 def write_obj(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
@@ -57,7 +55,7 @@ def read_obj_mesh(data: bytes, file: str) -> Arrays:
     try:
         vertices = np.array(places, np.float64).reshape(-1, 3)
         corners = np.array([corner for polygon in polygons for corner in polygon], np.int64)
-    except ValueError:
+    except (ValueError, OverflowError):  # of numbers beyond 64 bits
         raise FormatError("a vertex or a face cannot be understood", file=file, expected="numbers") from None
     sizes = np.array([len(polygon) for polygon in polygons], np.int64)
     if (corners == 0).any() or (sizes < 3).any():
@@ -71,28 +69,9 @@ def read_obj_mesh(data: bytes, file: str) -> Arrays:
 
 
 def unfolded(data: bytes, file: str) -> list[str]:
-    """Return the lines of a text, those joined that end with a backslash."""
+    """Return the lines of a text without comments, those joined that end with a backslash."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")  # names of materials may be in any code; the numbers are ASCII
-    return re.sub(r"\\[ \t]*\r?\n", " ", text).splitlines()
-
-
-def fans(corners: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Cut polygons into triangles around the first corner of each.
-
-    Parameters
-    ----------
-    corners : (c,) int64 array
-        The corners of all polygons, one after the other.
-    sizes : (p,) int64 array
-        Corners of each, at least 3.
-
-    Returns
-    -------
-    (c - 2p, 3) int64 array
-    """
-    first = np.repeat(np.cumsum(sizes) - sizes, sizes - 2)
-    step = np.arange(len(first)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
-    return np.asarray(corners[np.stack([first, first + step + 1, first + step + 2], axis=1)])
+    return [line.partition("#")[0] for line in re.sub(r"\\[ \t]*\r?\n", " ", text).splitlines()]

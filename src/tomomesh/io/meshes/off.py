@@ -1,4 +1,4 @@
-"""OFF: vertices and faces as text.
+"""OFF: vertices and faces as text, and what may stand behind each.
 
 Written by hand: trimesh's exporter rounds to ten digits. Neither comments nor colors (COFF): niivue shows nothing of
 files that have one, meshio and CloudCompare refuse some.
@@ -6,15 +6,53 @@ files that have one, meshio and CloudCompare refuse some.
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ...errors import FormatError
 from ..files.atomic import replacing
+from ..files.limits import require_rows
+from .cells import fans
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
+    from .cells import Arrays
+
+HEAD = re.compile(r"\s*(ST|C|N)*OFF\b(?!\s*BINARY)")
+"""The word that begins a file, and says what stands behind the three numbers of a vertex; it may be left out."""
+
+
+def read_off(data: bytes, file: str) -> Arrays:
+    """Read vertices and polygons, these cut into fans; comments, normals, colors and textures are passed over.
+
+    Raises
+    ------
+    FormatError
+        For a file that is cut off, or cannot be understood.
+    """
+    text = re.sub(r"#.*", "", data.decode("utf-8-sig", "replace"))
+    head = HEAD.match(text)
+    lines = [words for line in text[head.end() if head else 0 :].splitlines() if (words := line.split())]
+    try:
+        vertices, faces = (int(word) for word in (lines[0] if lines else [])[:2])
+        if min(vertices, faces) < 0:
+            raise ValueError(vertices, faces)
+        require_rows(vertices + faces, len(lines) - 1, "vertices and faces", file=file)
+        places = np.array([words[:3] for words in lines[1 : vertices + 1]], np.float64).reshape(-1, 3)
+        polygons = [words[1 : int(words[0]) + 1] for words in lines[vertices + 1 : vertices + faces + 1]]
+        corners = np.array([corner for polygon in polygons for corner in polygon], np.int64)
+    except (ValueError, OverflowError):  # of numbers beyond 64 bits
+        raise FormatError("the file cannot be understood", file=file, expected="OFF: vertices and faces") from None
+    sizes = np.array([len(polygon) for polygon in polygons], np.int64)
+    promised = np.array([int(words[0]) for words in lines[vertices + 1 : vertices + faces + 1]], np.int64)
+    if (sizes < 3).any() or not np.array_equal(sizes, promised):
+        raise FormatError("a face cannot be understood", file=file, expected="three vertices or more")
+    return places, fans(corners, sizes)
 
 
 def write_off(mesh: TriMesh, path: str | Path, _beside: MeshAttributes) -> None:

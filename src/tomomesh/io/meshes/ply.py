@@ -1,7 +1,8 @@
-"""PLY: its header, which says how many bytes must follow, and meshes in and out."""
+"""PLY: its header, which says how many bytes must follow, and meshes out."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,6 @@ from ..fields import AXES
 from ..files.atomic import replacing
 from ..files.limits import require_bytes
 from .attributes import narrowed
-from .through_trimesh import loaded
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from ...model.mesh import TriMesh
     from ..fields import Fields
     from .attributes import MeshAttributes
-    from .through_trimesh import Arrays
 
 TYPE_NAMES = {
     "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
@@ -38,6 +37,13 @@ TYPE_CODES = {
     "float64": "f8",
 }
 """Every name of a type to NumPy's code."""
+
+WRITTEN = ("u1", "i4", "u4", "f4", "f8")
+"""Codes of the types that are written: meshio's reader of binary files knows no other names of ours."""
+
+LINE_END = re.compile(rb"[ \t]*(\r\n|\n|\r)")
+"""The end of the header's last line: behind a lone carriage return the first row may begin with any byte but that of a
+line feed, which no format tells from the end of both."""
 
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 """The formats to their byte orders."""
@@ -106,7 +112,8 @@ def parse_header(data: bytes, *, file: str) -> PlyHeader:
         For a header that is broken, or promises more than there is.
     """
     end = data.find(b"end_header")
-    length = data.find(b"\n", end) + 1
+    line_end = LINE_END.match(data, end + len(b"end_header"))
+    length = line_end.end() if line_end else 0
     lines = [line.split() for line in data[: max(end, 0)].decode("ascii", "replace").splitlines()]
     if end < 0 or length == 0 or len(lines) < 2 or lines[0] != ["ply"]:
         raise FormatError("the file has no PLY header", file=file, expected="ply ... end_header")
@@ -140,12 +147,6 @@ def _elements(lines: list[list[str]]) -> list[PlyElement]:
     return [PlyElement(name, count, tuple(properties)) for name, count, properties in found]
 
 
-def read_ply_mesh(data: bytes, file: str) -> Arrays:
-    """Read vertices and faces, once the header is known to promise no more than there is."""
-    parse_header(data, file=file)
-    return loaded("ply", data, file)
-
-
 def write_ply_mesh(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write 64-bit coordinates, or 32-bit ones where asked for, with all fields, of vertices and of faces."""
     positions = dict(zip(AXES, narrowed(mesh.vertices, single=beside.single).T, strict=True))
@@ -168,7 +169,8 @@ def write_ply(
     comment : str
         Goes into the header.
     vertices : mapping of str to (n,) array
-        One column a property; integers that PLY has no type for become doubles.
+        One column a property; other small integers than bytes become ``int``, which every reader
+        knows, and integers that PLY has no type for doubles.
     faces : (m, 3) int array, optional
         Vertex numbers.
     face_fields : mapping of str to (m,) array, optional
@@ -189,8 +191,8 @@ def write_ply(
 
 
 def _storable(column: NDArray[Any]) -> NDArray[Any]:
-    """Return a column in a type that PLY has."""
-    if column.dtype.str[1:] in TYPE_NAMES:
+    """Return a column in a type that every reader of PLY knows."""
+    if column.dtype.str[1:] in WRITTEN:
         return column
     if column.dtype.kind == "f":
         return column.astype(np.float32 if column.dtype.itemsize < 4 else np.float64)

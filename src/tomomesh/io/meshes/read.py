@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 from ...errors import EmptyError, FormatError
 from ...model.mesh import TriMesh
 from ..files.source import existing_file, reader_of, whole
 from ..finite import check_finite
+from .cells import joined
 from .encapsulated import read_encapsulated
 from .gifti import read_gifti
 from .glb import read_glb
 from .obj import read_obj_mesh
-from .ply import read_ply_mesh
+from .off import read_off
+from .ply_rows import read_ply_mesh
 from .stl import read_stl
 from .threemf import read_3mf
-from .through_trimesh import loaded
 from .vtp import read_vtp_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from .through_trimesh import Arrays
+    from .cells import Arrays
 
 
 def read_mesh(path: str | Path) -> TriMesh:
@@ -33,7 +33,8 @@ def read_mesh(path: str | Path) -> TriMesh:
     ----------
     path : path
         ``.stl`` and DICOM Encapsulated STL, ``.dcm`` (equal positions become one vertex), ``.ply``, ``.obj``, ``.off``,
-        ``.vtp``, ``.3mf``, ``.glb`` or ``.gii``. Polygons are cut into triangles.
+        ``.vtp``, ``.3mf``, ``.glb`` or ``.gii``. Polygons are cut into triangles, and borders that lie on each other
+        are joined.
 
     Raises
     ------
@@ -66,14 +67,14 @@ def read_mesh(path: str | Path) -> TriMesh:
             expected=f"0 to {len(vertices) - 1}",
         )
     check_finite(vertices, "vertex", file=file)
-    return TriMesh(vertices, faces)
+    return TriMesh(*joined(vertices, faces))
 
 
 MESH_READERS: dict[str, Callable[[bytes, str], Arrays]] = {
     ".stl": read_stl,
     ".ply": read_ply_mesh,
     ".obj": read_obj_mesh,
-    ".off": partial(loaded, "off"),
+    ".off": read_off,
     ".dcm": read_encapsulated,
     ".vtp": read_vtp_mesh,
     ".3mf": read_3mf,

@@ -12,7 +12,7 @@ from ..fields import doubles
 from ..files.atomic import replacing
 from ..files.limits import require_bytes
 from .attributes import single_precision
-from .weld import weld
+from .cells import weld
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,10 +21,13 @@ if TYPE_CHECKING:
 
     from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
-    from .through_trimesh import Arrays
+    from .cells import Arrays
 
 FACE = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
 """One face of a binary STL file."""
+
+LONGEST_NAME = 2**16
+"""Bytes among which the first facet of a text must be; names of parts are lines of some dozen letters."""
 
 STL_HEADER_BYTES = 80
 """Bytes of text at the start of a binary STL file."""
@@ -33,10 +36,22 @@ BEFORE_FACES = STL_HEADER_BYTES + 4
 """Bytes before the first face: the text, and the count of faces."""
 
 
-BEGIN, CORNER = re.compile(rb"\s*solid\b", re.IGNORECASE), re.compile(rb"\svertex\s+(\S+\s+\S+\s+\S+)", re.IGNORECASE)
-NAMES = re.compile(rb"^[ \t]*(end[ \t]*)?solid\b[^\r\n]*", re.IGNORECASE | re.MULTILINE)
+BEGIN = re.compile(rb"(\xef\xbb\xbf)?\s*solid\b", re.IGNORECASE)
+"""How a text begins, behind the mark of UTF-8 that some editors put there."""
+
+CORNER = re.compile(rb"\svertex\s+(\S+\s+\S+\s+\S+)", re.IGNORECASE)
+NAMES = re.compile(
+    rb"(?:\A\xef\xbb\xbf|(?<!\S))(end[ \t]*)?solid\b[^\r\n]*?(?=[\r\n]|\Z|\bfacet\s+normal\b)", re.IGNORECASE
+)
+FILLED = re.compile(rb"\bfacet\b|\bend\s*solid\b", re.IGNORECASE)
+"""What stands in every text, and in no binary file but by chance."""
+
+UNCOUNTED = (0, 2**32 - 1)
+"""Counts of writers that did not know it when they wrote it: the faces go to the end of the file."""
+
 FACET, CLOSED = re.compile(rb"\bfacet\b", re.IGNORECASE), re.compile(rb"\bend\s*facet\b", re.IGNORECASE)
-"""What a text is made of: its begin, the three numbers behind a corner, the names of solids, facets and their ends."""
+"""What a text is made of: the three numbers behind a corner, the names of solids, facets and their ends. A name goes to
+the end of its line, or to the next facet where all is on one line."""
 
 
 def read_stl(data: bytes, file: str) -> Arrays:
@@ -58,13 +73,15 @@ def _is_text(data: bytes) -> bool:
     """Tell whether a file is text: headers of binary files may begin with ``solid`` too, but their length is told."""
     count = int(np.frombuffer(data, "<u4", 1, STL_HEADER_BYTES)[0]) if len(data) >= BEFORE_FACES else -1
     exact = len(data) == BEFORE_FACES + count * np.dtype(FACE).itemsize
-    return not exact and bool(BEGIN.match(data)) and bool(FACET.search(data, 0, 1000))
+    return not exact and bool(BEGIN.match(data)) and bool(FILLED.search(data, 0, LONGEST_NAME))
 
 
 def _binary_corners(data: bytes, file: str) -> NDArray[np.float64]:
     require_bytes(BEFORE_FACES, len(data), file=file)
-    count = int(np.frombuffer(data, "<u4", 1, STL_HEADER_BYTES)[0])
-    require_bytes(BEFORE_FACES + count * np.dtype(FACE).itemsize, len(data), file=file)
+    count, size = int(np.frombuffer(data, "<u4", 1, STL_HEADER_BYTES)[0]), np.dtype(FACE).itemsize
+    if count in UNCOUNTED and (len(data) - BEFORE_FACES) % size == 0:
+        count = (len(data) - BEFORE_FACES) // size
+    require_bytes(BEFORE_FACES + count * size, len(data), file=file)
     return doubles(np.frombuffer(data, FACE, count, BEFORE_FACES)["corners"].reshape(-1, 3))
 
 

@@ -24,6 +24,8 @@ from ..files.atomic import replacing
 from ..files.limits import require_memory
 from ..files.markup import parsed_xml
 from ..files.source import third_party
+from ..frames import frame_in_file
+from .attributes import single_precision
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
 
     from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
-    from .through_trimesh import Arrays
+    from .cells import Arrays
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 MATERIAL = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
@@ -66,13 +68,18 @@ IDENTITY, TRIPLE = "1 0 0 0 1 0 0 0 1 0 0 0", ("v1", "v2", "v3")
 """The place of what has none, as four rows of three; the corners of a triangle."""
 
 
+LARGEST_MM = 1e9
+"""Largest coordinate that lib3mf takes, with which MeshLab and others read."""
+
+
 def write_3mf(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write one object of 64-bit coordinates in millimeters, with colors at its corners where there are any.
 
     Raises
     ------
     OutputError
-        For coordinates of an unknown unit: 3MF has none without.
+        For coordinates of an unknown unit: 3MF has none without; and for such as its readers, which keep 32 bits,
+        could not tell apart.
     """
     if beside.unit not in MM:
         raise OutputError(
@@ -82,13 +89,29 @@ def write_3mf(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
             expected="a unit of length, as mm",
             hint="--units",
         )
-    sized = mesh.moved(MM[beside.unit] * mesh.vertices)
-    members = {**COMPANIONS, "3D/3dmodel.model": "".join(_model(sized, replace(beside, unit="mm")))}
+    frame = frame_in_file(path, unit=beside.unit, frame=beside.frame)
+    sized = mesh.moved(frame.place(mesh.vertices))
+    _check_readable(sized.vertices, path)
+    members = {**COMPANIONS, "3D/3dmodel.model": "".join(_model(sized, replace(beside, unit=frame.unit)))}
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in members.items():
             entry = zipfile.ZipInfo(name, FIRST_DAY)
             entry.create_system = 3  # else it names the machine's
             archive.writestr(entry, text, zipfile.ZIP_DEFLATED)
+
+
+def _check_readable(vertices: NDArray[np.float64], path: str | Path) -> None:
+    """Refuse coordinates that the file holds, and its readers do not: they keep 32 bits."""
+    largest = np.abs(vertices).max()
+    if largest > LARGEST_MM:
+        raise OutputError(
+            "programs refuse a 3MF file that lies so far from 0",
+            file=str(path),
+            found=f"largest coordinate = {largest:g} mm",
+            expected=f"at most {LARGEST_MM:g} mm",
+            hint="a .ply file, or --local-origin for a cloud",
+        )
+    single_precision(vertices, path, kind="3MF readers")
 
 
 def _model(mesh: TriMesh, beside: MeshAttributes) -> Iterator[str]:

@@ -17,7 +17,7 @@ from ..fields import IDS, doubles, flat_columns
 from ..files.atomic import replacing
 from ..files.source import whole
 from .attributes import narrowed
-from .obj import fans
+from .cells import fans, strips
 from .vtk_arrays import TYPES, PolyData
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from ...model.points import PointSet
     from ..fields import Cloud, Fields
     from .attributes import MeshAttributes
-    from .through_trimesh import Arrays
+    from .cells import Arrays
 
 VTK_TYPES = {code: name for name, code in TYPES.items()}
 """NumPy's codes of the types of numbers to VTK's names."""
@@ -47,24 +47,23 @@ def write_vtp_mesh(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> N
 
 
 def read_vtp_mesh(data: bytes, file: str) -> Arrays:
-    """Read the vertices and polygons of a file of anybody's, these cut into fans.
+    """Read the vertices, polygons and strips of a file of anybody's, these cut into triangles.
 
     Raises
     ------
     FormatError
-        For a file that is none of VTK's polygons, or is broken, and for one with strips of triangles.
+        For a file that is none of VTK's polygons, or is broken.
     """
     parsed = PolyData.parsed(data, file)
     vertices, faces, first = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
     for piece in parsed.pieces:
-        if int(piece.get("NumberOfStrips", 0)):
-            raise FormatError("strips of triangles are not read", file=file, expected="polygons")
-        cells = parsed.arrays(piece, "Polys")
-        corners, ends = (np.array(cells.get(name, np.empty(0)), np.int64) for name in ("connectivity", "offsets"))
-        sizes = np.diff(ends, prepend=0)
-        if (sizes < 3).any() or sizes.sum() != len(corners):
-            raise FormatError("the polygons cannot be understood", file=file)
-        faces.append(fans(corners + first, sizes))
+        for kind, cut in (("Polys", fans), ("Strips", strips)):
+            cells = parsed.arrays(piece, kind)
+            corners, ends = (np.array(cells.get(name, np.empty(0)), np.int64) for name in ("connectivity", "offsets"))
+            sizes = np.diff(ends, prepend=0)
+            if (sizes < 3).any() or sizes.sum() != len(corners):
+                raise FormatError("the polygons cannot be understood", file=file)
+            faces.append(cut(corners + first, sizes))
         vertices.append(_positions(parsed, piece))
         first += len(vertices[-1])
     return np.concatenate(vertices), np.concatenate(faces)

@@ -9,7 +9,7 @@ from ..fields import AXES, flat_columns
 from ..files.atomic import check_output
 from ..files.source import suffix_of
 from .attributes import MeshAttributes
-from .gifti import write_gifti
+from .gifti import is_bare, write_gifti
 from .glb import write_glb
 from .obj import write_obj
 from .off import write_off
@@ -46,12 +46,12 @@ def write_mesh(
         Its coordinates are written as they are.
     path : path
         ``.ply`` and ``.vtp`` (binary), ``.obj``, ``.off`` and ``.3mf`` (text) keep 64-bit coordinates; ``.stl``,
-        ``.glb`` and ``.gii`` (binary; Connectome Workbench wants ``.surf.gii``) 32-bit ones.
+        ``.glb`` and ``.gii`` (binary; Connectome Workbench wants ``.surf.gii``) 32-bit ones, as do 3MF's readers.
     unit, frame : str
         What the coordinates are in, named in the file; OFF has no place for it.
     vertex_fields : mapping of str to (n,) or (n, c) array, optional
         Numbers at the vertices. PLY, VTP, GLB and GIFTI keep them all, OBJ and 3MF the colors (``red``, ``green`` and
-        ``blue``), STL and OFF none.
+        ``blue``), STL, OFF and ``.surf.gii`` none.
     face_fields : mapping of str to (m,) or (m, c) array, optional
         Numbers on the faces, kept by PLY and VTP.
     z_up : bool
@@ -92,6 +92,8 @@ KEEP_COLORS = (".obj", ".3mf")
 def keeps(path: str | Path, field: str, *, on_faces: bool = False) -> bool:
     """Whether the format of a mesh file keeps a field."""
     suffix = suffix_of(path)
+    if is_bare(path):
+        return False
     if on_faces or suffix in KEEP_ALL:
         return suffix in KEEP_ALL
     return suffix in KEEP_AT_VERTICES or (suffix in KEEP_COLORS and field in COLORS)

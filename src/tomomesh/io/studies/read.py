@@ -205,6 +205,7 @@ def _read_slices(slices: Slices, settings: ReadSettings, select: Sequence[int] |
         file=study,
         found=counted(others),
         expected=READABLE,
+        hint="the file of the volume itself, not its folder" if volumes_among(slices.rest) else "",
     )
 
 

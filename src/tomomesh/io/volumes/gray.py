@@ -15,15 +15,20 @@ if TYPE_CHECKING:
 WHITE_IS_ZERO = 0
 """TIFF's photometric interpretation of pictures whose low numbers are bright."""
 
+ONE_BIT = "pixels of one bit: a mask of 0 and 1"
+"""The note on them."""
+
 
 def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
-    """Return real numbers in the machine's own byte order.
+    """Return real numbers in the machine's own byte order; truth values are 0 and 1.
 
     Raises
     ------
     FormatError
         For complex and other kinds of voxels.
     """
+    if voxels.dtype == np.bool_:
+        return np.minimum(voxels.view(np.uint8), 1)
     if voxels.dtype.kind not in "iuf" or voxels.dtype.itemsize > 8:
         raise FormatError(
             "the voxels are of a kind that cannot be read",
@@ -41,7 +46,7 @@ def bright_is_high(voxels: NDArray[Any], bits: int) -> tuple[NDArray[Any], tuple
     ----------
     voxels : array
     bits : int
-        Of a number that is WhiteIsZero; 0 for other pages.
+        Of a number that is WhiteIsZero, 0 for other pages; 1 for all pages of single bits.
 
     Returns
     -------
@@ -54,7 +59,7 @@ def bright_is_high(voxels: NDArray[Any], bits: int) -> tuple[NDArray[Any], tuple
     if not bits:
         return voxels, ()
     if bits == 1:
-        return voxels, ("low bits are bright (WhiteIsZero): taken for a mask, as they are",)
+        return voxels, (ONE_BIT,)
     if voxels.dtype.kind != "u":
         return voxels, (f"low gray levels are bright (WhiteIsZero): {voxels.dtype} numbers are left as they are",)
     black = voxels.dtype.type(2**bits - 1)

@@ -10,10 +10,11 @@ from ...errors import FormatError, GeometryError, ResourceError
 from ...model.volume import Volume
 from ...settings import ReadSettings
 from ..files.limits import require_memory
-from ..files.source import existing_file, suffix_of, third_party
+from ..files.source import existing_file, first_bytes, suffix_of, third_party
 from .affine import required_spacing, upright
 from .gray import WHITE_IS_ZERO, bright_is_high, native, without_holes
 from .slice_names import in_order
+from .tiff import read_page
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,10 +26,16 @@ FAMILIES = {".png": "PNG", ".tif": "TIFF", ".tiff": "TIFF", ".jpg": "JPEG", ".jp
 """Suffixes of slices, and the format behind each."""
 
 CONVERTED_MODES = {"RGB": "RGB", "RGBA": "RGB", "P": "RGB", "1": "L", "LA": "L"}
-"""Pillow's modes that are turned into another before they are read."""
+"""Pillow's modes that are turned into another before they are read; but for TIFF's bits."""
 
-PHOTOMETRIC, BITS = 262, 258
-"""Numbers of TIFF's fields that say which numbers are bright, and how many bits one has."""
+PHOTOMETRIC, BITS, SAMPLE_FORMAT = 262, 258, 339
+"""Numbers of TIFF's fields that say which numbers are bright, how many bits one has, and of which kind it is."""
+
+AS_STORED = {("L", 2): np.int8, ("I", 1): np.uint32}
+"""Pillow's modes that do not tell whether numbers have a sign, with TIFF's kind of numbers (2 has one), of 32 bits."""
+
+TIFF_MARKS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+"""First bytes of TIFF files."""
 
 GRAY_MODES = ("L", "I", "F", "I;16", "I;16B", "I;16L")
 """Pillow's modes of one channel."""
@@ -77,7 +84,7 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
         pixels, more = _pixels(path)
         _check_same_kind(pixels, first, path.name, ordered[0].name)
         stack[k], turned = pixels, turned or more
-    voxels, notes = without_holes(stack, file=folder)
+    voxels, notes = without_holes(native(stack, file=folder), file=folder)
     note = f"{len(ordered)} {kinds[0]} slices in the order of their names: columns left, rows back, slices up"
     return Volume.from_stored(voxels, upright(spacing), notes=(note, *told, *turned, *notes))
 
@@ -101,19 +108,25 @@ def read_picture(path: str | Path) -> Volume:
 
 def _pixels(path: Path) -> tuple[NDArray[Any], tuple[str, ...]]:
     """Return one slice, (J, I) or (J, I, 3), and whether its gray levels were turned over."""
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     with third_party("Pillow", path.name):
         try:
             image = Image.open(path, formats=tuple(set(FAMILIES.values())))
         except Image.DecompressionBombError:
             raise ResourceError("the slice is too large to be read", file=path.name) from None
+        except UnidentifiedImageError:
+            if first_bytes(path, 4) not in TIFF_MARKS:
+                raise
+            return read_page(path)  # kinds of numbers that Pillow does not know
         with image:
             require_memory(image.width * image.height * 4, file=path.name)
             if getattr(image, "n_frames", 1) > 1:
                 raise FormatError("the file holds several pages", file=path.name, expected="one slice a file")
             image.load()
-            pixels = np.asarray(image.convert(CONVERTED_MODES[image.mode]) if image.mode in CONVERTED_MODES else image)
+            mask = image.mode == "1" and image.format == "TIFF"
+            convert = image.mode in CONVERTED_MODES and not mask
+            pixels = np.asarray(image.convert(CONVERTED_MODES[image.mode]) if convert else image)
             if image.mode not in CONVERTED_MODES and image.mode not in GRAY_MODES:
                 raise FormatError(
                     "the slice's colors cannot be read",
@@ -123,6 +136,11 @@ def _pixels(path: Path) -> tuple[NDArray[Any], tuple[str, ...]]:
                 )
             fields = getattr(image, "tag_v2", {})
             bits = fields.get(BITS, (1,))[0] if fields.get(PHOTOMETRIC) == WHITE_IS_ZERO else 0
+    if mask:
+        return bright_is_high(pixels ^ bool(bits), 1)  # Pillow has turned over what is WhiteIsZero
+    kind = AS_STORED.get((image.mode, fields.get(SAMPLE_FORMAT, (1,))[0]))
+    if kind and fields.get(BITS) == (8 * np.dtype(kind).itemsize,):
+        pixels = pixels.view(kind)
     pixels = native(pixels, file=path.name)
     if bits and pixels.dtype == np.uint8:
         pixels = 255 - pixels  # Pillow has turned them over

@@ -12,10 +12,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import FormatError, GeometryError
+from ...model.units import millimeters
 from ...model.volume import Volume
 from ..files.detached import beside, check_count, numbered
 from ..files.unpack import PLAIN, ZLIB
-from .affine import GIVEN, SPACING_HINT, UNTURNED, check_affine, check_spacing, passed_over, required_spacing, upright
+from .affine import (
+    GIVEN,
+    SPACING_HINT,
+    UNTURNED,
+    brought_to_mm,
+    check_affine,
+    check_spacing,
+    passed_over,
+    required_spacing,
+    upright,
+)
 from .raster import TEXT, Raster, floats_of, gray_or_color, header_bytes, read_raster, sizes_of
 
 if TYPE_CHECKING:
@@ -68,7 +79,7 @@ def read_metaimage(path: Path, settings: ReadSettings) -> Volume:
     affine, notes = _frame(fields, settings, name)
     channels = _channels(fields, name)
     stored = read_raster(_raster(fields, (*sizes[::-1], channels), path, start, length), file=name)
-    voxels, more = gray_or_color(stored, channels, file=name)
+    voxels, more = gray_or_color(stored, channels, file=name, named=False)
     return Volume.from_stored(voxels, affine, notes=notes + more)
 
 
@@ -112,12 +123,23 @@ def _frame(fields: HeaderFields, settings: ReadSettings, name: str) -> tuple[NDA
         return upright(required_spacing(settings.spacing, file=name)), (GIVEN,)
     check_spacing(spacing.tolist(), [f"ElementSpacing[{n}]" for n in range(3)], file=name, hint=SPACING_HINT)
     matrix, origin = _numbers(fields, DIRECTIONS, 2, name), _numbers(fields, ORIGINS, 1, name)
-    affine = np.eye(4)
+    affine, (factor, brought) = np.eye(4), _unit(fields, name)
     affine[:3, :3] = (np.eye(3) if matrix is None else matrix.T) * spacing
     affine[:3, 3] = 0.0 if origin is None else origin
+    affine[:3] *= factor
     check_affine(affine, file=name, hint="a file with a valid TransformMatrix")
     notes = (UNTURNED,) if matrix is None else ()
-    return affine, notes + passed_over(settings.spacing)
+    return affine, notes + brought + passed_over(settings.spacing)
+
+
+def _unit(fields: HeaderFields, name: str) -> tuple[float, tuple[str, ...]]:
+    """Return the millimeters in the file's unit, and a note; none, or a question mark, is taken for millimeters."""
+    unit = fields.get("DistanceUnits", "?").strip()
+    factor = 1.0 if unit in ("", "?") else millimeters(unit)
+    if factor is None:
+        found = f"DistanceUnits = {unit[:80]}"
+        raise GeometryError("the unit of the coordinates is unknown", file=name, found=found, expected="um | mm | cm")
+    return factor, brought_to_mm(factor)
 
 
 def _numbers(fields: HeaderFields, names: tuple[str, ...], rank: int, name: str) -> NDArray[np.float64] | None:

@@ -9,8 +9,8 @@ import numpy as np
 from ...errors import FormatError
 from ...model.volume import Volume
 from ..files.limits import require_bytes
-from ..files.source import existing_file, suffix_of, third_party
-from ..files.unpack import GZIP, PLAIN, check_promise, fill, unpacked
+from ..files.source import existing_file, third_party
+from ..files.unpack import check_promise, fill, packing_of, unpacked
 from .affine import check_affine, check_spacing, passed_over
 from .gray import native, without_holes
 from .nifti_frame import FLIP
@@ -58,7 +58,7 @@ def read_mgh(path: Path, settings: ReadSettings) -> Volume:
         As the header or the voxels demand.
     """
     path, name = existing_file(path), str(path)
-    packing = GZIP if suffix_of(path) == ".mgz" else PLAIN
+    packing = packing_of(path)
     with unpacked(path, packing, file=name) as stream:
         start = stream.read(MGH_HEADER_BYTES)
         header = _header(start, name)

@@ -11,7 +11,7 @@ from ...errors import FormatError
 from ...model.volume import Volume
 from ..files.detached import beside
 from ..files.source import existing_file, suffix_of
-from ..files.unpack import GZIP, PLAIN, check_promise, fill, unpacked
+from ..files.unpack import check_promise, fill, packing_of, unpacked
 from .gray import native, scaled, scaled_dtype, without_holes
 from .nifti_frame import frame_of
 from .nifti_header import NIFTI_HEADERS, NiftiLayout, layout_of, unpack_header
@@ -52,26 +52,22 @@ def read_nifti(path: Path, settings: ReadSettings) -> Volume:
     """
     name = str(path)
     front, back = _files(existing_file(path))
-    with unpacked(front, _packing(front), file=name) as stream:
+    with unpacked(front, packing_of(front), file=name) as stream:
         header = unpack_header(stream.read(max(NIFTI_HEADERS)), settings, paired=front != back, file=name)
     layout = layout_of(header, paired=front != back, file=name)
     affine, notes, other = frame_of(header, settings, layout.shape, name)
-    check_promise(layout.offset + layout.promised, back.stat().st_size, _packing(back), file=name)
+    check_promise(layout.offset + layout.promised, back.stat().st_size, packing_of(back), file=name)
     data = np.empty(layout.promised, np.uint8)
-    with unpacked(back, _packing(back), file=name) as stream:
+    with unpacked(back, packing_of(back), file=name) as stream:
         stream.seek(layout.offset)
         fill(data, stream, file=name)
     stored, more = _gray(data, layout, name)
     return replace(Volume.from_stored(stored, affine, notes=notes + layout.notes + more), other_frame=other)
 
 
-def _packing(path: Path) -> str:
-    return GZIP if suffix_of(path).endswith(".gz") else PLAIN
-
-
 def _files(path: Path) -> tuple[Path, Path]:
     """Return the file with the header and that with the voxels; never one outside of the folder."""
-    plain = path.with_suffix("") if _packing(path) == GZIP else path
+    plain = path.with_suffix("") if suffix_of(path).endswith(".gz") else path
     suffix = plain.suffix.lower()
     if suffix not in PAIRED:
         return path, path

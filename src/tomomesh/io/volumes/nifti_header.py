@@ -135,12 +135,13 @@ def _shape(header: Any, file: str) -> tuple[int, int, int]:
         raise FormatError("the sizes of the volume are invalid", file=file, found=f"dim = {dim}", expected="all over 0")
     sizes = [*dim[1 : ndim + 1], 1][: max(ndim, 3)]
     if any(size > 1 for size in sizes[3:]):
+        several = "values a voxel" if max(sizes[4:], default=1) > 1 else "frames"
         raise FormatError(
-            "the file holds several frames",
+            f"the file holds several {several}",
             file=file,
             found=f"dim = {sizes}",
             expected="one volume",
-            hint="one frame, written to a file of its own",
+            hint="one of them, written to a file of its own",
         )
     return sizes[0], sizes[1], sizes[2]
 

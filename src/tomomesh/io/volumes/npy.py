@@ -17,8 +17,12 @@ if TYPE_CHECKING:
     from ...settings import ReadSettings
 
 
+COLORS = (1, 3, 4)
+"""Numbers of a voxel behind its place: gray, a color, a color with its opacity."""
+
+
 def read_npy_volume(path: Path, settings: ReadSettings) -> Volume:
-    """Read an array (K, J, I), or (K, J, I, L) with 3 or 4 colors, from a ``.npy`` file.
+    """Read an array (K, J, I), or (K, J, I, L) with 3 or 4 colors, also behind axes of one, from a ``.npy`` file.
 
     Parameters
     ----------
@@ -39,7 +43,8 @@ def read_npy_volume(path: Path, settings: ReadSettings) -> Volume:
     """
     name = str(path)
     shape, by_columns, dtype, start = npy_header(header_bytes(path), file=name)
-    if len(shape) not in (3, 4) or 0 in shape:
+    plain = _without_ones(shape)
+    if len(plain) not in (3, 4) or 0 in shape:
         raise FormatError(
             "the array is no volume",
             file=name,
@@ -48,6 +53,13 @@ def read_npy_volume(path: Path, settings: ReadSettings) -> Volume:
         )
     spacing = required_spacing(settings.spacing, file=name, what="NPY arrays hold no spacing")
     numbers = read_raster(Raster(shape[::-1] if by_columns else shape, dtype, PLAIN, (path,), start), file=name)
-    stored = (numbers.T if by_columns else numbers).reshape(*shape[:3], -1)
-    voxels, notes = gray_or_color(stored, stored.shape[3], file=name)
+    stored = (numbers.T if by_columns else numbers).reshape(*plain[:3], -1)
+    voxels, notes = gray_or_color(stored, stored.shape[3], file=name, named=False)
     return Volume.from_stored(voxels, upright(spacing), notes=(GIVEN, *notes))
+
+
+def _without_ones(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Drop axes of one before the slices, as neural networks have them for batches and channels."""
+    while len(shape) > (4 if shape[-1] in COLORS else 3) and shape[0] == 1:
+        shape = shape[1:]
+    return shape

@@ -174,13 +174,25 @@ def _from_digits(raster: Raster, part: Path, file: str) -> bytes:
     return found
 
 
-def gray_or_color(stored: NDArray[Any], channels: int, *, file: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+def many_levels(stored: NDArray[Any]) -> bool:
+    """Tell whether a layer of bytes (K, J, I, channels) has more levels than a mask."""
+    layers = np.moveaxis(stored, 3, 0) if stored.dtype == np.uint8 else ()
+    return any(np.count_nonzero(np.bincount(layer.ravel(), minlength=256)) > 2 for layer in layers)
+
+
+def gray_or_color(
+    stored: NDArray[Any], channels: int, *, file: str, named: bool = True
+) -> tuple[NDArray[Any], tuple[str, ...]]:
     """Return voxels (K, J, I), or (K, J, I, 3) of bytes, from an array whose last axis is that of the channels.
 
     Parameters
     ----------
     stored : (K, J, I, channels) array
         One number a voxel, or the 3 of a color, or 4 with its opacity, which is dropped.
+    channels : int
+    file : str
+    named : bool
+        Whether the file says that a color is one. Else layers of two levels each are masks, as of one-hot labels.
 
     Raises
     ------
@@ -191,12 +203,12 @@ def gray_or_color(stored: NDArray[Any], channels: int, *, file: str) -> tuple[ND
     """
     if channels == 1:
         return without_holes(stored[..., 0], file=file)
-    if channels in (3, 4) and stored.dtype == np.uint8:
+    if channels in (3, 4) and stored.dtype == np.uint8 and (named or many_levels(stored)):
         return stored[..., :3], ()
     raise FormatError(
         "the file holds several values a voxel",
         file=file,
         found=f"values = {channels} of {stored.dtype}",
         expected="one gray level, or a color of 3 or 4 bytes",
-        hint="one of them, written to a file of its own",
+        hint="one of them, written to a file of its own; of masks, the number of the mask as one label map",
     )

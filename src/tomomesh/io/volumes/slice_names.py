@@ -23,6 +23,9 @@ WHOLE = re.compile(r"()([0-9]+)()()()")
 CHAIN = re.compile(r"[0-9][.,p][0-9]+[.,p][0-9]")
 """Numbers with dots between, as in versions and identifiers: no fractions."""
 
+WORDS = "the names differ in more than their numbers: they are in the order of their words and numbers"
+"""What is said where numbers alone do not tell the order."""
+
 EVENLY = Decimal("0.05")
 """Part of a step by which numbers may be off a whole number of steps: the rounding of a name, as 0.33 for a third."""
 
@@ -58,7 +61,7 @@ def in_order(files: Sequence[Path]) -> tuple[list[Path], tuple[str, ...]]:
     stems = [path.stem for path in files]
     numbers = _by_value(stems) or _by_parts(stems) or _hexadecimal(stems)
     if numbers is None:
-        return sorted(files, key=natural), ()
+        return sorted(files, key=natural), (WORDS,) * any(map(WHOLE.search, stems))
     rows = numbers.rows
     order = sorted(range(len(files)), key=lambda n: (rows[n], str(files[n])))
     notes = (numbers.note, *_gaps([rows[n] for n in order]))
@@ -109,13 +112,12 @@ def _between_words(stems: Sequence[str], number: re.Pattern[str]) -> list[list[r
 
 
 def _are_fractions(field: Sequence[re.Match[str]]) -> bool:
-    """Tell whether what follows the dots is a fraction: as many digits in all names, or none that end in 0.
+    """Tell whether what follows the dots is a fraction: as many digits wherever there is one, or none that end in 0.
 
-    1.9 and 1.10 are parts 9 and 10 of something.
+    1.9 and 1.10 are parts 9 and 10 of something; 1, 1.50 and 2 are none.
     """
-    ends = [one[4] for one in field]
-    some = [end for end in ends if end]
-    return len({len(end or "") for end in ends}) == 1 or not any(end.endswith("0") for end in some)
+    ends = [one[4] for one in field if one[4]]
+    return len(set(map(len, ends))) < 2 or not any(end.endswith("0") for end in ends)
 
 
 def _have_signs(field: Sequence[re.Match[str]]) -> bool:
@@ -155,7 +157,8 @@ def _gaps(rows: Sequence[tuple[Decimal, ...]]) -> tuple[str, ...]:
     if not least:
         return ("several slices have the same number in their names",)
     counts = [round(step / least) for step in steps]
-    if any(abs(step / least - count) > EVENLY for step, count in zip(steps, counts, strict=True)):
+    wide = sum(count > 1 for count in counts)
+    if 2 * wide > len(counts) or any(abs(a / least - b) > EVENLY for a, b in zip(steps, counts, strict=True)):
         told = f"{float(least):g} to {float(max(steps)):g} apart"
         return (f"the numbers in the names are {told}: the slices are taken as even",)
     gone = [

@@ -29,10 +29,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from ...settings import ReadSettings
 
-STACKS = tuple(pages + rest for pages in "ZIQ" for rest in ("YX", "YXS", "SYX"))
-"""tifffile's letters for the axes of a stack: Z, or pages of an unknown kind; S is a color, which may be planar."""
+SLICES = "ZIQ"
+"""tifffile's letters for the axis of a stack: Z, or pages of an unknown kind."""
 
 UNPACKED_WITHOUT = (1, 8, 32946)
 """Compressions, none and deflate, that need no further package."""
@@ -66,22 +68,52 @@ def read_tiff(path: Path, settings: ReadSettings) -> Volume:
         As the pages demand; `FormatError` too where the package is not installed.
     """
     name = str(existing_file(path))
+    with _opened(path, name) as pages:
+        found = _stack(pages.series, name)
+        spacing, notes = _spacing(pages, settings, name)
+        stored, more = _stored(found, path, name)
+    return Volume.from_stored(stored, upright(spacing), notes=notes + more)
+
+
+def read_page(path: Path) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """Return the pixels (J, I), or (J, I, 3), of a file of one page, and notes.
+
+    Raises
+    ------
+    FormatError, ResourceError
+        As the page demands; `FormatError` too where the package is not installed.
+    """
+    with _opened(path, path.name) as pages:
+        if len(pages.pages) > 1:
+            raise FormatError("the file holds several pages", file=path.name, expected="one slice a file")
+        stored, notes = _stored(pages.series[:1], path, path.name)
+    return stored[0], notes
+
+
+@contextmanager
+def _opened(path: Path, name: str) -> Iterator[Any]:
     tifffile = required("tifffile", file=name)
     check_chain(path, file=name)
     with _complaints_refused(name), third_party("tifffile", name), tifffile.TiffFile(path, _multifile=False) as pages:
-        series = _only(pages.series, name)
-        _check_promise(series, path.stat().st_size, name)
-        spacing, notes = _spacing(pages, settings, name)
-        stored = series.asarray()
-        if stored.shape != series.shape:
-            raise ValueError(stored.shape)
-        keyframe, axes = series.keyframe, series.axes
-    stored = native(stored.view(np.uint8) if stored.dtype == np.bool_ else stored, file=name)
-    bits = keyframe.bitspersample if keyframe.photometric == WHITE_IS_ZERO else 0
+        yield pages
+
+
+def _stored(found: list[Any], path: Path, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """Return the voxels (K, J, I), or (K, J, I, 3), of a stack, and notes."""
+    require_memory(sum(one.nbytes for one in found), file=name)
+    for one in found:
+        _check_promise(one, path.stat().st_size, name)
+    parts = [one.asarray() for one in found]
+    if any(part.shape != one.shape for part, one in zip(parts, found, strict=True)):
+        raise ValueError(parts[0].shape)
+    keyframe, page = found[0].keyframe, found[0].shape[found[0].ndim - len(_page_axes(found[0])) :]
+    stored = (parts[0] if len(parts) == 1 else np.stack(parts)).reshape(-1, *page)
+    stored = native(stored, file=name)
+    bits = keyframe.bitspersample if keyframe.photometric == WHITE_IS_ZERO or keyframe.bitspersample == 1 else 0
     stored, turned = bright_is_high(stored, bits)
-    stored = np.moveaxis(stored, 1, -1) if axes.endswith("SYX") else stored.reshape(*stored.shape[:3], -1)
+    stored = np.moveaxis(stored, 1, -1) if _page_axes(found[0]) == "SYX" else stored.reshape(*stored.shape[:3], -1)
     voxels, more = gray_or_color(stored, stored.shape[3], file=name)
-    return Volume.from_stored(voxels, upright(spacing), notes=notes + turned + more)
+    return voxels, turned + more
 
 
 class _Complaints(logging.Handler):
@@ -119,9 +151,12 @@ def _complaints_refused(name: str) -> Iterator[None]:
         )
 
 
-def _only(found: list[Any], name: str) -> Any:
-    """Return the one stack of a file."""
-    if len(found) != 1:
+def _stack(series: list[Any], name: str) -> list[Any]:
+    """Return the one stack of a file, or the pages of one size that were written one by one; none that is a preview."""
+    found = [one for one in series if not one.keyframe.is_reduced] or series
+    kinds = {(one.kind, one.axes, one.shape, one.dtype) for one in found}
+    alone = found[0].kind == "shaped" and not _before_page(found[0])  # as tifffile writes pages one by one
+    if len(found) > 1 and (len(kinds) > 1 or not alone):
         raise FormatError(
             "the file holds several images",
             file=name,
@@ -129,24 +164,36 @@ def _only(found: list[Any], name: str) -> Any:
             expected="one stack of pages of one size",
             hint="one stack, written to a file of its own",
         )
-    if found[0].axes in ("YX", "YXS", "SYX"):
+    before = "".join(_before_page(found[0]))
+    if len(found) == 1 and not before:
         raise FormatError("the file holds one slice", file=name, hint="the folder of the slices")
-    if found[0].axes not in STACKS:
+    if len(before) > 1 or before.strip(SLICES):
         raise FormatError(
-            "the file holds several frames",
+            f"the file holds several {'channels' if before.strip(SLICES) == 'C' else 'frames'}",
             file=name,
             found=f"axes = {found[0].axes}, shape = {found[0].shape}",
             expected="slices, rows and columns",
-            hint="one frame, written to a file of its own",
+            hint="one of them, written to a file of its own",
         )
-    return found[0]
+    return found
+
+
+def _page_axes(series: Any) -> str:
+    """Return the letters of the axes within a page; S is a color, which may be planar."""
+    return next(axes for axes in ("SYX", "YXS", "YX", series.axes) if series.axes.endswith(axes))
+
+
+def _before_page(series: Any) -> list[str]:
+    """Return the letters of the axes before those of a page along which there is more than one."""
+    before = len(series.axes) - len(_page_axes(series))
+    return [axis for axis, size in zip(series.axes[:before], series.shape[:before], strict=True) if size > 1]
 
 
 def _check_promise(series: Any, size: int, name: str) -> None:
     """Compare what the pages promise with the memory and with the file's bytes."""
     keyframe = series.keyframe
     chunk = math.prod(keyframe.chunks) * keyframe.dtype.itemsize
-    require_memory(max(series.nbytes, chunk), file=name)
+    require_memory(chunk, file=name)
     if series.dataoffset is not None:
         require_bytes(series.dataoffset + series.nbytes, size, file=name)
         return

@@ -27,6 +27,11 @@ BLUNT = 0.6
 half of it. Only what is told depends on it."""
 NAMED = 6
 """Empty slices that are named at most, so that a note stays a line."""
+ALONE = 0.05
+"""Share of the voxels without a neighbor across an axis over which some labels are taken for drawn on slices alone.
+Measured: 0.0001 to 0.004 of whole bodies, 0.1 where one of two bodies is drawn on every eighth slice."""
+BESIDE = 2
+"""Pixels around what was drawn on a slice within which what is not drawn is outside: curves are smoothed by less."""
 WIDEST = 4.0
 """Depths beyond which nothing is told, in voxels: two more than what tells a border from a mask's."""
 
@@ -52,6 +57,8 @@ class Gaps:
         gone = np.setdiff1d(np.arange(self.labelled[0], self.labelled[-1]), self.labelled)
         named = ", ".join(map(str, gone[:NAMED].tolist())) + (", ..." if len(gone) > NAMED else "")
         across = ("slices", "rows", "columns")[self.axis]
+        if not len(gone):
+            return f"some of the labels lie on {across} alone, between {across} that hold none of theirs"
         return f"{len(gone)} {across} are empty between {len(self.labelled)} that hold labels ({named})"
 
 
@@ -113,7 +120,7 @@ def filled_slices(mask: Mask, study: Volume, *, threads: int = 0, progress: Prog
     UsageError
         Where no slice is empty between others, or the labels lie on one slice alone.
     """
-    found = gaps_in(mask) or next((gaps for axis in range(3) if (gaps := _any_gaps(mask, axis))), None)
+    found = gaps_in(mask) or _likeliest_gaps(mask)
     if found is None:
         raise UsageError(
             "no slice without labels lies between others", found="--fill-slices",
@@ -127,16 +134,39 @@ def filled_slices(mask: Mask, study: Volume, *, threads: int = 0, progress: Prog
     )
     slices = Slices(
         np.zeros(3), np.eye(3), heights[found.labelled], np.zeros(len(rings), np.int64), np.empty(0, np.int64),
-        min(columns, rows), rings, complete=True,
+        min(columns, rows), rings, sparse=True,
     )  # fmt: skip
     levels, low, edge = solid_between(slices, heights, threads=threads, progress=progress)
     depths = _resampled(levels, low, edge, (rows, columns), planes.shape)
+    depths[found.labelled] = _as_drawn(depths[found.labelled], planes[found.labelled])
     return replace(study, voxels=np.moveaxis(depths, 0, found.axis)), f"{found.told}: they were interpolated"
 
 
-def _any_gaps(mask: Mask, axis: int) -> Gaps | None:
+def _as_drawn(depths: NDArray[np.float32], drawn: Mask) -> NDArray[np.float32]:
+    """Give the pixels that are not on the side where they were drawn the depth that a pixel alone has.
+
+    Those away from all that was drawn on their slice may be of a body that was drawn on others.
+    """
+    alone = np.where(drawn, np.float32(0.5), np.float32(-0.5))
+    beside = ndimage.binary_dilation(drawn, np.ones((1, 3, 3), np.bool_), iterations=BESIDE)
+    return np.where(beside & (drawn != (depths > 0)), alone, depths)
+
+
+def _likeliest_gaps(mask: Mask) -> Gaps | None:
+    """Find the axis across which most voxels have no neighbor; None where hardly any, and no slice, is alone."""
+    alone = [_alone_across(mask, axis) for axis in range(mask.ndim)]
+    axis = int(np.argmax(alone))
     labelled = np.flatnonzero(mask.any(axis=tuple(other for other in range(mask.ndim) if other != axis)))
-    return Gaps(axis, labelled) if (np.diff(labelled) > 1).any() else None
+    sparse = len(labelled) > 1 and alone[axis] > ALONE * np.count_nonzero(mask)
+    return Gaps(axis, labelled) if sparse or (np.diff(labelled) > 1).any() else None
+
+
+def _alone_across(mask: Mask, axis: int) -> int:
+    planes = np.moveaxis(mask, axis, 0)
+    beside = np.zeros_like(planes)
+    beside[1:] |= planes[:-1]
+    beside[:-1] |= planes[1:]
+    return int(np.count_nonzero(planes & ~beside))
 
 
 def _sizes(spacing: tuple[float, float, float], axis: int) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ from ...files.limits import require_rows
 from ...files.source import third_party
 from ...volumes.gray import check_scale
 from .kinds import class_of
-from .multiframe import DOSE, PER_FRAME, SHARED, dose_scale, frame_places
+from .multiframe import DOSE, PER_FRAME, SHARED, dose_scale, frame_places, has_places
 from .values import numbers
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def frames_of(path: Path, header: Any) -> list[ImageFrame]:
             )
         groups = [[*per_frame[number : number + 1], *shared[:1]] for number in range(count)]
         frames = [_frame(path, header, number, groups[number]) for number in range(count)]
-        if PER_FRAME in header or not frames:
+        if has_places(header) or not frames:
             return frames
         places = frame_places(header, count, frames[0].position, frames[0].axes, path.name)
         return [replace(frame, position=place) for frame, place in zip(frames, places, strict=True)]

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 PER_FRAME, SHARED = "PerFrameFunctionalGroupsSequence", "SharedFunctionalGroupsSequence"
+PLACES = ("PlanePositionSequence", "PlanePositionVolumeSequence")
+"""Functional groups that say where a frame is."""
 DOSE = "1.2.840.10008.5.1.4.1.1.481.2"
 """The storage class of RT Dose."""
 NUCLEAR = ("1.2.840.10008.5.1.4.1.1.20", "1.2.840.10008.5.1.4.1.1.5")
@@ -81,15 +83,21 @@ def counting(header: Any) -> list[str]:
     return [keyword_for_tag(tag) for tag in ([tags] if isinstance(tags, int) else list(tags))]
 
 
+def has_places(header: Any) -> bool:
+    """Tell whether functional groups say where frames are; some say other things alone."""
+    groups = [*(header.get(PER_FRAME) or []), *(header.get(SHARED) or [])]
+    return any(places in group for group in groups for places in PLACES)
+
+
 def placed_evenly(header: Any) -> bool:
     """Tell whether the distance of the slices alone places frames, in a kind of file that does not define it."""
-    several = int(header.get("NumberOfFrames") or 1) > 1 and PER_FRAME not in header
+    several = int(header.get("NumberOfFrames") or 1) > 1 and not has_places(header)
     counted = any(header.get(vector) for vector in SLICE_VECTORS) or class_of(header) in NUCLEAR
     return several and not counted and all(header.get(keyword) for keyword in EVENLY)
 
 
 def frame_places(header: Any, count: int, first: Floats | None, axes: Floats | None, name: str) -> list[Floats | None]:
-    """Return the place of each frame of a file without functional groups; None where it is not told.
+    """Return the place of each frame of a file whose functional groups do not say it; None where nothing does.
 
     Parameters
     ----------

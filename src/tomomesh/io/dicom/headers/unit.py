@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ...names import shown
 from .kinds import class_of
@@ -46,7 +46,13 @@ def gray_unit(frames: Sequence[ImageFrame]) -> tuple[str, tuple[str, ...]]:
     if not others:
         return HOUNSFIELD, ()
     note = f"RescaleType = {shown(', '.join(others))}: the gray levels are not Hounsfield units"
+    if others == ["US"] and _by_gdcm(header):
+        note += ", or may be: GDCM, by which ITK writes DICOM, says so where it was told nothing"
     return NAMED.get(others[0], shown(others[0])), (note,)
+
+
+def _by_gdcm(header: Any) -> bool:
+    return str(getattr(header, "file_meta", {}).get("ImplementationVersionName") or "").startswith("GDCM")
 
 
 def _kind(frame: ImageFrame) -> str:

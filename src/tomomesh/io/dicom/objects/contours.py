@@ -101,7 +101,7 @@ def _values(item: Any, told: str, file: str) -> Floats:
     """Return the numbers of a contour, without a Python object for each where the file is as it was read."""
     element = item.get_item("ContourData")
     value = None if element is None else element.value
-    parts = value.strip(b" \0").split(b"\\") if isinstance(value, bytes) else value
+    parts = value.strip(b" \0").rstrip(b"\\").split(b"\\") if isinstance(value, bytes) else value
     try:
         values = np.array([] if parts is None else parts).astype(np.float64).reshape(-1)
     except (TypeError, ValueError):

@@ -44,16 +44,19 @@ class Planes:
         Where the planes are along their normal, mm.
     apart : float
         Distance of the planes of a column, as a rule.
+    width : float
+        Extent of the widest contour.
     """
 
     labels: NDArray[np.int64]
     heights: Floats
     apart: float
+    width: float
 
     @property
     def slices(self) -> int:
         """How many slices the planes of all columns are on."""
-        return slices_at(self.heights)
+        return slices_at(self.heights, self.width)
 
 
 def planes_of(contours: Sequence[Floats], *, file: str, thickness: float | None = None) -> Planes:
@@ -83,9 +86,12 @@ def planes_of(contours: Sequence[Floats], *, file: str, thickness: float | None 
     height = np.array([float(one[:, 2].mean()) for one in placed])
     low, high = (np.array([end(one[:, :2], axis=0) for one in placed]) for end in (np.min, np.max))
     column = columns_of(low, high)
-    labels = planes_within(height, column, (high - low).max(axis=1), SAME_HEIGHT_MM)
+    widths = (high - low).max(axis=1)
+    width = float(widths.max())
+    labels = planes_within(height, column, widths, SAME_HEIGHT_MM)
     heights = np.bincount(labels, height) / np.bincount(labels)
-    gaps = np.array([typical_gap(heights[np.unique(labels[column == one])]) for one in range(column.max() + 1)])[column]
+    each = [heights[np.unique(labels[column == one])] for one in range(column.max() + 1)]
+    gaps = np.array([typical_gap(own, width) for own in each])[column]
     wide = gaps[gaps > SAME_HEIGHT_MM]
     if len(wide) == 0 and thickness is None:
         raise EmptyError(
@@ -101,7 +107,7 @@ def planes_of(contours: Sequence[Floats], *, file: str, thickness: float | None 
             found=f"contour {int(off.argmax()) + 1} is {off.max():.3g} mm off its plane",
             expected=f"at most {MOST_OFF_PLANE * apart:.3g} mm across ({', '.join(f'{n:.3g}' for n in normal)})",
         )
-    return Planes(labels, heights, apart)
+    return Planes(labels, heights, apart, width)
 
 
 def directions(contours: Sequence[Floats]) -> int:

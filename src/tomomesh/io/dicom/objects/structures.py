@@ -152,7 +152,7 @@ def _listed(path: Path) -> list[Structure]:
 
 
 def _structure(number: int, name: str, items: Sequence[Any]) -> Structure:
-    kinds = [str(item.get("ContourGeometricType") or "no type") for item in items]
+    kinds = [str(item.get("ContourGeometricType") or "").strip().upper() or "no type" for item in items]
     met = [kind == OPEN and ends_meet(item) for item, kind in zip(items, kinds, strict=True)]
     closed = [kind in CLOSED or one for kind, one in zip(kinds, met, strict=True)]
     others = Counter(shown(kind) for kind, one in zip(kinds, closed, strict=True) if not one)
@@ -210,8 +210,12 @@ def _no_contours(listed: list[Structure], file: str) -> EmptyError:
 
 
 def _table(structures: list[Structure], file: str) -> str:
-    """Put structures into words: number, name, contours, slices."""
-    return "; ".join(f"{one}, contours {len(one.contours)}, slices {_slices(one, file)}" for one in structures)
+    """Put structures into words: number, name, contours, slices, and what else there is where that is all."""
+    return "; ".join(
+        f"{one}, contours {len(one.contours)}, slices {_slices(one, file)}"
+        + (f", {counted(one.others)}" if one.others and not one.contours else "")
+        for one in structures
+    )
 
 
 def _slices(structure: Structure, file: str) -> str:

@@ -13,7 +13,7 @@ from ...names import shown
 from ..files import read_frames
 from .choice import grouped
 from .regular import steps_between
-from .same_geometry import check_same_geometry
+from .same_geometry import check_same_geometry, middle_of
 from .stack import SAME_PLACE, axes_of, pixel_of, placed, stacked, tilt_of
 
 if TYPE_CHECKING:
@@ -165,8 +165,9 @@ def _slice_spacing(members: list[ImageFrame], settings: ReadSettings) -> SliceSp
         return SliceSpacing()
     try:
         check_same_geometry(members)
-        normal = np.cross(*axes_of(members[0]))
-        places = placed(members, normal, SAME_PLACE * min(pixel_of(members[0], settings)))
+        middle, _ = middle_of(members)
+        normal = np.cross(*axes_of(middle))
+        places = placed(members, normal, SAME_PLACE * min(pixel_of(middle, settings)))
     except GeometryError:
         return SliceSpacing()
     origins = np.array([place[0].position for place in places])

@@ -12,7 +12,7 @@ from ...volumes.affine import check_affine, check_spacing
 from ..headers.kinds import class_of
 from ..headers.multiframe import DOSE, PROJECTIONS, no_slices
 from .regular import regular
-from .same_geometry import check_same_geometry, in_words
+from .same_geometry import ROUGH, check_same_geometry, in_words, middle_of, off_unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,10 +26,6 @@ and no scanner's slices are so thin."""
 
 ON_LINE = 0.1
 """Origins may leave their straight line by this part of a pixel, which interpolation would not show."""
-
-RIGHT_ANGLE = 0.01
-"""Products of the directions of columns and rows may be off those of unit vectors at right angles by this: .6 degrees,
-or directions that are written with two decimals."""
 
 TILTED = 0.1
 """Degrees of gantry tilt from which on it is mentioned: over a stack of 300 mm they are half a millimeter."""
@@ -109,7 +105,8 @@ def stacked(frames: list[ImageFrame], settings: ReadSettings, *, study: str) -> 
     _check_slices(frames[0])
     if class_of(frames[0].header) == DOSE:  # its planes may lie anywhere, and its values are meant to be interpolated
         settings = replace(settings, fill_gaps=True, resample_slices=True)
-    pixel, axes = pixel_of(frames[0], settings), axes_of(frames[0])
+    middle, notes = middle_of(frames)
+    pixel, axes = pixel_of(middle, settings), axes_of(middle)
     normal = np.cross(axes[0], axes[1])
     lost = [frame for frame in frames if frame.position is None]
     if lost:
@@ -122,7 +119,7 @@ def stacked(frames: list[ImageFrame], settings: ReadSettings, *, study: str) -> 
     affine = np.eye(4)
     affine[:3] = np.column_stack([axes[0] * pixel[0], axes[1] * pixel[1], line.step, line.origin])
     check_affine(affine, file=study, hint="a series with a valid geometry")
-    return Stack(places, line.levels, affine, line.notes)
+    return Stack(places, line.levels, affine, notes + line.notes)
 
 
 def _check_slices(frame: ImageFrame) -> None:
@@ -174,7 +171,7 @@ def pixel_of(frame: ImageFrame, settings: ReadSettings) -> tuple[float, float]:
 def axes_of(frame: ImageFrame) -> NDArray[np.float64]:
     """Return the directions of the columns and of the rows (2, 3); those of an axial slice where there are none.
 
-    They are of unit length, whatever their rounding in the file has made of them.
+    They are of unit length and at right angles, whatever their rounding in the file has made of them.
 
     Raises
     ------
@@ -184,14 +181,16 @@ def axes_of(frame: ImageFrame) -> NDArray[np.float64]:
     if frame.axes is None and frame.position is None:
         return np.eye(3)[:2]
     axes = np.full((2, 3), np.nan) if frame.axes is None else frame.axes
-    if not np.allclose(axes @ axes.T, np.eye(2), atol=RIGHT_ANGLE):
+    if not off_unit(axes) <= ROUGH:
         raise GeometryError(
             "the directions of the slices are invalid",
             file=frame.path.name,
             found=f"ImageOrientationPatient = {in_words(frame.axes)}",
             expected="two unit vectors at right angles",
         )
-    return np.asarray(axes / np.linalg.norm(axes, axis=1)[:, None])
+    axes = axes / np.linalg.norm(axes, axis=1)[:, None]
+    straight = axes - axes[::-1] * (axes[0] @ axes[1] / 2)  # each gives half of what they share
+    return np.asarray(straight / np.linalg.norm(straight, axis=1)[:, None])
 
 
 def _numbered(frames: list[ImageFrame]) -> list[list[ImageFrame]]:

@@ -16,7 +16,7 @@ from ....model.volume import Volume
 from ...files.detached import beside, check_count, numbered
 from ...files.source import first_bytes
 from ...files.unpack import BZIP2, GZIP, PLAIN
-from ..raster import HEX, LONGEST_HEADER, TEXT, Raster, gray_or_color, header_bytes, read_raster, sizes_of
+from ..raster import HEX, LONGEST_HEADER, TEXT, Raster, gray_or_color, header_bytes, many_levels, read_raster, sizes_of
 from .nrrd_frame import frame_of, is_spatial
 from .segments import Segment, label_map, segments_in
 
@@ -219,7 +219,7 @@ def _check_kinds(
         return
     others = [(kind, size) for kind, size, space in zip(kinds, sizes, spatial, strict=True) if not space and size > 1]
     if others and not (
-        len(others) == 1 and others[0][0] in (*COLORS, *KINDLESS, *(ITK_COLORS if _many_levels(stored) else ()))
+        len(others) == 1 and others[0][0] in (*COLORS, *KINDLESS, *(ITK_COLORS if many_levels(stored) else ()))
     ):
         raise FormatError(
             "the file holds several values a voxel",
@@ -228,12 +228,6 @@ def _check_kinds(
             expected="one gray level, a color, or segments with names",
             hint="one of them, written to a file of its own; or the kind RGB-color in the header, where it is a color",
         )
-
-
-def _many_levels(stored: NDArray[Any]) -> bool:
-    """Tell whether a layer of bytes (K, J, I, channels) has more levels than a mask."""
-    layers = np.moveaxis(stored, 3, 0) if stored.dtype == np.uint8 else ()
-    return any(np.count_nonzero(np.bincount(layer.ravel(), minlength=256)) > 2 for layer in layers)
 
 
 def _channels_last(stored: NDArray[Any], spatial: list[bool]) -> NDArray[Any]:

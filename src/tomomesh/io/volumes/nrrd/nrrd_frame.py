@@ -39,6 +39,9 @@ SPACES = {
 NAMELESS = ("", "scanner-xyz", "3d-right-handed")
 """Spaces that name no patient axes; ITK, which writes such files, means LPS."""
 
+UNTOLD = ("", "???", "none")
+"""What stands for no unit."""
+
 OTHER_KINDS = re.compile(r".*color|.*vector|.*matrix|list|time|point|normal|.*gradient|complex|quaternion|stub|scalar")
 """Kinds of axes that are none of space."""
 
@@ -54,6 +57,7 @@ def is_spatial(fields: Mapping[str, str], sizes: tuple[int, ...], *, file: str) 
         Where there are more, or directions of another count of axes.
     """
     directions = _directions(fields)
+    directions = directions if any(directions) else []
     kinds = fields.get("kinds", "").lower().split()
     if directions:
         spatial = [direction is not None for direction in directions]
@@ -133,11 +137,14 @@ def _signs(fields: Mapping[str, str], file: str) -> tuple[tuple[int, int, int], 
 
 def _units(fields: Mapping[str, str], file: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Return the millimeters in the unit of each axis of the space; none is taken for millimeters, as ITK does."""
-    units = re.findall(r'"([^"]*)"', fields.get("spaceunits", "")) or [""]
-    found = [1.0 if not unit else millimeters(unit) for unit in units]
+    return _factors(re.findall(r'"([^"]*)"', fields.get("spaceunits", "")) or [""], "space units", file)
+
+
+def _factors(units: list[str], field: str, file: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    found = [1.0 if unit in UNTOLD else millimeters(unit) for unit in units]
     factors = [factor for factor in found if factor is not None]
     if len(factors) < len(units) or len(units) not in (1, 3):
-        told = f"space units = {' '.join(units)[:80]}"
+        told = f"{field} = {' '.join(units)[:80]}"
         raise GeometryError(
             "the unit of the coordinates is unknown",
             file=file,
@@ -154,7 +161,10 @@ def _without_directions(
     """Take the spacings that the file holds, or else those that were given."""
     words = fields.get("spacings", "").split()
     if len(words) == len(spatial):
-        spacings = floats_of(words, "spacings", file=file)[spatial].tolist()
-        check_spacing(spacings, ["spacings[0]", "spacings[1]", "spacings[2]"], file=file, hint=SPACING_HINT)
-        return upright(spacings), (UNTURNED,)
+        spacings = floats_of(words, "spacings", file=file)[spatial]
+        check_spacing(spacings.tolist(), ["spacings[0]", "spacings[1]", "spacings[2]"], file=file, hint=SPACING_HINT)
+        units = re.findall(r'"([^"]*)"', fields.get("units", ""))
+        named = [unit for unit, one in zip(units, spatial, strict=True) if one] if len(units) == len(spatial) else [""]
+        factors, notes = _factors(named, "units", file)
+        return upright((spacings * factors).tolist()), (UNTURNED, *notes)
     return upright(required_spacing(settings.spacing, file=file)), (GIVEN,)

@@ -133,7 +133,7 @@ def read_array(array: Any, folder: Path, *, fill_chunks: bool, file: str) -> tup
     _check_lengths(array, files, file)
     with third_party("zarr", file):
         voxels = array[...]
-    voxels = native(voxels.view(np.uint8) if voxels.dtype == np.bool_ else voxels, file=file)
+    voxels = native(voxels, file=file)
     if not missing.any():
         return voxels, ()
     fill, told = array.fill_value, f"{int(missing.sum())} of {missing.size}"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from .. import io
-from ..errors import GeometryError
+from ... import io
+from ...errors import GeometryError
 
 PATIENT = ("LPS", "RAS")
 """Frames in which front and back, left and right are the patient's."""
@@ -17,7 +17,7 @@ def frame_of_mesh(path: str, unit: str | None = None) -> dict[str, str]:
     GeometryError
         For a unit that has no length, as voxels.
     """
-    from ..printing.part import PRINTED_MM
+    from ...printing.part import PRINTED_MM
 
     named = {"unit": "mm", "frame": "unknown"} | io.frame_of_file(path) | ({"unit": unit} if unit else {})
     if named["unit"] not in PRINTED_MM:

@@ -14,8 +14,8 @@ POINT_FORMATS = ("ply", "xyz", "csv", "npy", "vtp")
 LABEL_FORMATS = ("nii", "nii.gz")
 CHECKED_FORMATS = ("stl", "ply", "obj", "off", "vtp", "3mf", "glb", "gii", "dcm")
 CLOUD_FORMATS = (
-    "ply", "xyz", "txt", "csv", "npy", "npz", "pcd", "las", "laz", "e57", "obj", "off", "stl", "3mf", "glb", "gii",
-    "vtp", "asc", "pts", "ptx",
+    "ply", "xyz", "txt", "csv", "tsv", "npy", "npz", "pcd", "las", "laz", "e57", "obj", "off", "stl", "3mf", "glb",
+    "gii", "vtp", "asc", "xyzn", "xyzrgb", "pts", "ptx",
 )  # fmt: skip
 STUDY_FORMATS = ("nii", "nii.gz", "nrrd", "mha", "mgh", "mgz", "npy", "tif", "tiff", "dcm", "ima", "zip", "ozx")
 """Single files that hold a whole study."""

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..show import draw_all
-from ..show.film import film
-from ..show.fit import draw_learning
-from ..show.maps import SHEETS, draw_maps
-from ..show.plane import Plane
-from ..show.render import View
-from ..show.topologies import draw_adapted, draw_update_regions
-from ..som.fit import match
-from ..som.snapshots import snapshots
-from ..ways import way_of
+from ...show import draw_all
+from ...show.film import film
+from ...show.fit import draw_learning
+from ...show.maps import SHEETS, draw_maps
+from ...show.plane import Plane
+from ...show.render import View
+from ...show.topologies import draw_adapted, draw_update_regions
+from ...som.fit import match
+from ...som.snapshots import snapshots
+from ...ways import way_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from ..results import Segmentation, Surface
-    from ..settings import Settings
-    from ..som.region import TrainedNetwork
+    from ...results import Segmentation, Surface
+    from ...settings import Settings
+    from ...som.region import TrainedNetwork
 
 FRAMES = 40
 """Most frames of a network that is filmed."""

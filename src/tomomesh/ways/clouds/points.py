@@ -8,23 +8,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..contours.axis import half_planes
-from ..contours.known import known_slices
-from ..contours.slices import find_slices, one_slice
-from ..contours.turning import between_half_planes
-from ..errors import EmptyError, GeometryError
-from ..model.columns import box
-from ..model.units import MM
-from ..results import Place
-from ..stage import Stage, timed
+from ...contours.axis import half_planes
+from ...contours.known import known_slices
+from ...contours.slices import find_slices, one_slice
+from ...contours.turning import between_half_planes
+from ...errors import EmptyError, GeometryError
+from ...model.columns import box
+from ...model.units import MM
+from ...results import Place
+from ...stage import Stage, timed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..contours.slices import Slices
-    from ..model.mesh import TriMesh
-    from ..model.points import PointSet
-    from ..settings import Settings
+    from ...contours.slices import Slices
+    from ...model.mesh import TriMesh
+    from ...model.points import PointSet
+    from ...settings import Settings
 
 
 OWN = ("um", "mm", "cm", "m", "voxel", "unknown")

@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import GeometryError
-from ..model.columns import box
-from ..pointcloud.forecast import require_room_for_points
-from ..pointcloud.samples import Samples, settle_points
-from ..stage import Stage, timed
-from .sections import unit_in_words
+from ...errors import GeometryError
+from ...model.columns import box
+from ...pointcloud.forecast import require_room_for_points
+from ...pointcloud.samples import Samples, settle_points
+from ...stage import Stage, timed
+from ..sections import unit_in_words
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..progress import Progress
-    from ..settings import Settings
+    from ...progress import Progress
+    from ...settings import Settings
     from .points import Points
 
     Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from ..settings import LAYERS, MANY, asked_by, limits_of, option_of, parameters
+from ...settings import LAYERS, MANY, asked_by, limits_of, option_of, parameters
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,0 +1,112 @@
+"""What was likely meant by what was typed: an option, a command, a file of another command."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...errors import FormatError
+from .formats import CHECKED_FORMATS, CLOUD_FORMATS, HEADER_FORMATS, STUDY_FORMATS
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Collection
+
+USUAL = {
+    "lower": ("threshold", "iso", "isovalue", "isolevel", "iso-value", "level-set", "min", "hu", "low", "lt"),
+    "upper": ("max", "high", "ht"),
+    "smooth": ("smoothing", "smooth-iterations", "sigma", "laplacian", "taubin"),
+    "target-faces": ("decimate", "decimation", "simplify", "faces", "reduce", "reduction", "triangles", "max-faces"),
+    "select": ("label", "segment-number", "roi-number"),
+    "output": ("out", "outfile", "save", "destination"),
+    "cell": ("voxel-size", "resolution", "grid", "pitch"),
+    "keep": ("keep-largest", "largest-component", "lcc"),
+    "edge": ("edge-length", "mesh-size", "max-edge"),
+    "threads": ("jobs", "cores", "workers", "n-jobs"),
+    "neurons": ("nodes", "n-neurons"),
+    "epochs": ("iter", "n-iter"),
+    "spacing": ("pixel-size", "voxel-spacing"),
+    "report": ("log", "stats"),
+}
+"""Options by which other programs call what ours do."""
+COMMANDS = {
+    "reconstruct": ("convert", "mesh", "run", "extract", "marching-cubes", "volume", "isosurface", "dicom2stl"),
+    "surface": ("points", "cloud", "poisson", "pointcloud"),
+    "check": ("validate", "verify", "quality", "stats"),
+    "inspect": ("info", "show", "view", "list", "header"),
+    "network": ("som", "train"),
+    "print": ("hollow", "repair"),
+}
+"""Commands that other programs have for what ours do."""
+STUDIES = {f".{name}" for name in (*STUDY_FORMATS, *HEADER_FORMATS)}
+CLOUDS = {f".{name}" for name in CLOUD_FORMATS}
+MESHES = {f".{name}" for name in CHECKED_FORMATS}
+KINDS = {
+    "reconstruct": ("study", STUDIES), "segment": ("study", STUDIES), "inspect": ("study", STUDIES),
+    "surface": ("cloud", CLOUDS), "check": ("mesh", MESHES), "print": ("mesh", MESHES),
+}  # fmt: skip
+"""Command to the argument that it reads, and the kinds of file that it can."""
+
+
+def likely_option(word: str, known: Collection[str]) -> str:
+    """Return the option that was likely meant by one that there is not, given all that there are; "" where none is."""
+    name = word.partition("=")[0].lstrip("-").replace("_", "-")
+    usual = [f"--{option}" for option, others in USUAL.items() if name in others]
+    near = get_close_matches(f"--{name}", [*known], 1, 0.7)
+    return next((option for option in (*usual, *near) if option in known), "")
+
+
+def likely_command(word: str, known: Collection[str]) -> str:
+    """Return the command line that was likely meant by a word that is no command; "" where none is."""
+    if _is_there(word):
+        suffix = _suffix_of(word)
+        command = "surface" if suffix in CLOUDS - STUDIES - MESHES else "check" if suffix in MESHES else "reconstruct"
+        return f"tomomesh {command} {word}" + ("" if command == "check" else " -o mesh.stl")
+    usual = [command for command, others in COMMANDS.items() if word.lower() in others]
+    near = get_close_matches(word.lower(), [*known], 1, 0.6)
+    return f"tomomesh {(usual or near)[0]}" if usual or near else ""
+
+
+def require_kind(chosen: Namespace) -> None:
+    """Refuse a file that another command reads, naming it.
+
+    Raises
+    ------
+    FormatError
+    """
+    argument, own = KINDS.get(chosen.command, ("", set()))
+    path = getattr(chosen, argument, None)
+    if not isinstance(path, str) or not _is_there(path):
+        return
+    is_folder = Path(path).is_dir()
+    suffix = ".dcm" if chosen.command == "surface" and is_folder else _suffix_of(path)
+    if suffix == ".dcm" and not is_folder:
+        return  # it may hold contours
+    other = _reading(suffix) if suffix not in own else ""
+    if other:
+        raise FormatError(
+            f"`tomomesh {chosen.command}` does not read such a file", file=path,
+            found="a folder" if is_folder else f"suffix = {suffix}",
+            hint=f"tomomesh {other} {path}" + ("" if other == "check" else " -o mesh.stl"),
+        )  # fmt: skip
+
+
+def _is_there(path: str) -> bool:
+    """Tell whether a path leads to something that may be looked at."""
+    try:
+        Path(path).stat()
+    except (OSError, ValueError):
+        return False
+    return True
+
+
+def _suffix_of(path: str) -> str:
+    from ...io.files.source import suffix_of  # which NumPy comes with: `--help` has no need of it
+
+    return suffix_of(path)
+
+
+def _reading(suffix: str) -> str:
+    """Return the command that reads a kind of file; "" where none does."""
+    return next((name for name in ("reconstruct", "surface", "check") if suffix in KINDS[name][1]), "")

@@ -1,0 +1,1 @@
+"""What ways from points begin with, and share."""
