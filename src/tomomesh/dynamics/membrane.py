@@ -88,5 +88,5 @@ def _at_rest(
     free, fixed, rows = np.flatnonzero(moving), np.flatnonzero(~moving), system[moving]
     found = vertices.copy()
     factors = splu(sparse.csc_array(rows[:, free]), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    found[free] = factors.solve(-(rows[:, fixed] @ vertices[fixed]))
+    found[free] = factors.solve(np.asarray(-(rows[:, fixed] @ vertices[fixed])))
     return found
