@@ -49,8 +49,8 @@ MET = 0.8
 that were measured. Chosen: half of it changes no case of few points, thin parts and holes; over 1 none is theirs."""
 MADE_UP = 0.25
 """Share of a surface without samples from which it is refused, unless holes are to be filled: a third of a hemisphere's
-is, and a sixth of a cube's that lacks a side: halfway. Half of it refuses scans of a capsule and a cube, twice takes a
-hemisphere."""
+is, and a sixth of a cube's that lacks a side: halfway. Half of it leaves out scans of a capsule and of a cube (.19,
+.20), twice takes a hemisphere."""
 OPEN = 0.4
 """Width of a border over that of all samples, from which they are of an open surface: .48 and more at the ends of tubes
 and of a bowl, .31 and less in scans of closed objects."""
