@@ -12,7 +12,7 @@ from tomomesh import reconstruct_points
 from tomomesh.cuberille.bitmasks import Blocks
 from tomomesh.cuberille.closing import shell_around
 from tomomesh.cuberille.faces import exposed_faces
-from tomomesh.dynamics.membrane import capped
+from tomomesh.dynamics.membrane import capped, carried_on
 from tomomesh.errors import GeometryError
 from tomomesh.measure.topology import check_promise
 from tomomesh.model.icosphere import icosphere
@@ -96,6 +96,44 @@ class TestNoisyScans:
         points = points[~((points[:, 0] > 0.9) & (np.abs(points[:, 1]) < 0.3) & (points[:, 2] > 0))]
         surface = reconstruct_points(points)
         assert quality_of(surface, genus=1)["volume_mm3"] == pytest.approx(2 * np.pi**2 * 0.16, rel=0.1)
+
+    def test_of_a_box_that_lacks_a_side_are_closed_and_told_of(self) -> None:
+        points = on_box(20_000, (1.0, 1.0, 1.0))
+        points = points[points[:, 2] > 0] + 0.02 * np.random.default_rng(5).normal(size=((points[:, 2] > 0).sum(), 3))
+        surface = reconstruct_points(points)
+        assert quality_of(surface)["volume_mm3"] == pytest.approx(1, rel=0.1)
+        assert warned(surface, "of the faces lie where there are no points")
+
+
+class TestThinPlates:
+    BALL = TriMesh(*icosphere(16))
+
+    @pytest.mark.parametrize("height", [0.3, 0.5, 0.8])
+    def test_end_a_ball_nearer_to_a_ball_than_a_membrane(self, height: float) -> None:
+        free = self.BALL.vertices[:, 2] > height
+        cut = self.BALL.vertices.copy()
+        cut[free, 2] = height
+        plate, flat = (np.linalg.norm(way(self.BALL.moved(cut), free)[free], axis=1) for way in (carried_on, capped))
+        assert np.abs(plate - 1).mean() < 0.25 * np.abs(flat - 1).mean()
+
+    def test_of_what_is_flat_are_flat_and_leave_the_rest(self) -> None:
+        flat = np.minimum(self.BALL.vertices, [2, 2, 0.2])
+        free = np.hypot(flat[:, 0], flat[:, 1]) < 0.6
+        free &= flat[:, 2] == 0.2
+        rough = flat + free[:, None] * np.random.default_rng(1).normal(scale=0.02, size=flat.shape)
+        found = carried_on(self.BALL.moved(rough), free)
+        assert np.abs(found[free, 2] - 0.2).max() < 1e-9
+        assert np.array_equal(found[~free], flat[~free])
+
+    def test_turn_and_grow_with_the_mesh(self) -> None:
+        free, turn = self.BALL.vertices[:, 2] > 0.4, np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+        turn *= np.sign(np.linalg.det(turn))
+        moved = 7 * self.BALL.vertices @ turn + [1, 2, 3]
+        wanted = 7 * carried_on(self.BALL, free) @ turn + [1, 2, 3]
+        assert np.allclose(carried_on(self.BALL.moved(moved), free), wanted, rtol=0, atol=1e-7)
+
+    def test_without_a_border_keep_their_place(self) -> None:
+        assert np.array_equal(carried_on(self.BALL, np.ones(len(self.BALL.vertices), bool)), self.BALL.vertices)
 
 
 class TestHoles:

@@ -94,7 +94,7 @@ def test_planes_are_those_of_weighted_moments(seed: int, width: float) -> None:
 def settled(points: Floats, planes: Floats, width: float) -> Floats:
     """Return where points come to rest, in the order in which they are given."""
     index = Index.of(points, 2.0)
-    rows, found = np.column_stack([points, np.ones(len(points))])[index.order], np.empty((len(points), 7))
+    rows, found = np.column_stack([points, np.ones(len(points))])[index.order], np.empty((len(points), 8))
     settle(
         rows, planes[index.order], *index.cells, np.full(len(rows), width), np.zeros(len(rows), bool), found,
         0, len(rows),
@@ -102,6 +102,17 @@ def settled(points: Floats, planes: Floats, width: float) -> Floats:
     back = np.empty_like(found)
     back[index.order] = found
     return back
+
+
+@law(20)
+@given(seeds, st.floats(-0.1, 0.1), st.floats(-0.1, 0.1))
+def test_the_rise_of_a_quadratic_is_half_of_its_laplacian(seed: int, along: float, across: float) -> None:
+    flat = np.vstack([[0, 0], np.random.default_rng(seed).uniform(-2, 2, (60, 2))])
+    heights = flat**2 @ [along, across]
+    planes = np.tile([0, 0, 1.0, 0, 0.05], (61, 1))
+    planes[:, 3] = -heights  # all feet lie on the plane under the first point
+    found = settled(np.column_stack([flat, heights]), planes, 1.0)[0]
+    assert found[7] == pytest.approx(along + across, abs=1e-4)
 
 
 @law(20)

@@ -83,7 +83,7 @@ def _moves(mesh: TriMesh, step: float, free: NDArray[np.bool_]) -> Floats:
     With the areas M of the vertices and the stiffness L of the surface, (M + i t L) w = -i t L x, and the moves are the
     real part of w (van der Vorst & Melissen 1990).
     """
-    areas, stiff = _areas(mesh), _stiffness(mesh)
+    areas, stiff = areas_of(mesh), stiffness_of(mesh)
     away = mesh.vertices - mesh.vertices.mean(axis=0)
     keep, weight = free[:, None], areas[:, None]
     scale = weight + 1j * step * stiff.diagonal()[:, None]
@@ -106,7 +106,7 @@ def _not_zero(values: Complex) -> Complex:
     return np.where(values == 0, 1, values)
 
 
-def _stiffness(mesh: TriMesh) -> sparse.csr_array[np.float64]:
+def stiffness_of(mesh: TriMesh) -> sparse.csr_array[np.float64]:
     """Return the stiffness (n, n) of linear elements: half the cotangents of the angles that face each edge."""
     corners, doubled = mesh.corners, 2 * np.maximum(mesh.face_areas, np.finfo(float).tiny)
     rows, columns, weights = [], [], []
@@ -123,7 +123,7 @@ def _stiffness(mesh: TriMesh) -> sparse.csr_array[np.float64]:
     return stiff
 
 
-def _areas(mesh: TriMesh) -> Floats:
+def areas_of(mesh: TriMesh) -> Floats:
     """Return the area of each vertex (n,), a third of its faces'."""
     thirds = np.repeat(mesh.face_areas / 3, 3)
     return np.asarray(np.bincount(mesh.faces.ravel(), thirds, len(mesh.vertices)), np.float64)

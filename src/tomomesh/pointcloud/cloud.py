@@ -161,8 +161,8 @@ class Cloud:
         return planes, noise, wide
 
     def settled(self, planes: Floats, width: Floats, stray: NDArray[np.bool_]) -> Floats:
-        """Return position, normal and residual of each point on the surface that its neighbors describe, (p, 7)."""
-        settled = np.empty((len(self.points), 7))
+        """Return position, normal, residual and rise of each point on the surface of its neighbors, (p, 8)."""
+        settled = np.empty((len(self.points), 8))
         self._run(3, lambda a, b: settle(self.points, planes, *self._cells, width, stray, settled, a, b))
         return settled
 

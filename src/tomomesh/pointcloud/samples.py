@@ -31,6 +31,11 @@ leads to a refusal."""
 OFF = 5.0
 """Distance from the surface under a point, over the region's, from which it is a stray. Chosen: half of it changes the
 distance by +15.5 %, twice by -0.2 %."""
+SIDEWAYS = 0.5
+"""Variance of the noise along one direction in the surface over that along its normal: where noise lies along rays from
+all sides, of which an area meets as many as the cosine of their angle says, half of it is along the normal and a
+quarter along each of the others. Chosen: none of it changes the distance of eleven scans' samples from the surface by
++1.0 %, twice by +.7 %."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +97,9 @@ def settle_points(
     A quadratic over the local plane, with Gaussian weights whose width follows the noise (Levin 1998; Cheng et
     al. 2008). Two sheets are kept apart by the planes of their points. Where the noise is so large that the points
     fill a slab, they are first merged in cubes: a fit to the means, weighted by how many points each stands for,
-    is all but the fit to the points.
+    is all but the fit to the points. Noise as large moves points along the surface, too, so that what
+    stands where a surface bulges comes from the lower places around: the mean height there is too low by the variance
+    of that noise times half of the Laplacian (an error in the variables; Fuller 1987), and each sample rises by it.
 
     What becomes of a point depends on `Whole`, and on the points within 37 sampling distances: those of its region
     (12), what these look at (2.5 widths of 3.4), the regions that tell the planes there (12), and what the points of
@@ -117,6 +124,8 @@ def settle_points(
     noise = cloud.around("residual", settled[:, 6])
     stray |= settled[:, 6] > np.maximum(OFF * noise, LOOSE * spacing)
     stray |= cloud.lonely(settled, spacing)
+    if cloud.merges:
+        settled[:, :3] -= (SIDEWAYS * noise**2 * settled[:, 7])[:, None] * settled[:, 3:6]
     kept = np.flatnonzero(~stray)
     strays = int(len(points) - cloud.points[kept, 3].sum())
     bends = planes[kept, 4] / spacing[kept]

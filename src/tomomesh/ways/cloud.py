@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..dynamics.low_pass import OneRing
-from ..dynamics.membrane import capped
+from ..dynamics.membrane import capped, carried_on
 from ..dynamics.moving_least_squares import SurfaceFit, fit_to_surface
 from ..dynamics.untangle import untangle
 from ..measure.intersections import CrossingFaces
@@ -104,7 +104,7 @@ def _fitted(
     mesh, filled = TriMesh(fitted.vertices, fitted.faces), fitted.filled
     if shell.doubt:
         filled = filled | holes(mesh, samples, edge)
-        mesh = mesh.moved(capped(mesh, filled)) if settings.cubes.fill_holes else mesh
+        mesh = mesh.moved((capped if settings.cubes.fill_holes else carried_on)(mesh, filled))
     return Rest(mesh, any_of(filled[mesh.faces]), fitted)
 
 

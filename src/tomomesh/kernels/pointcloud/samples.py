@@ -187,8 +187,9 @@ def settle(
         Standard deviation of the weights.
     stray : (p,) bool array
         Points that are not looked at.
-    settled : (p, 7) float array
-        Result: position, unit normal, and the root mean square distance of the neighbors from the quadratic.
+    settled : (p, 8) float array
+        Result: position, unit normal, the root mean square distance of the neighbors from the quadratic, and half of
+        its Laplacian: how fast it rises along the normal, 1 / length.
     begin, end : int
         Points to work on.
     """
@@ -248,6 +249,7 @@ def settle(
             bend = right[3] * u * u + right[4] * u * v + right[5] * v * v
             squares += rows[n, 3] * (rows[n, 2] - right[0] - right[1] * u - right[2] * v - bend) ** 2
         settled[p, 6] = h * np.sqrt(squares / max(total, 1e-300))
+        settled[p, 7] = (right[3] + right[5]) / h
         length = np.sqrt(1 + right[1] ** 2 + right[2] ** 2)
         for axis in range(3):
             settled[p, axis] = points[p, axis] + (planes[p, 3] + h * right[0]) * planes[p, axis]
