@@ -115,7 +115,7 @@ class TestBatch:
     def test_a_fault_of_the_program_is_a_row_too(
         self, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: CaptureFixture[str]
     ) -> None:
-        failing(monkeypatch, at=1, fault=ZeroDivisionError("oh"))
+        failing(monkeypatch, at=2, fault=ZeroDivisionError("oh"))
         assert batch(folder) == 10
         assert [row["exit_code"] for row in table(folder)] == ["4", "9", "0"]
         assert "ZeroDivisionError" in table(folder)[1]["error"]
@@ -140,10 +140,10 @@ class TestBatch:
 
 
 def failing(monkeypatch: pytest.MonkeyPatch, *, at: int, fault: BaseException) -> None:
-    """Let the reconstruction with that number, from 1, raise a fault."""
+    """Let the study with that number, from 1, raise a fault as it is reconstructed."""
     import tomomesh.pipeline
 
-    reconstruct, calls = tomomesh.pipeline.reconstruct, []
+    reconstruct, calls = tomomesh.pipeline.reconstruct_once, []
 
     def some(*arguments: Any, **options: Any) -> Any:
         calls.append(1)
@@ -151,7 +151,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, *, at: int, fault: BaseException) -
             raise fault
         return reconstruct(*arguments, **options)
 
-    monkeypatch.setattr(tomomesh.pipeline, "reconstruct", some)
+    monkeypatch.setattr(tomomesh.pipeline, "reconstruct_once", some)
 
 
 def made_by(report: Path, version: str) -> None:
@@ -215,7 +215,7 @@ class TestAgain:
         self, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: CaptureFixture[str]
     ) -> None:
         with monkeypatch.context() as patched:
-            failing(patched, at=2, fault=KeyboardInterrupt())
+            failing(patched, at=3, fault=KeyboardInterrupt())
             assert batch(folder) == 130
         assert {path.name for path in (folder.parent / "out").iterdir()} == {"first.stl", "first.json", "reports.csv"}
         assert [row["name"] for row in table(folder)] == ["broken", "first"]

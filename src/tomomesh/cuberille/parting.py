@@ -6,10 +6,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from ..kernels.cuberille.cells import label_components
 from ..model.cubes import keys_of
+from .bitmasks import EDGE
 from .closing import DEEP, close_shell
 from .neighbors import neighbor_table
 
@@ -68,6 +70,25 @@ def joint(shell: Shell, finer: int = 1) -> NDArray[np.int64] | None:
     beside = cKDTree(buried).query_ball_point(buried, BESIDE * finer, return_length=True)
     few = beside.max() < FEW * finer**2 and len(buried) < MANY * int(shell.blocks.count(shell.occupied).sum())
     return None if few else np.asarray(buried[beside.argmax()])
+
+
+def neck(shell: Shell, places: NDArray[np.int64], finer: int) -> NDArray[np.int64] | None:
+    """Return a cube (3,) by which two objects hang together; None where there is none near some cubes (p, 3).
+
+    What small cubes part everywhere but at a few falls to pieces when as much is eroded as is `DEEP`, and is of one
+    piece before, within a block around one of the cubes.
+    """
+    _, once = np.unique(places // EDGE, axis=0, return_index=True)
+    solid = shell.blocks.cells(shell.solid)
+    tree = cKDTree(solid)
+    for place in places[once]:
+        near = solid[tree.query_ball_point(place, EDGE, p=np.inf)] - place + EDGE
+        window = np.zeros(3 * (2 * EDGE + 1,), np.bool_)
+        window[tuple(near.T)] = True
+        eroded = ndimage.binary_erosion(window, iterations=finer * DEEP // 2, border_value=1)
+        if ndimage.label(eroded)[1] > ndimage.label(window)[1]:
+            return np.asarray(place)
+    return None
 
 
 def _pieces(cells: NDArray[np.int64]) -> NDArray[np.int64]:

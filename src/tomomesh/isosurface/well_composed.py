@@ -107,6 +107,7 @@ def without_contacts(
     -------
     (K, J, I) bool array
     """
+    mask = np.ascontiguousarray(mask)
     cells, _ = cells_where(mask, JOINING > 0, threads)
     joined = mask.copy() if len(cells) else mask
     while len(cells):

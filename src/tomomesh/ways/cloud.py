@@ -102,7 +102,7 @@ def _fitted(
     start = rough.mesh.vertices
     fitted = fit_to_surface(start, rough.ring, samples, edge, settings.fit, threads=threads, progress=progress)
     mesh, filled = TriMesh(fitted.vertices, fitted.faces), fitted.filled
-    if shell.doubt:
+    if shell.by_normals:
         filled = filled | holes(mesh, samples, edge)
         mesh = mesh.moved((capped if settings.cubes.fill_holes else carried_on)(mesh, filled))
     return Rest(mesh, any_of(filled[mesh.faces]), fitted)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ...cuberille.faces import TIGHT
 from ...cuberille.leak_test import SURE, close_leaks
 from ...cuberille.neighbors import once_each
-from ...cuberille.parting import joint
+from ...cuberille.parting import joint, neck
 from ...cuberille.partition import cubes_over
 from ...measure.tree import Tree
 from ...model.cubes import cells_of, keys_of
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ...cuberille.bitmasks import Bitmask
     from ...model.mesh import TriMesh
     from ...pointcloud.samples import Samples
     from ...progress import Progress
@@ -70,12 +72,23 @@ def apart(
     first, second = (small, shell) if is_nearer(small, shell, samples, fewer=noisy) else (shell, small)
     agree = noisy or _handles(first) == _handles(second) or not second.leak_test.tight
     if agree and joint(first.leak_test.shell, first.finer) is None:
-        return first
+        return first if first is shell else _with_neck(first, shell, origin)
     third = by_normals(first)
     if is_nearer(third, first, samples, fewer=True):
         return third
     sure = agree or (third is not first and _handles(third) == _handles(first))
     return first if sure else replace(first, doubt=_disagreement(first, second, origin))
+
+
+def _with_neck(small: Shell, shell: Shell, origin: Floats) -> Shell:
+    """Tell of a neck that small cubes have left of a joint."""
+    buried = shell.lowest + shell.cell * (shell.leak_test.shell.buried() + 0.5)
+    cubes = np.floor((buried - small.lowest) / small.cell).astype(np.int64)
+    found = neck(small.leak_test.shell, cubes, small.finer)
+    if found is None:
+        return small
+    where = place_in_words(small.lowest + small.cell * (found + 0.5) + origin)
+    return replace(small, doubt=f"two parts hang together by a few cubes around {where}, which may be two objects")
 
 
 def _handles(shell: Shell) -> int:
@@ -111,7 +124,7 @@ def is_nearer(other: Shell, shell: Shell, samples: Samples, *, fewer: bool) -> b
         return False
     handles, before = _handles(other), _handles(shell)
     left, had = _without_say(other, samples), _without_say(shell, samples)
-    if left > had + LOST * len(samples.positions):
+    if left > had + LOST * len(samples.positions) or _leaks_more(other, shell, samples):
         return False
     return handles < before or not fewer if handles != before else left < FEWER * had
 
@@ -125,6 +138,30 @@ def _without_say(shell: Shell, samples: Samples) -> int:
     faces = shell.leak_test.faces
     away = cKDTree(shell.lowest + shell.cell * (faces.cells + 0.5)).query(samples.positions)[0]
     return int(np.count_nonzero(away > BURIED * float(np.median(samples.spacing))))
+
+
+def _leaks_more(other: Shell, shell: Shell, samples: Samples) -> bool:
+    """Tell whether a part, however small, tells of no inside in another shell though it does in this one."""
+    reach = BESIDE * float(np.median(samples.spacing))
+    looked_at = _places(other, other.leak_test.shell.occupied & ~other.leak_test.shell.witnesses)
+    _, once = np.unique(np.floor(looked_at / reach), axis=0, return_index=True)
+    shares = (_share_around(looked_at[once], one, reach) for one in (other, shell))
+    return any(after < TIGHT <= before for after, before in zip(*shares, strict=True))
+
+
+def _share_around(places: Floats, shell: Shell, reach: float) -> Floats:
+    """Return the share of the occupied cubes within reach of each place that tell of an inside."""
+    test = shell.leak_test.shell
+    told, there = (
+        cKDTree(_places(shell, one)).query_ball_point(places, reach, return_length=True)
+        for one in (test.witnesses, test.occupied)
+    )
+    return np.asarray(told / np.maximum(there, 1))
+
+
+def _places(shell: Shell, bitmask: Bitmask) -> Floats:
+    """Return the middles of a set of a shell's cubes."""
+    return np.asarray(shell.lowest + shell.cell * (shell.leak_test.shell.blocks.cells(bitmask) + 0.5))
 
 
 def follows(shell: Shell, mesh: TriMesh, samples: Samples, origin: Floats, *, threads: int = 0) -> Stage[None]:

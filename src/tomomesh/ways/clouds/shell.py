@@ -73,8 +73,10 @@ class Shell:
     cubes: int
     spanned: Bridges
     leak_test: LeakTest
+    by_normals: bool = False
+    """Whether inside and outside were told apart by the normals alone."""
     doubt: str = ""
-    """Where inside and outside were told apart by the normals alone, in words."""
+    """What of it is unsure, and where, in words."""
     finer: int = 1
     """How many times finer its cubes are than usual."""
 
@@ -152,7 +154,8 @@ def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settin
         return shell
     where = place_in_words(found.doubtful + origin)
     doubt = f"the shell of cubes does not hold: the normals tell inside from outside, least surely around {where}"
-    return Shell(np.full(3, found.cell), found.lowest, found.cubes, shell.spanned, found.leak_test, doubt)
+    cell = np.full(3, found.cell)
+    return Shell(cell, found.lowest, found.cubes, shell.spanned, found.leak_test, by_normals=True, doubt=doubt)
 
 
 def _borders(shell: Shell, samples: Samples, settings: Settings) -> list[Gap]:
