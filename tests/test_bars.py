@@ -40,17 +40,23 @@ class TestBars:
         monkeypatch.setattr(sys, "stderr", screen)
         monkeypatch.setattr(bars, "TICK", 0.001)
         progress = Bars()
-        with pytest.raises(KeyboardInterrupt), progress:
-            progress("voxels", 0, 1)
-            raise KeyboardInterrupt
+
+        def stopped() -> None:
+            with progress:
+                progress("voxels", 0, 1)
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            stopped()
         drawn = screen.getvalue()
         assert "voxels" in drawn
         progress._tick()
         assert screen.getvalue() == drawn
 
     def test_says_one_line_a_stage_elsewhere(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(sys, "stderr", io.StringIO())
+        lines = io.StringIO()
+        monkeypatch.setattr(sys, "stderr", lines)
         with Bars() as progress:
             progress("voxels", 0, 2)
             progress("voxels", 2, 2)
-            assert sys.stderr.getvalue().startswith("voxels     2/2")  # type: ignore[attr-defined]
+            assert lines.getvalue().startswith("voxels     2/2")
