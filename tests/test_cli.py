@@ -161,6 +161,13 @@ class TestOtherCommands:
             "01-topologies.png", "02-network.png", "02-learning.png", *maps,
         }  # fmt: skip
 
+    def test_network_tells_its_warnings(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
+        line = ["network", "square", "-o", str(tmp_path / "n"), "--network", "grid", "--neurons", "37"]
+        assert main([*line, "--radius", "1,4"]) == 0
+        told = capsys.readouterr().out
+        assert "the radius rises from 1 to 4" in told
+        assert "37 neurons make no grid" in told
+
     def test_inspect_suggests_windows(self, study: Path, capsys: CaptureFixture[str]) -> None:
         assert main(["inspect", str(study)]) == 0
         assert "otsu: k >" in capsys.readouterr().out

@@ -169,6 +169,17 @@ class TestSpace:
         assert is_drawn(draw_shaded(flat))
         assert is_drawn(draw_wireframe(flat))
 
+    @pytest.mark.parametrize("size", [(1, 1.5, 40), (40, 1, 1.5), (1, 40, 1), (1, 1, 1), (20, 20, 0.1)])
+    def test_marks_of_a_long_object_keep_apart(self, size: tuple[float, float, float]) -> None:
+        cloud = np.random.default_rng(0).uniform(-1, 1, (200, 3)) * size
+        figure = draw_points(PointSet.from_positions(cloud))
+        figure.canvas.draw()
+        ax = figure.axes[0]
+        words = [text.get_window_extent() for text in ax.texts]
+        assert len(words) == 5  # the note, the length of the bar, three axes
+        assert not any(a.overlaps(b) for n, a in enumerate(words) for b in words[:n])
+        assert ax.get_window_extent().x0 < 0.1 * figure.bbox.width
+
     @given(st.floats(1e-6, 1e9))
     def test_scale_bar_is_round_and_fits(self, size: float) -> None:
         length = nice_length(size)

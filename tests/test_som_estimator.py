@@ -100,6 +100,11 @@ class TestManners:
             som = SOM(asked).fit(blobs())
         assert max(som.lattice_.shape) <= 2 * min(som.lattice_.shape)
 
+    @pytest.mark.parametrize("asked", [58, 37])
+    def test_says_that_a_sphere_has_another_number(self, asked: int) -> None:
+        with pytest.warns(UserWarning, match=f"^{asked} neurons make no even sphere: it has 42$"):
+            SOM(asked, topology="sphere").fit(blobs())
+
     def test_warns_of_what_rises(self) -> None:
         with pytest.warns(UserWarning, match="learning rate rises"):
             SOM(9, training="online", alpha=(0.01, 0.5), epochs=2).fit(blobs())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from threading import Event, Lock, Thread
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
 FORMAT = "{desc} {bar:30} {n_fmt}/{total_fmt} {elapsed}"
+TICK = 1.0
+"""Seconds from one look at the clock to the next: it counts in whole seconds."""
 
 
 class Bars:
@@ -24,19 +27,38 @@ class Bars:
         self._stage = ""
         self._since = 0.0
         self._bar: tqdm[NoReturn] | None = None
+        self._drawing, self._left = Lock(), Event()
 
     def __enter__(self) -> Bars:
+        if self._drawn and not self._quiet:
+            Thread(target=self._tick, daemon=True).start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._close()
+        self._left.set()
+        with self._drawing:
+            self._close()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Report progress (see `tomomesh.progress`)."""
         if self._quiet:
             return
+        with self._drawing:
+            self._show(stage, done, total)
+
+    def _tick(self) -> None:
+        """Let the clock of the bar go on while a stage reports nothing.
+
+        Drawn without tqdm's own lock, which an interrupt in the midst of drawing would leave locked.
+        """
+        while not self._left.wait(TICK):
+            with self._drawing:
+                if self._bar is not None:
+                    self._bar.refresh(nolock=True)
+
+    def _show(self, stage: str, done: int, total: int) -> None:
         if stage != self._stage:
             self._close()
             self._stage, self._since = stage, time.perf_counter()

@@ -60,15 +60,17 @@ def lattice(name: str, neurons: int, *, shape: tuple[int, int] | None = None) ->
 
 
 def other_number(graph: Lattice, asked: int | None) -> str | None:
-    """Say so where a sheet has another number of neurons than was asked for: 58 and 37 make none of even sides.
+    """Say so where a sheet or a sphere has another number of neurons than was asked for: 58 and 37 make neither.
 
     Examples
     --------
     >>> other_number(lattice("grid", 37), 37)
     '37 neurons make no grid of about equal sides: it has 6 x 6 = 36'
     """
-    if asked is None or graph.name not in _SHEETS or len(graph) == asked:
+    if asked is None or graph.name not in (*_SHEETS, "sphere") or len(graph) == asked:
         return None
+    if graph.name == "sphere":
+        return f"{asked} neurons make no even sphere: it has {len(graph)}"
     rows, columns = graph.shape
     return f"{asked} neurons make no {graph.name} of about equal sides: it has {rows} x {columns} = {len(graph)}"
 

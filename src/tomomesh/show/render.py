@@ -63,16 +63,13 @@ def draw_smooth(ax: Axes, mesh: TriMesh, camera: Camera) -> None:
 
 def frame(ax: Axes, points: NDArray[np.float64], view: View) -> None:
     """Fit a panel to (n, 3) points, and give it a scale bar and the directions of the axes."""
-    seen = view.camera.project(points)
-    low, high = seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)
-    size = float((high - low).max()) or 1.0
+    low, high = _box(view, points)
+    side = float((high - low).max())
     ax.set_axis_off()
     ax.set_aspect("equal")
-    (left, bottom), (right, top) = _box(view, points)
-    ax.set(xlim=(left, right), ylim=(bottom, top))
-    corner = np.array([low[0], low[1] - 0.13 * size])
-    _scale_bar(ax, corner, size, view.unit)
-    _directions(ax, np.array([high[0] - 0.09 * size, low[1] - 0.13 * size]), 0.085 * size, view)
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    _scale_bar(ax, low + side * np.array([0.04, 0.06]), float(high[0] - low[0]), view.unit)
+    _directions(ax, np.array([high[0] - 0.13 * side, low[1] + 0.06 * side]), 0.08 * side, view)
 
 
 def page(view: View, points: NDArray[np.float64], width: float, more: float) -> tuple[float, float]:
@@ -83,15 +80,17 @@ def page(view: View, points: NDArray[np.float64], width: float, more: float) -> 
     low, high = _box(view, points)
     across, up = high - low
     side = max(across, up)
-    return max(width * across / side, NARROWEST * width), max(width * up / side, NARROWEST * width) + more
+    return width * across / side, max(width * up / side, NARROWEST * width) + more
 
 
 def _box(view: View, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the lowest and the highest place of a panel that holds points, its scale bar and its axes."""
+    """Return the lowest and the highest place of a panel that holds points, its scale bar and its axes side by side."""
     seen = view.camera.project(points)[:, :2]
     low, high = seen.min(axis=0), seen.max(axis=0)
     size = float((high - low).max()) or 1.0
-    return low - size * np.array([0.04, 0.20]), high + 0.04 * size
+    low, high = low - size * np.array([0.04, 0.20]), high + 0.04 * size
+    room = max(NARROWEST * (high[1] - low[1]) - (high[0] - low[0]), 0.0) * np.array([0.5, 0.0])
+    return low - room, high + room
 
 
 def nice_length(size: float) -> float:

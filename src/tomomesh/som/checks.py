@@ -117,7 +117,8 @@ def warnings_of(
 ) -> list[str]:
     """Return what to be warned of: falls that rise, and another number of neurons than was asked for."""
     other = other_number(lattice, asked) if isinstance(asked, int) else None
-    return [*schedule_warnings(settings, **falls), *([f"{other} (shape sets the sides)"] if other else [])]
+    cure = "" if lattice.name == "sphere" else " (shape sets the sides)"
+    return [*schedule_warnings(settings, **falls), *([other + cure] if other else [])]
 
 
 def _counted(neurons: Any, shape: Any) -> tuple[int, tuple[int, int] | None]:

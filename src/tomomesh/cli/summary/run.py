@@ -45,7 +45,7 @@ def of_network(report: dict[str, Any], output: str) -> list[str]:
         f"network   {network['topology']} of {network['neurons']} neurons on {network['inputs']} inputs",
         f"          quantization error {network['quantization_error']:.4g}, dead neurons {network['dead_neurons']}, "
         f"longest edge {network['longest_over_median_edge']:.2f} medians",
-        *(f"warning   {warning}" for warning in report["warnings"][:SHOWN]),
+        *(f"warning   {warning}" for warning in [*network["warnings"], *report["warnings"]][:SHOWN]),
         f"written   {output}",
     ]
 

@@ -1,0 +1,62 @@
+"""Bars of progress: a clock that goes on where a stage is silent, and lines where there is no terminal."""
+
+from __future__ import annotations
+
+import io
+import sys
+from threading import Event
+
+import pytest
+from tqdm import tqdm
+
+from tomomesh.cli import bars
+from tomomesh.cli.bars import Bars
+
+SOON = 60.0
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+class TestBars:
+    def test_the_clock_goes_on_in_a_silent_stage(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        again = Event()
+
+        def refresh(bar: tqdm[int], nolock: bool = False, **_: object) -> None:
+            if nolock and bar.n == 0:
+                again.set()
+
+        monkeypatch.setattr(sys, "stderr", Terminal())
+        monkeypatch.setattr(bars, "TICK", 0.001)
+        monkeypatch.setattr(tqdm, "refresh", refresh)
+        with Bars() as progress:
+            progress("voxels", 0, 1)
+            assert again.wait(SOON)
+
+    def test_leaves_through_an_interrupt_and_draws_no_more(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        screen = Terminal()
+        monkeypatch.setattr(sys, "stderr", screen)
+        monkeypatch.setattr(bars, "TICK", 0.001)
+        progress = Bars()
+
+        def stopped() -> None:
+            with progress:
+                progress("voxels", 0, 1)
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            stopped()
+        drawn = screen.getvalue()
+        assert "voxels" in drawn
+        progress._tick()
+        assert screen.getvalue() == drawn
+
+    def test_says_one_line_a_stage_elsewhere(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        lines = io.StringIO()
+        monkeypatch.setattr(sys, "stderr", lines)
+        with Bars() as progress:
+            progress("voxels", 0, 2)
+            progress("voxels", 2, 2)
+            assert lines.getvalue().startswith("voxels     2/2")
