@@ -54,9 +54,9 @@ a coil were joined, at most 17 in the clouds of docs/clouds.md (cat, skull, fand
 FACING, ACROSS, TAKEN_IN = 2.0, 0.9, 0.1
 """How near, sampling distances, two samples lie that face one another, the cosine from which the step between them is
 along the normals of both, and how far off, over the noise, the mesh passes a pair by that it has joined; of more noise
-than that nothing is said, for its normals face anywhere (bunny and wingnut of .1 % noise were warned of). It passes 2 to
-12 pairs by where rods cross 1 s apart (six seeds), none in the clouds of docs/clouds.md. With a cosine of .8 the skull's
-thin bones have 15 and the rocker-arm 1; with .25 s two seeds of six have none; 2.5 s changes nothing of it."""
+than that nothing is said, for its normals face anywhere (bunny and wingnut of .1 % noise were warned of). It passes 2
+to 12 pairs by where rods cross 1 s apart (six seeds), none in the clouds of docs/clouds.md. With a cosine of .8 the
+skull has 15 and the rocker-arm 1; with .25 s two seeds of six have none; 2.5 s changes nothing of it."""
 
 
 def may_join(shell: Shell) -> bool:
