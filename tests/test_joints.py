@@ -53,6 +53,20 @@ def on_coil(count: int, apart: float, radius: float = 0.15, turns: int = 3) -> F
     return np.concatenate([tube, *caps])
 
 
+def crossing_rods(count: int, apart: float, seed: int, radius: float = 0.3) -> Floats:
+    """Points on two round-ended rods, of length 4 between the ends' middles, that cross sampling distances apart."""
+    rng = np.random.default_rng(seed)
+    s = spacing_of(2 * 2 * np.pi * radius * (4 + 2 * radius), count)
+    rods = []
+    for _ in range(2):
+        along = rng.uniform(-2 - radius, 2 + radius, count // 2)  # equal areas: Archimedes
+        beyond = np.abs(along) - 2
+        width = np.sqrt(radius**2 - np.maximum(beyond, 0) ** 2)
+        around = rng.uniform(0, 2 * np.pi, count // 2)
+        rods.append(np.column_stack([along, width * np.cos(around), width * np.sin(around)]))
+    return np.concatenate([rods[0], rods[1][:, [1, 0, 2]] + np.array([0, 0, 2 * radius + apart * s])])
+
+
 class TestObjects:
     @pytest.mark.parametrize("apart", [3.0, 4.0])
     def test_boxes_are_two(self, apart: float) -> None:
@@ -72,6 +86,19 @@ class TestObjects:
         assert surface.report["quality"]["components"] == 2 or any(
             "around (" in one for one in surface.report["warnings"]
         )
+
+    @pytest.mark.parametrize("seed", range(3))
+    def test_rods_that_cross_are_told_of_though_they_touch_at_one_place(self, seed: int) -> None:
+        surface = reconstruct_points(crossing_rods(6_000, 1.0, seed))
+        assert surface.report["quality"]["components"] == 2 or any(
+            "around (" in one for one in surface.report["warnings"]
+        )
+
+    @pytest.mark.parametrize("apart", [2.0, 3.0])
+    def test_rods_that_cross_farther_apart_are_two(self, apart: float) -> None:
+        surface = reconstruct_points(crossing_rods(6_000, apart, 0))
+        assert_sound(surface, components=2)
+        assert not surface.report["warnings"]
 
 
 class TestSheetsOfOneObject:
