@@ -72,11 +72,11 @@ def joint(shell: Shell, finer: int = 1) -> NDArray[np.int64] | None:
     return None if few else np.asarray(buried[beside.argmax()])
 
 
-def neck(shell: Shell, places: NDArray[np.int64], finer: int) -> NDArray[np.int64] | None:
+def neck(shell: Shell, places: NDArray[np.int64]) -> NDArray[np.int64] | None:
     """Return a cube (3,) by which two objects hang together; None where there is none near some cubes (p, 3).
 
-    What small cubes part everywhere but at a few falls to pieces when as much is eroded as is `DEEP`, and is of one
-    piece before, within a block around one of the cubes.
+    What cubes part everywhere but at a few falls to more pieces when `DEEP` of them are eroded, within a block's width
+    of one of the places.
     """
     _, once = np.unique(places // EDGE, axis=0, return_index=True)
     solid = shell.blocks.cells(shell.solid)
@@ -85,7 +85,7 @@ def neck(shell: Shell, places: NDArray[np.int64], finer: int) -> NDArray[np.int6
         near = solid[tree.query_ball_point(place, EDGE, p=np.inf)] - place + EDGE
         window = np.zeros(3 * (2 * EDGE + 1,), np.bool_)
         window[tuple(near.T)] = True
-        eroded = ndimage.binary_erosion(window, iterations=finer * DEEP // 2, border_value=1)
+        eroded = ndimage.binary_erosion(window, iterations=DEEP, border_value=1)
         if ndimage.label(eroded)[1] > ndimage.label(window)[1]:
             return np.asarray(place)
     return None

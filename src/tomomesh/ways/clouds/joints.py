@@ -88,12 +88,12 @@ def apart(
 
 def _with_neck(small: Shell, shell: Shell, origin: Floats) -> Shell:
     """Tell of a neck that small cubes have left of a joint."""
-    buried = shell.lowest + shell.cell * (shell.leak_test.shell.buried() + 0.5)
+    buried = shell.middles(shell.leak_test.shell.buried())
     cubes = np.floor((buried - small.lowest) / small.cell).astype(np.int64)
-    found = neck(small.leak_test.shell, cubes, small.finer)
+    found = neck(small.leak_test.shell, cubes)
     if found is None:
         return small
-    where = place_in_words(small.lowest + small.cell * (found + 0.5) + origin)
+    where = place_in_words(small.middles(found) + origin)
     return replace(small, doubt=f"two parts hang together by a few cubes around {where}, which may be two objects")
 
 
@@ -103,7 +103,7 @@ def _handles(shell: Shell) -> int:
 
 def _disagreement(shell: Shell, other: Shell, origin: Floats) -> str:
     """Say how many handles two shells have, and where they are farthest from one another."""
-    middles, others = (one.lowest + one.cell * (one.leak_test.faces.cells + 0.5) for one in (shell, other))
+    middles, others = (one.middles(one.leak_test.faces.cells) for one in (shell, other))
     farthest = middles[np.argmax(cKDTree(others).query(middles)[0])] + origin
     counts = f"{_handles(shell)} with those of {shell.cell.min():.3g}, {_handles(other)} with {other.cell.min():.3g}"
     return f"cubes of two sizes disagree about the handles, {counts}, most around {place_in_words(farthest)}"
@@ -141,8 +141,7 @@ def _is_noisy(samples: Samples) -> bool:
 
 
 def _without_say(shell: Shell, samples: Samples) -> int:
-    faces = shell.leak_test.faces
-    away = cKDTree(shell.lowest + shell.cell * (faces.cells + 0.5)).query(samples.positions)[0]
+    away = cKDTree(shell.middles(shell.leak_test.faces.cells)).query(samples.positions)[0]
     return int(np.count_nonzero(away > BURIED * float(np.median(samples.spacing))))
 
 
@@ -171,7 +170,7 @@ def _share_around(places: Floats, shell: Shell, reach: float) -> Floats:
 
 def _places(shell: Shell, bitmask: Bitmask) -> Floats:
     """Return the middles of a set of a shell's cubes."""
-    return np.asarray(shell.lowest + shell.cell * (shell.leak_test.shell.blocks.cells(bitmask) + 0.5))
+    return shell.middles(shell.leak_test.shell.blocks.cells(bitmask))
 
 
 def follows(shell: Shell, mesh: TriMesh, samples: Samples, origin: Floats, *, threads: int = 0) -> Stage[None]:
@@ -179,7 +178,7 @@ def follows(shell: Shell, mesh: TriMesh, samples: Samples, origin: Floats, *, th
     if not shell.leak_test.tight or shell.doubt:
         return Stage(None)
     deep = joint(shell.leak_test.shell, shell.finer)
-    inside = None if deep is None else shell.lowest + shell.cell * (deep + 0.5)
+    inside = None if deep is None else shell.middles(deep)
     place = passed_by(mesh, samples, threads=threads) if inside is None else inside
     if place is None:
         return Stage(None)

@@ -86,6 +86,10 @@ class Shell:
         faces = self.leak_test.faces
         return len(np.unique(faces.cells[faces.occupied], axis=0)) >= THIN * self.cubes
 
+    def middles(self, cells: NDArray[np.int64]) -> Floats:
+        """Return where the middles of cubes (c, 3) are."""
+        return np.asarray(self.lowest + self.cell * (cells + 0.5))
+
     def taken(self, settings: Settings) -> NDArray[np.bool_]:
         """Tell of each surface whether it is kept."""
         return self.leak_test.faces.worth_keeping(largest=settings.cubes.largest)
@@ -148,14 +152,12 @@ def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settin
     leaky = close_leaks(cells_of(once_each(keys)), TRIED[-1][-1:], threads=threads, progress=progress)
     asked = float(shell.cell.min()) if settings.cubes.cell_mm else None
     found = fill_inside(samples, leaky, lowest, shell.cell, cell=asked, threads=threads, progress=progress)
-    middles = found.lowest + found.cell * (found.leak_test.faces.cells + 0.5)
-    share = float(made_up(middles, samples, found.cell).mean())
-    if found.met < MET or (share > MADE_UP and not settings.cubes.fill_holes):
-        return shell
     where = place_in_words(found.doubtful + origin)
     doubt = f"the shell of cubes does not hold: the normals tell inside from outside, least surely around {where}"
     cell = np.full(3, found.cell)
-    return Shell(cell, found.lowest, found.cubes, shell.spanned, found.leak_test, by_normals=True, doubt=doubt)
+    other = Shell(cell, found.lowest, found.cubes, shell.spanned, found.leak_test, by_normals=True, doubt=doubt)
+    share = float(made_up(other.middles(found.leak_test.faces.cells), samples, found.cell).mean())
+    return shell if found.met < MET or (share > MADE_UP and not settings.cubes.fill_holes) else other
 
 
 def _borders(shell: Shell, samples: Samples, settings: Settings) -> list[Gap]:
