@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import re
@@ -299,27 +298,6 @@ class TestFaults:
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
-
-    @pytest.mark.parametrize("ends", [[], ["--no-such-option"]])
-    def test_streams_are_put_back_as_they_were_found(self, ends: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-        out, err = (io.TextIOWrapper(io.BytesIO(), "ascii", kind) for kind in ("strict", "backslashreplace"))
-        monkeypatch.setattr(sys, "stdout", out)
-        monkeypatch.setattr(sys, "stderr", err)
-        assert main(["inspect", "h\u00e4upter", *ends]) in (2, 3)
-        assert (out.errors, err.errors) == ("strict", "backslashreplace")
-        err.write("\u00fc")
-        err.flush()
-        said = err.buffer.getvalue()
-        assert said.count(b"\\xfc") == 1
-        assert b"\\xe4" not in said
-        assert ends or b"h?upter" in said
-
-    def test_streams_that_were_closed_by_then_are_left(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        out = io.TextIOWrapper(io.BytesIO(), "ascii")
-        monkeypatch.setattr(sys, "stdout", out)
-        monkeypatch.setattr("tomomesh.cli._told", lambda arguments: out.close())
-        main([])
-        assert out.closed
 
     @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
     def test_signals_leave_nothing_behind(self, number: int, code: int, study: Path, tmp_path: Path) -> None:

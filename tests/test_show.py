@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import io
-import subprocess
-import sys
 from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
 import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
-from PIL import Image
 
-from tomomesh.errors import OutputError
 from tomomesh.model.lattice import lattice
 from tomomesh.model.mesh import QuadMesh, TriMesh
 from tomomesh.model.networks import Networks
 from tomomesh.model.points import BRIDGE, CAP, PointSet
 from tomomesh.model.trace import Trace
-from tomomesh.show import draw_all, save, space
+from tomomesh.show import draw_all, space
 from tomomesh.show.camera import Camera
 from tomomesh.show.fit import draw_fit
 from tomomesh.show.gallery import median_slice
@@ -33,8 +27,6 @@ from tomomesh.show.space import draw_points, draw_shaded, draw_surfaces, draw_wi
 from tomomesh.show.topologies import draw_adapted, draw_update_regions
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -317,40 +309,3 @@ class TestGallery:
         assert median_slice(mask) == 2
         assert median_slice(mask, np.array([1, 4], np.int32)) == 4
         assert median_slice(np.zeros((2, 3, 3), bool)) == 0
-
-
-class TestSaving:
-    def test_repeats_its_bytes(self, ball: TriMesh) -> None:
-        files = [io.BytesIO() for _ in range(3)]
-        figure = draw_shaded(ball)
-        save(figure, files[0])
-        save(figure, files[1])
-        save(draw_shaded(ball), files[2])
-        assert files[0].getvalue() == files[1].getvalue() == files[2].getvalue()
-
-    def test_writes_a_png_without_date_or_software(self, ball: TriMesh, tmp_path: Path) -> None:
-        file = tmp_path / "ball.png"
-        figure = draw_shaded(ball)
-        save(figure, file)
-        with Image.open(file) as picture:
-            assert picture.format == "PNG"
-            assert set(picture.info) <= {"dpi"}
-            np.testing.assert_array_equal(np.asarray(picture.convert("RGBA")), pixels(figure))
-
-    def test_says_where_it_cannot_write(self, ball: TriMesh, tmp_path: Path) -> None:
-        with pytest.raises(OutputError, match="cannot be written"):
-            save(draw_shaded(ball), tmp_path / "nowhere" / "ball.png")
-
-    def test_leaves_the_callers_style_alone(self, ball: TriMesh) -> None:
-        before = dict(matplotlib.rcParams)
-        first, second = io.BytesIO(), io.BytesIO()
-        save(draw_shaded(ball), first)
-        assert dict(matplotlib.rcParams) == before
-        with matplotlib.rc_context({"font.size": 30, "axes.titlesize": 40}):
-            save(draw_shaded(ball), second)
-        assert first.getvalue() == second.getvalue()
-
-    def test_needs_no_display(self) -> None:
-        code = "import sys, tomomesh.show; print('matplotlib.pyplot' in sys.modules, 'tkinter' in sys.modules)"
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-        assert done.stdout.split() == ["False", "False"]

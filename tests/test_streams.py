@@ -267,3 +267,26 @@ class TestPipes:
         line = [sys.executable, "-c", PROGRAM, "inspect", "-", "--json"]
         done = subprocess.run(line, input=study.read_bytes(), capture_output=True, check=True)
         assert json.loads(done.stdout)["slices_rows_columns"] == [8, 9, 10]
+
+
+class TestOfTheCaller:
+    @pytest.mark.parametrize("ends", [[], ["--no-such-option"]])
+    def test_streams_are_put_back_as_they_were_found(self, ends: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+        out, err = (io.TextIOWrapper(io.BytesIO(), "ascii", kind) for kind in ("strict", "backslashreplace"))
+        monkeypatch.setattr(sys, "stdout", out)
+        monkeypatch.setattr(sys, "stderr", err)
+        assert main(["inspect", "h\u00e4upter", *ends]) in (2, 3)
+        assert (out.errors, err.errors) == ("strict", "backslashreplace")
+        err.write("\u00fc")
+        err.flush()
+        said = err.buffer.getvalue()
+        assert said.count(b"\\xfc") == 1
+        assert b"\\xe4" not in said
+        assert ends or b"h?upter" in said
+
+    def test_streams_that_were_closed_by_then_are_left(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        out = io.TextIOWrapper(io.BytesIO(), "ascii")
+        monkeypatch.setattr(sys, "stdout", out)
+        monkeypatch.setattr("tomomesh.cli._told", lambda arguments: out.close())
+        main([])
+        assert out.closed
