@@ -79,6 +79,8 @@ def apart(
     agree = noisy or _handles(first) == _handles(second) or not second.leak_test.tight
     if agree and joint(first.leak_test.shell, first.finer) is None:
         return first if first is shell else _with_neck(first, shell, origin)
+    if first.by_normals:  # which have been asked
+        return first
     third = by_normals(first)
     if is_nearer(third, first, samples, fewer=True):
         return third
