@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import resource
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ from importlib.metadata import version
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, NamedTuple
 
 SHARED = Path(__file__).parents[2] / "shared"
 """Data and judges beside the project; not part of it."""
@@ -88,6 +89,41 @@ def _seconds(call: Callable[[], Any], clock: Clock) -> float:
     start = clock()
     call()
     return clock() - start
+
+
+class Cost(NamedTuple):
+    """What a call or a process took: seconds of the wall clock, and of all processors together."""
+
+    wall: float
+    cpu: float
+
+
+def costs(*calls: Callable[[], Any], repeats: int = 7) -> list[Cost]:
+    """Return the median cost of each call, after one warm round; the calls take turns."""
+    for call in calls:
+        call()
+    rounds = [[_cost(call) for call in calls] for _ in range(repeats)]
+    return [Cost(*(median(part) for part in zip(*taken, strict=True))) for taken in zip(*rounds, strict=True)]
+
+
+def _cost(call: Callable[[], Any]) -> Cost:
+    """Clock a call; the processes that it starts and waits for count too."""
+    wall, cpu = time.perf_counter(), _processor_seconds()
+    call()
+    return Cost(time.perf_counter() - wall, _processor_seconds() - cpu)
+
+
+def _processor_seconds() -> float:
+    return sum(sum(resource.getrusage(whose)[:2]) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+
+
+def race(figure: str, ours: Cost, peer: Cost, mark: float, *, wall: float | None = None) -> None:
+    """Print our CPU time over a peer's against its mark, and the wall time's, against its own where it has one."""
+    note(f"{figure}: CPU", f"{ours.cpu:.3g} s for {peer.cpu:.3g} s")
+    at_most(f"{figure}: CPU, ratio", ours.cpu / peer.cpu, mark)
+    note(f"{figure}: wall", f"{ours.wall:.3g} s for {peer.wall:.3g} s, ratio {ours.wall / peer.wall:.3g}")
+    if wall is not None:
+        at_most(f"{figure}: wall, ratio", ours.wall / peer.wall, wall)
 
 
 def judge(name: str) -> Any:

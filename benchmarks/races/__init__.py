@@ -1,0 +1,1 @@
+"""Races of `speed.py`: each file prints the rows of one kind of work."""
