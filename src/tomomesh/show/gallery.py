@@ -20,13 +20,13 @@ from .space import draw_points, draw_shaded, draw_surfaces, draw_wireframe
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from ..model.contours import Contours
     from ..model.mesh import QuadMesh, TriMesh
     from ..model.points import PointSet
     from ..model.trace import Trace
+    from .drawing.page import Page
 
 
 def draw_all(
@@ -45,7 +45,7 @@ def draw_all(
     plane: Plane = Plane(),  # noqa: B008
     view: View = View(),  # noqa: B008
     tolerance: float | None = None,
-) -> Iterator[tuple[str, Figure]]:
+) -> Iterator[tuple[str, Page]]:
     """Draw every picture whose stages are given, numbered as the paper's figures.
 
     Parameters
@@ -73,7 +73,7 @@ def draw_all(
     ------
     name : str
         As ``"03-relief"``, the name for a file.
-    figure : Figure
+    page : Page
     """
     if images is not None and mask is not None:
         yield from _of_slice(images, mask, networks, labels, plane)
@@ -128,7 +128,7 @@ def _of_slice(
     networks: Networks | Contours | None,
     labels: NDArray[Any] | None,
     plane: Plane,
-) -> Iterator[tuple[str, Figure]]:
+) -> Iterator[tuple[str, Page]]:
     k = median_slice(mask, None if networks is None else networks.slices)
     note = f"slice {k + 1} of {len(images)}"
     yield "03-relief", draw_relief(images[k], plane)

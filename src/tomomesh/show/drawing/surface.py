@@ -1,0 +1,73 @@
+"""Polygons in space on a grid of pixels: what is nearer hides what is behind it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...kernels.rendering.triangles import NEAREST, STEPS, keep_nearest, mean_of_samples
+from ...kernels.threads import in_blocks
+from .style import INK, rgb
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+SAMPLES = 4
+"""Samples of a pixel, across and down."""
+BAND = 64
+"""Rows of pixels that one call draws."""
+
+
+def draw_polygons(
+    pixels: NDArray[np.uint8],
+    corners: Floats,
+    polygons: NDArray[np.int64],
+    colors: Floats,
+    *,
+    smooth: bool = False,
+    line: float = 0.0,
+    ink: str = INK,
+) -> None:
+    """Draw convex polygons, the nearest in front, whichever come first.
+
+    Parameters
+    ----------
+    pixels : (rows, columns, 3) uint8 array
+        Changed.
+    corners : (n, 3) float array
+        To the right and down in pixels, from the outer corner of the first, and toward the viewer in any unit.
+    polygons : (m, 3 or more) int array
+        Counterclockwise where they face the viewer.
+    colors : (2, n or m, 3) float array
+        Of the corners where `smooth`, else of the polygons, from the front and from behind, 0 to 255.
+    line : float
+        Width of the lines along their sides, in pixels.
+    ink : str
+        Color of these.
+    """
+    if not len(polygons) or not pixels.size:
+        return
+    placed, shades = _snapped(corners), np.ascontiguousarray(np.round(colors).astype(np.uint8))
+    sides, color = np.ascontiguousarray(polygons), rgb(ink).astype(np.uint8)
+    half = 0.5 * line * SAMPLES * STEPS
+
+    def work(start: int, stop: int) -> None:
+        nearest = np.zeros(((stop - start) * SAMPLES, pixels.shape[1] * SAMPLES), np.int64)
+        keep_nearest(placed, sides, shades, smooth, half, color, start * SAMPLES, nearest)
+        mean_of_samples(nearest, pixels[start:stop])
+
+    in_blocks(work, len(pixels), block=BAND)
+
+
+def _snapped(corners: Floats) -> NDArray[np.int64]:
+    """Lay corners on the grid of steps, and their depths between 0 and the largest."""
+    depth = corners[:, 2]
+    low, high = float(depth.min()), float(depth.max())
+    span = high - low
+    placed = np.empty(corners.shape, np.int64)
+    placed[:, :2] = np.round(corners[:, :2] * (SAMPLES * STEPS))
+    placed[:, 2] = (depth - low) / (span if span > 0 else 1.0) * NEAREST
+    return placed
