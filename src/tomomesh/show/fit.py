@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     Curves = dict[str, NDArray[np.generic]]
 
 COLORS = (NETWORK, ACCENT)
+FINE = 8
+"""Places of a step that a legend keeps off."""
 
 
 def draw_fit(trace: Trace, *, tolerance: float | None = None, unit: str = "mm") -> Page:
@@ -128,7 +130,9 @@ def _from_zero(heights: Floats, *, whole: bool) -> tuple[float, float, Floats]:
 
 def _name(ax: Panel, names: list[str], places: Floats) -> None:
     """Put a legend into the corner where the fewest steps are."""
-    seen, (left, top, right, bottom) = ax.place(places), ax.box
+    along = np.linspace(0, len(places) - 1, FINE * len(places))
+    fine = np.stack([np.interp(along, np.arange(len(places)), column) for column in places.T], axis=1)
+    seen, (left, top, right, bottom) = ax.place(fine), ax.box
     step = ax.page.points(13)
     wide = ax.page.points(14) + max(width_of(name, ax.page.points(SMALL)) for name in names)
     high = step * len(names)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .camera import Camera, brightness, normals
-from .drawing.marks import lines, small_print
+from .drawing.marks import fill, lines, small_print
 from .drawing.page import canvas
 from .drawing.style import MUTED, RELIEF
 from .plane import PIXELS, Plane, gray
@@ -33,7 +34,8 @@ def draw_relief(image: NDArray[Any], plane: Plane = PIXELS, camera: Camera = TAB
     low, high = float(coarse.min()), float(coarse.max())
     grid = _grid(coarse, low, high, (plane.spacing_mm[0] * block, plane.spacing_mm[1] * block), plane.upward)
     page, (ax,) = canvas(8.2, 5.2)
-    _limit(ax, camera.project(grid.reshape(-1, 3))[:, :2])
+    box = np.array([*product(*zip(grid.min(axis=(0, 1)), grid.max(axis=(0, 1)), strict=True))])
+    _limit(ax, camera.project(box)[:, :2])
     _draw_box(ax, grid, camera, (low, high))
     _draw_landscape(ax, grid, camera)
     ax.heading("A slice as a matrix", f"{levels.shape[1]} x {levels.shape[0]} pixels, height and color by gray level k")
@@ -73,11 +75,14 @@ def _draw_landscape(ax: Panel, grid: NDArray[np.float64], camera: Camera) -> Non
     facets = np.stack(corners, axis=2).reshape(-1, 4)
     if normals(vertices, facets)[:, 2].sum() < 0:
         facets = facets[:, ::-1]
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    table = np.array([[low[0], low[1], 0], [high[0], low[1], 0], [high[0], high[1], 0], [low[0], high[1], 0]])
+    fill(ax, camera.project(table)[None, :, :2], color=RELIEF(0.0))
     seen = camera.project(vertices)
     level = vertices[facets, 2].mean(axis=1) / (grid[..., 2].max() or 1.0)
     toward = normals(seen, facets)
     light = np.stack([brightness(toward), brightness(-toward)])[:, :, None]
-    draw_colored(ax, seen, facets, RELIEF(level) * (0.45 + 0.55 * light))
+    draw_colored(ax, seen, facets, np.round(RELIEF(level) * (0.45 + 0.55 * light)).astype(np.uint8))
 
 
 def _draw_box(ax: Panel, grid: NDArray[np.float64], camera: Camera, levels: tuple[float, float]) -> None:

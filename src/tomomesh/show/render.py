@@ -9,7 +9,7 @@ import numpy as np
 
 from .camera import Camera, brightness, normals
 from .drawing.marks import lines, small_print
-from .drawing.style import BEHIND, BONE, INK, MUTED, WHITE, opaque
+from .drawing.style import BEHIND, BONE, INK, MUTED
 from .drawing.surface import draw_polygons
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
+    Bytes = NDArray[np.uint8]
 
 
 NARROWEST = 0.45
@@ -45,7 +46,7 @@ def draw_faces(
 
 def draw_wires(ax: Panel, mesh: TriMesh, camera: Camera, *, width: float) -> None:
     """Draw the sides of the faces, those behind others hidden."""
-    white = np.stack([opaque(WHITE, len(mesh.faces))[:, :3]] * 2)
+    white = np.full((2, len(mesh.faces), 3), 255, np.uint8)
     draw_colored(ax, camera.project(mesh.vertices), mesh.faces, white, width=width)
 
 
@@ -55,13 +56,13 @@ def draw_smooth(ax: Panel, mesh: TriMesh, camera: Camera) -> None:
     draw_colored(ax, camera.project(mesh.vertices), mesh.faces, shades, smooth=True)
 
 
-def _lit(directions: Floats) -> Floats:
+def _lit(directions: Floats) -> Bytes:
     """Return the colors of surfaces with the given normals, of the camera's frame, from the front and from behind."""
     return np.stack([BONE(brightness(directions)), BEHIND(brightness(-directions))])
 
 
 def draw_colored(
-    ax: Panel, seen: Floats, polygons: Ints, colors: Floats, *, smooth: bool = False, edge: str = INK,
+    ax: Panel, seen: Floats, polygons: Ints, colors: Bytes, *, smooth: bool = False, edge: str = INK,
     width: float = 0.0,
 ) -> None:  # fmt: skip
     """Draw (m, 3 or 4) polygons over (n, 3) places of the camera's frame in the colors of both of their sides."""

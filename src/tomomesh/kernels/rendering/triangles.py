@@ -74,7 +74,8 @@ def keep_nearest(
             on_b = 0 if ay < cy or (ay == cy and ax > cx) else 1
             on_c = 0 if by < ay or (by == ay and bx > ax) else 1
             share = 1.0 / abs(twice)
-            depth, to_b, to_c = float(corners[a, 2]), corners[b, 2] - corners[a, 2], corners[c, 2] - corners[a, 2]
+            depth = float(corners[a, 2])
+            to_b, to_c = float(corners[b, 2]) - depth, float(corners[c, 2]) - depth
             of_colors, b_colors, c_colors = (a, b, c) if smooth else (number, number, number)
             long_a = np.sqrt(float((cx - bx) ** 2 + (cy - by) ** 2))
             long_b = np.sqrt(float((ax - cx) ** 2 + (ay - cy) ** 2))
@@ -88,15 +89,16 @@ def keep_nearest(
                 for i in range(left, right + 1):
                     if at_a >= on_a and at_b >= on_b and at_c >= on_c:
                         second, third = at_b * share, at_c * share
-                        height = min(max(depth + second * to_b + third * to_c, 0.0), float(NEAREST))
-                        key = (np.int64(height) + 1) << 32
+                        key = (np.int64(depth + second * to_b + third * to_c) + 1) << 32
                         if key + 0xFFFFFF >= nearest[j, i]:
-                            away = at_a / long_a
-                            if of_b:
-                                away = min(away, at_b / long_b)
-                            if of_c:
-                                away = min(away, at_c / long_c)
-                            inked = max(min(away + middle, line) - max(away - middle, -line), 0.0) / STEPS
+                            inked = 0.0
+                            if line > 0.0:
+                                away = at_a / long_a
+                                if of_b:
+                                    away = min(away, at_b / long_b)
+                                if of_c:
+                                    away = min(away, at_c / long_c)
+                                inked = max(min(away + middle, line) - max(away - middle, -line), 0.0) / STEPS
                             for channel in range(3):
                                 color = float(colors[side, of_colors, channel])
                                 if smooth:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 TICK = 3
 """Length of a tick in points."""
+NAME = 19
+"""Points between an axis and its name."""
 SMALL = 8.5
 """Letters of axes and legends, in points."""
 
@@ -86,7 +88,7 @@ def rule(
         ax.rule(place - np.array([[tick, 0], [0, 0]]), 0.6, MUTED)
         page.write(word, (place[0] - 2 * tick, place[1]), color=MUTED, align=1, up=0.5, size=SMALL)
         broad = max(broad, width_of(word, page.points(SMALL)))
-    page.write(along, ((x0 + x1) / 2, y1 + page.points(15)), color=MUTED, align=0.5, up=1, size=SMALL)
+    page.write(along, ((x0 + x1) / 2, y1 + page.points(NAME)), color=MUTED, align=0.5, up=1, size=SMALL)
     page.write(
         up, (x0 - 2 * tick - broad - page.points(5), (y0 + y1) / 2), color=MUTED, align=0.5, upward=True, size=SMALL
     )
@@ -122,7 +124,7 @@ def color_bar(
     if upright:
         page.write(name, (x1 + 3.5 * tick + broad, (y0 + y1) / 2), align=0.5, up=1, upward=True, **look)
     else:
-        page.write(name, ((x0 + x1) / 2, y1 + page.points(15)), align=0.5, up=1, **look)
+        page.write(name, ((x0 + x1) / 2, y1 + page.points(NAME)), align=0.5, up=1, **look)
 
 
 def legend(

@@ -66,7 +66,8 @@ def fill(ax: Panel, polygons: Floats, *, color: Any) -> None:
     flat = np.zeros((count * corners, 3))
     flat[:, :2] = _inside(ax, ax.place(polygons.reshape(-1, 2)))
     sides = np.arange(count * corners).reshape(count, corners)
-    draw_polygons(ax.pixels, flat, sides, np.stack([opaque(color, count)[:, :3]] * 2))
+    shades = np.round(opaque(color, count)[:, :3]).astype(np.uint8)
+    draw_polygons(ax.pixels, flat, sides, np.stack([shades, shades]))
 
 
 def show(

@@ -12,9 +12,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     Floats = NDArray[np.float64]
-    Ramp = Callable[[ArrayLike], Floats]
+    Ramp = Callable[[ArrayLike], NDArray[np.uint8]]
 
 DPI = 150
+STEPS = 256
+"""Colors of a scale."""
 INK, MUTED, RULE, WHITE = "#17222b", "#66757f", "#d3dae0", "#ffffff"
 SIGNAL, NETWORK, ACCENT = "#b4bfc7", "#0b6b88", "#d9480f"
 TRACKS = (NETWORK, "#8a4f9e", "#2e7d4f", "#a8791a", INK)
@@ -42,10 +44,12 @@ def opaque(color: Any, count: int) -> Floats:
 def ramp(*stops: str) -> Ramp:
     """Return a scale that carries 0 to 1 to colors between evenly spaced stops, (..., 3) from 0 to 255."""
     levels = np.array([rgb(stop) for stop in stops])
-    places = np.linspace(0, 1, len(stops))
+    places = np.linspace(0, len(stops) - 1, STEPS)
+    table = np.stack([np.interp(places, np.arange(len(stops)), channel) for channel in levels.T], axis=1)
+    shades = np.round(table).astype(np.uint8)
 
-    def colors(values: ArrayLike) -> Floats:
-        return np.stack([np.interp(values, places, channel) for channel in levels.T], axis=-1)
+    def colors(values: ArrayLike) -> NDArray[np.uint8]:
+        return np.asarray(shades[np.rint(np.asarray(values) * (STEPS - 1)).astype(np.intp)])
 
     return colors
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-SAMPLES = 4
+SAMPLES = 3
 """Samples of a pixel, across and down."""
 BAND = 64
 """Rows of pixels that one call draws."""
@@ -25,7 +25,7 @@ def draw_polygons(
     pixels: NDArray[np.uint8],
     corners: Floats,
     polygons: NDArray[np.int64],
-    colors: Floats,
+    colors: NDArray[np.uint8],
     *,
     smooth: bool = False,
     line: float = 0.0,
@@ -41,33 +41,36 @@ def draw_polygons(
         To the right and down in pixels, from the outer corner of the first, and toward the viewer in any unit.
     polygons : (m, 3 or more) int array
         Counterclockwise where they face the viewer.
-    colors : (2, n or m, 3) float array
-        Of the corners where `smooth`, else of the polygons, from the front and from behind, 0 to 255.
+    colors : (2, n or m, 3) uint8 array
+        Of the corners where `smooth`, else of the polygons, from the front and from behind.
     line : float
         Width of the lines along their sides, in pixels.
     ink : str
         Color of these.
     """
-    if not len(polygons) or not pixels.size:
+    low = np.clip(np.floor(corners[:, :2].min(axis=0, initial=np.inf)), 0, pixels.shape[1::-1]).astype(int)
+    high = np.clip(np.ceil(corners[:, :2].max(axis=0, initial=-np.inf)), low, pixels.shape[1::-1]).astype(int)
+    part = pixels[low[1] : high[1], low[0] : high[0]]
+    if not len(polygons) or not part.size:
         return
-    placed, shades = _snapped(corners), np.ascontiguousarray(np.round(colors).astype(np.uint8))
-    sides, color = np.ascontiguousarray(polygons), rgb(ink).astype(np.uint8)
+    placed, color = _snapped(corners, low), rgb(ink).astype(np.uint8)
+    sides, shades = np.ascontiguousarray(polygons), np.ascontiguousarray(colors)
     half = 0.5 * line * SAMPLES * STEPS
 
     def work(start: int, stop: int) -> None:
-        nearest = np.zeros(((stop - start) * SAMPLES, pixels.shape[1] * SAMPLES), np.int64)
+        nearest = np.zeros(((stop - start) * SAMPLES, part.shape[1] * SAMPLES), np.int64)
         keep_nearest(placed, sides, shades, smooth, half, color, start * SAMPLES, nearest)
-        mean_of_samples(nearest, pixels[start:stop])
+        mean_of_samples(nearest, part[start:stop])
 
-    in_blocks(work, len(pixels), block=BAND)
+    in_blocks(work, len(part), block=BAND)
 
 
-def _snapped(corners: Floats) -> NDArray[np.int64]:
-    """Lay corners on the grid of steps, and their depths between 0 and the largest."""
+def _snapped(corners: Floats, first: NDArray[np.int_]) -> NDArray[np.int64]:
+    """Lay corners on the grid of steps from a first pixel, and their depths between 0 and the largest."""
     depth = corners[:, 2]
     low, high = float(depth.min()), float(depth.max())
     span = high - low
     placed = np.empty(corners.shape, np.int64)
-    placed[:, :2] = np.round(corners[:, :2] * (SAMPLES * STEPS))
+    placed[:, :2] = np.round((corners[:, :2] - first) * (SAMPLES * STEPS))
     placed[:, 2] = (depth - low) / (span if span > 0 else 1.0) * NEAREST
     return placed
