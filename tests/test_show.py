@@ -278,7 +278,7 @@ class TestSlices:
 
     def test_regions_keep_their_colors(self, study: dict[str, NDArray[np.generic]], networks: Networks) -> None:
         labels = study["labels"][0]
-        page = draw_regions(study["images"][0], study["mask"][0], networks.codebooks[0], networks.lattice, labels)
+        page = draw_regions(study["images"][0], study["mask"][0], networks.codebooks[0], networks.lattice)
         shown = on_slice(page, 3, labels)
         colors = np.array([shown[labels == label][0] for label in range(17)])
         assert all((shown[labels == label] == colors[label]).all() for label in range(17))
@@ -367,7 +367,6 @@ class TestGallery:
                 images=study["images"],
                 mask=study["mask"].astype(bool),
                 networks=networks,
-                labels=study["labels"],
                 points=PointSet.from_positions(ball.vertices),
                 cuberille=cube,
                 triangulated=cube.triangulated(),

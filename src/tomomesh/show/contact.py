@@ -13,7 +13,7 @@ from ..model.networks import Networks
 from .drawing.marks import lines
 from .drawing.page import canvas
 from .drawing.style import ACCENT, INK, MUTED, NETWORK, TRACKS
-from .plane import PIXELS, Plane
+from .plane import PIXELS, Plane, on_paper
 from .render import nice_length
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ LETTERS = 6.8
 """Points of the letters beside slices."""
 MOST_LINES = 3
 """Contours of a slice whose measures are written."""
-PALE, PAPER = (217, 224, 230), (255, 255, 255)
+PALE = (217, 224, 230)
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ def _page(
     words = max((min(len(nets.get(int(k), ())), MOST_LINES + 1) for k in part), default=1)
     page, axes = contact_sheet(len(part), bounds, plane, which, f"{note}; dashed: bridged gaps", 0.12 * max(words, 1))
     for ax, k in zip(axes, part, strict=True):
-        plane.draw(ax, np.where(mask[k][:, :, None], PALE, PAPER))
+        plane.draw(ax, on_paper(mask[k], PALE))
         _draw_nets(ax, nets.get(int(k), []), f"{k + 1}", empty=not mask[k].any())
     return page
 

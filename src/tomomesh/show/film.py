@@ -13,7 +13,7 @@ from .drawing.axes import around
 from .drawing.marks import dots, lines
 from .drawing.page import canvas
 from .drawing.style import NETWORK, WHITE
-from .plane import PIXELS, Plane
+from .plane import PIXELS, Plane, on_paper
 from .topologies import flat
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ SIDE = 4.0
 DPI = 100
 COLORS = 32
 FRONT = Camera()
-PALE, PAPER = (204, 214, 222), (255, 255, 255)
+PALE = (204, 214, 222)
 
 
 def film(
@@ -114,7 +114,7 @@ def film_slice(
     ratio = float(np.clip((bounds[1] - bounds[0])[1] / (bounds[1] - bounds[0])[0], 0.4, 1.8))
     page, (ax,) = canvas(SIDE, SIDE * ratio + 0.35, left=0.5, below=0.42, dpi=DPI)
     plane.crop(ax, bounds)
-    plane.draw(ax, np.where(np.asarray(mask, bool)[:, :, None], PALE, PAPER))
+    plane.draw(ax, on_paper(np.asarray(mask, bool), PALE))
     plane.rule([ax])
     return _encoded(list(_frames(page, ax, places, network, notes, title)))
 

@@ -135,11 +135,10 @@ def _name(ax: Panel, names: list[str], places: Floats) -> None:
     seen, (left, top, right, bottom) = ax.place(fine), ax.box
     step = ax.page.points(13)
     wide = ax.page.points(14) + max(width_of(name, ax.page.points(SMALL)) for name in names)
-    high = step * len(names)
-    corners = [(x, y) for y in (top + step / 2, bottom - high) for x in (right - wide, left + step)]
-    hidden = [
-        np.count_nonzero((seen >= [x - step, y - step]).all(axis=1) & (seen <= [x + wide, y + high]).all(axis=1))
-        for x, y in corners
-    ]
+    high = step * (len(names) - 1)
+    corners = [(x, y) for y in (top + 0.6 * step, bottom - high - step) for x in (right - wide, left + step)]
+    half = np.array([wide + 0.8 * step, high + 1.2 * step]) / 2
+    middles = np.array(corners) + np.array([wide, high]) / 2
+    hidden = [np.count_nonzero((np.abs(seen - middle) < half).all(axis=1)) for middle in middles]
     entries = [("-", color, name) for name, color in zip(names, COLORS, strict=False)]
     legend(ax.page, entries, corners[int(np.argmin(hidden))], stacked=True)

@@ -44,13 +44,13 @@ class Plane:
         return np.asarray(indices * np.array(self.spacing_mm))
 
     def draw(self, ax: Panel, image: Pixels, span: tuple[float, float] = (0, 1)) -> None:
-        """Show (J, I) levels in gray, black and white at the ends of the span, or (J, I, 3) colors from 0 to 255."""
+        """Show (J, I) levels in gray, black and white at the ends of the span, or (J, I, 3) uint8 colors."""
         (dx, dy), (rows, columns) = self.spacing_mm, image.shape[:2]
         top, bottom = -0.5 * dy, (rows - 0.5) * dy
         if image.ndim == 2:
             low, high = span
-            image = np.clip((image - low) * (255.0 / ((high - low) or 1.0)), 0, 255)
-        show(ax, np.round(image).astype(np.uint8), -0.5 * dx, bottom, (columns - 0.5) * dx, top, upward=self.upward)
+            image = np.round(np.clip((image - low) * (255.0 / ((high - low) or 1.0)), 0, 255)).astype(np.uint8)
+        show(ax, image, -0.5 * dx, bottom, (columns - 0.5) * dx, top, upward=self.upward)
 
     def fit(self, ax: Panel, image: Pixels) -> None:
         """Limit a panel to a whole slice."""
@@ -82,6 +82,11 @@ FAR = 2.0
 measured, as -9999: it is drawn black or white. Background of 0 around a head is nearer. Only pictures depend on it."""
 PIXELS = Plane()
 """A slice whose pixels are squares of 1 mm."""
+
+
+def on_paper(mask: Pixels, color: tuple[int, int, int]) -> NDArray[np.uint8]:
+    """Return a window in a color on white, (J, I, 3)."""
+    return np.array([(255, 255, 255), color], np.uint8)[np.asarray(mask, np.uint8)]
 
 
 def gray(image: Pixels) -> Floats:

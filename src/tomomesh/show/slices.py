@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from ..som.fit import match
 from .drawing.marks import arrow, dots, lines, pointer
 from .drawing.style import ACCENT, NETWORK, WHITE
-from .plane import PIXELS, Plane, contrast, gray, panels
+from .plane import PIXELS, Plane, contrast, gray, on_paper, panels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 AXES = {"left": 0.5, "below": 0.42}
 """Inches for what axes say."""
 ON_DARK, BLACK = "#ff9a4d", "#000000"
-PALE, PAPER = (194, 204, 212), (255, 255, 255)
+PALE = (194, 204, 212)
 
 
 def draw_window(image: Pixels, mask: Pixels, plane: Plane = PIXELS, *, note: str = "") -> Page:
@@ -56,9 +57,7 @@ class Joined(Protocol):
         """Numbers (e, 2) of both neurons of each pair."""
 
 
-def draw_regions(
-    image: Pixels, mask: Pixels, codebook: Floats, network: Joined, labels: Pixels, plane: Plane = PIXELS
-) -> Page:
+def draw_regions(image: Pixels, mask: Pixels, codebook: Floats, network: Joined, plane: Plane = PIXELS) -> Page:
     """Draw the way of a slice: image, window, network, regions (Fig. 5).
 
     Parameters
@@ -71,8 +70,6 @@ def draw_regions(
         Neurons in pixel indices (column, row).
     network : Joined
         Which neurons are neighbors.
-    labels : (J, I) int array
-        0 outside, else the number of the nearest neuron plus one.
     plane : Plane
         Spacing and sense of the slice.
     """
@@ -86,7 +83,7 @@ def draw_regions(
     plane.draw(axes[2], inside, (0, 3))
     lines(axes[2], places[network.edges], color=ON_DARK, width=0.9)
     dots(axes[2], places, size=3, color=ON_DARK)
-    plane.draw(axes[3], _colored(labels, len(codebook)))
+    plane.draw(axes[3], _regions(mask, places, plane))
     axes[0].heading("1  Image", "gray levels k")
     axes[1].heading("2  Window", "k inside the limits")
     axes[2].heading("3  Network", f"{network.name} of {len(network)} neurons")
@@ -103,13 +100,22 @@ def _flow(page: Page, left: Panel, right: Panel) -> None:
     pointer(page, np.array([[left.box[2] + shift, middle], [right.box[0] - shift, middle]]), color=ACCENT)
 
 
-def _colored(labels: Pixels, neurons: int) -> Floats:
-    """Color the regions around the wheel, neighbors by turns lighter and darker, (J, I, 3)."""
-    number = np.arange(neurons)
-    turns = 6 * (number[:, None] / neurons + np.array([0, 2 / 3, 1 / 3]))  # red, green and blue, a third apart
-    wheel = 1 - 0.62 * (1 - np.clip(np.abs(turns % 6 - 3) - 1, 0, 1))
-    colors = 255 * np.where(number % 2, 0.95, 0.68)[:, None] * wheel
-    return np.asarray(np.vstack([np.zeros((1, 3)), colors])[np.asarray(labels, np.int64)])
+def _regions(mask: Pixels, places: Floats, plane: Plane) -> Pixels:
+    """Give each pixel of the window the color of its nearest neuron, (J, I, 3)."""
+    rows, columns = np.nonzero(mask)
+    pixels = plane.place(np.stack([columns, rows], axis=1))
+    winners, _ = match(np.ascontiguousarray(places.T), np.ascontiguousarray(pixels.T))
+    shown = np.zeros((*mask.shape, 3), np.uint8)
+    shown[rows, columns] = _wheel(len(places))[winners]
+    return shown
+
+
+def _wheel(count: int) -> NDArray[np.uint8]:
+    """Return colors around the wheel, neighbors by turns lighter and darker, (count, 3)."""
+    number = np.arange(count)
+    turns = 6 * (number[:, None] / count + np.array([0, 2 / 3, 1 / 3]))  # red, green and blue, a third apart
+    colors = 1 - 0.62 * (1 - np.clip(np.abs(turns % 6 - 3) - 1, 0, 1))
+    return np.asarray(np.round(255 * np.where(number % 2, 0.95, 0.68)[:, None] * colors).astype(np.uint8))
 
 
 def draw_contour(
@@ -124,7 +130,7 @@ def draw_contour(
     page, axes = panels(8.6, 2, bounds[1] - bounds[0], 0.55, **AXES)
     for ax in axes:
         plane.crop(ax, bounds)
-    plane.draw(axes[0], np.where(np.asarray(mask, bool)[:, :, None], PALE, PAPER))
+    plane.draw(axes[0], on_paper(mask, PALE))
     lines(axes[0], places[network.edges], color=BLACK, width=0.9)
     dots(axes[0], places, size=3.9, color=BLACK, marker="D")
     axes[0].heading("a  Neurons and virtual lines", f"{network.name} of {len(network)} neurons over the window")

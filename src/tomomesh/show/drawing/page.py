@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import io
+import struct
+import zlib
 from os import PathLike
+from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
@@ -18,8 +20,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-COMPRESSION = 1
-"""Of PNG: 2 and 4 take 2 and 33 % longer for files 2 % smaller and 3 % larger, 9 six times as long for 5 %."""
+COMPRESSION = 2
+"""Of PNG; 1 and 4 make files 6 % larger and 1 % smaller, and 4 takes 1.4 times as long."""
 UNIT = np.array([0.0, 0.0, 1.0, 1.0])
 MARGIN = 0.09
 """Inches around what a page shows."""
@@ -76,9 +78,7 @@ class Page:
 
     def _repr_png_(self) -> bytes:
         """Show the page in a notebook."""
-        file = io.BytesIO()
-        save(self, file)
-        return file.getvalue()
+        return png(self)
 
 
 class Panel:
@@ -177,7 +177,31 @@ def save(page: Page, file: str | PathLike[str] | IO[bytes]) -> None:
         Where the file cannot be written.
     """
     try:
-        page.image().save(file, format="PNG", compress_level=COMPRESSION, dpi=(page.dpi, page.dpi))
+        if isinstance(file, str | PathLike):
+            Path(file).write_bytes(png(page))
+        else:
+            file.write(png(page))
     except OSError as error:
         name = str(file) if isinstance(file, str | PathLike) else ""
         raise OutputError("the picture cannot be written", file=name, hint=str(error.strerror)) from error
+
+
+def png(page: Page) -> bytes:
+    """Return a page as a PNG file.
+
+    Its rows are packed as they are: Pillow tries five filters on each, which takes longer than all else that it does
+    and saves nothing in drawings.
+    """
+    pixels = np.asarray(page.image())
+    rows = np.zeros((pixels.shape[0], 1 + 3 * pixels.shape[1]), np.uint8)
+    rows[:, 1:] = pixels.reshape(len(pixels), -1)
+    per_meter = round(page.dpi / 0.0254)
+    chunks = (
+        (b"IHDR", struct.pack(">2I5B", pixels.shape[1], pixels.shape[0], 8, 2, 0, 0, 0)),  # 8 bits, red green blue
+        (b"pHYs", struct.pack(">2IB", per_meter, per_meter, 1)),
+        (b"IDAT", zlib.compress(rows, COMPRESSION)),
+        (b"IEND", b""),
+    )
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data)) for name, data in chunks
+    )
