@@ -121,7 +121,8 @@ def film_slice(
 
 def _dot_size(count: int, dimensions: int) -> float:
     """Let the dots of a filled plane region overlap, which also is shorter to store; keep those in space apart."""
-    return float(np.clip(1.5e5 / count, 2.0, 36.0) if dimensions == 2 else np.clip(1.5e4 / count, 1.0, 9.0)) ** 0.5
+    area = np.clip(1.5e5 / count, 2.0, 36.0) if dimensions == 2 else np.clip(1.5e4 / count, 1.0, 9.0)
+    return float(np.sqrt(area))
 
 
 def _frames(

@@ -13,6 +13,8 @@ from .drawing.page import canvas
 from .drawing.style import ACCENT, MUTED, NETWORK
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from ..model.trace import Trace
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from .drawing.page import Page, Panel
 
     Floats = NDArray[np.float64]
-    Curves = dict[str, NDArray[np.generic]]
+    Curves = Mapping[str, NDArray[np.generic]]
 
 COLORS = (NETWORK, ACCENT)
 FINE = 8
@@ -72,8 +74,8 @@ def draw_learning(history: History, *, unit: str = "") -> Page:
     axes[0].heading("Quantization error", f"mean distance of an input to its winner{ending}")
     _curves(axes[1], {"largest move": history.largest_move}, log=True, along="epoch")
     axes[1].heading("Largest move", f"of a neuron in an epoch{ending}")
-    curves: Curves = {"radius": history.radius}
-    _curves(axes[2], curves | ({"learning rate": rate} if online else {}), log=online, along="epoch")
+    curves = {"radius": history.radius} | ({"learning rate": rate} if online else {})
+    _curves(axes[2], curves, log=online, along="epoch")
     axes[2].heading("Radius" + (" and learning rate" if online else ""), "of the neighborhood, hops")
     return page
 
@@ -85,24 +87,24 @@ def _curves(
     """Draw curves over the steps, and a level by its name; a logarithmic axis leaves zeros out."""
     heights = [np.asarray(values, np.float64) for values in curves.values()]
     name, at = level
-    known = np.concatenate([*heights, [] if at is None else [at]])
-    log = log and bool((known > 0).any())
-    bottom, top, marked = _powers(known[known > 0]) if log else _from_zero(known, whole=whole)
+    every = np.concatenate([*heights, [] if at is None else [at]])
+    log = log and bool((every > 0).any())
+    bottom, top, marked = _powers(every[every > 0]) if log else _from_zero(every, whole=whole)
     count = max(map(len, heights))
     ax.limit(1 - 0.03 * count, bottom, count + 0.03 * count, top, equal=False)
     words = [f"{value:g}" for value in 10.0**marked] if log else None
     rule(ax, along=along, x=ticks(1, max(count, 2), 9, whole=True), y=marked, words=words, grid=True)
     if at is not None and (at > 0 or not log):
         line = np.log10(at) if log else at
-        lines(
-            ax, np.array([[ax.limits[[0]], ax.limits[[2]]]]) * [1, 0] + [0, line], color=MUTED, width=0.9, dashed=True
-        )
+        level_line = np.array([[[ax.limits[0], line], [ax.limits[2], line]]])
+        lines(ax, level_line, color=MUTED, width=0.9, dashed=True)
         small_print(ax, name, np.array([1, line]), (0, 6), align=0)
     places = []
     for each, color in zip(heights, COLORS, strict=False):
         places.append(_places(each, log=log))
-        lines(ax, np.stack([places[-1][:-1], places[-1][1:]], axis=1), color=color, width=1.6)
-        dots(ax, places[-1], size=2.6, color=color)
+        sides, known = np.stack([places[-1][:-1], places[-1][1:]], axis=1), np.isfinite(places[-1][:, 1])
+        lines(ax, sides[known[:-1] & known[1:]], color=color, width=1.6)
+        dots(ax, places[-1][known], size=2.6, color=color)
     if len(curves) > 1:
         _name(ax, [*curves], np.concatenate(places))
 

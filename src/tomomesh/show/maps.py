@@ -135,7 +135,7 @@ def _draw_cells(
     """Fill a cell around each center, and put a scale beside them, from the lowest value on."""
     highest = float(values.max())
     low, high = lowest if lowest < highest else 0.0, highest or 1.0
-    fill(ax, centers[:, None] + corners, color=TINT((values - low) / (high - low)))
+    fill(ax, centers[:, None] + corners, color=TINT((np.asarray(values, np.float64) - low) / (high - low)))
     inch, (left, _, right, bottom) = ax.page.dpi, ax.box
     half, middle = 0.375 * (right - left), (left + right) / 2
     bar = np.array([middle - half, bottom + 0.12 * inch, middle + half, bottom + 0.21 * inch])

@@ -53,14 +53,8 @@ def _draw_update(
 ) -> None:
     lines(ax, places[network.edges], color=SIGNAL, width=1.2)
     lines(ax, moved[network.edges], color=NETWORK, width=1.6)
-    dots(
-        ax,
-        places,
-        size=15.2,
-        color=WHITE,
-        rim=np.where(near[:, None], opaque(NETWORK, 1), opaque(SIGNAL, 1)),
-        width=1.3,
-    )
+    rims = np.where(near[:, None], opaque(NETWORK, 1), opaque(SIGNAL, 1))
+    dots(ax, places, size=15.2, color=WHITE, rim=rims, width=1.3)
     dots(ax, moved[near], size=5.8, color=NETWORK)
     for number, (place, moves) in enumerate(zip(places, near, strict=True), 1):
         small_print(ax, str(number), place, color=INK if moves else MUTED)

@@ -76,7 +76,11 @@ def keep_nearest(
             share = 1.0 / abs(twice)
             depth = float(corners[a, 2])
             to_b, to_c = float(corners[b, 2]) - depth, float(corners[c, 2]) - depth
-            of_colors, b_colors, c_colors = (a, b, c) if smooth else (number, number, number)
+            u, v, w = (a, b, c) if smooth else (number, number, number)
+            tones = colors[side]
+            red_a, green_a, blue_a = float(tones[u, 0]), float(tones[u, 1]), float(tones[u, 2])
+            red_b, green_b, blue_b = tones[v, 0] - red_a, tones[v, 1] - green_a, tones[v, 2] - blue_a
+            red_c, green_c, blue_c = tones[w, 0] - red_a, tones[w, 1] - green_a, tones[w, 2] - blue_a
             long_a = np.sqrt(float((cx - bx) ** 2 + (cy - by) ** 2))
             long_b = np.sqrt(float((ax - cx) ** 2 + (ay - cy) ** 2))
             long_c = np.sqrt(float((bx - ax) ** 2 + (by - ay) ** 2))
@@ -99,16 +103,13 @@ def keep_nearest(
                                 if of_c:
                                     away = min(away, at_c / long_c)
                                 inked = max(min(away + middle, line) - max(away - middle, -line), 0.0) / STEPS
-                            for channel in range(3):
-                                color = float(colors[side, of_colors, channel])
-                                if smooth:
-                                    color = (
-                                        (1.0 - second - third) * color
-                                        + second * colors[side, b_colors, channel]
-                                        + third * colors[side, c_colors, channel]
-                                    )
-                                color += inked * (ink[channel] - color)
-                                key |= np.int64(color + 0.5) << (16 - 8 * channel)
+                            red = red_a + second * red_b + third * red_c
+                            green = green_a + second * green_b + third * green_c
+                            blue = blue_a + second * blue_b + third * blue_c
+                            red += inked * (ink[0] - red)
+                            green += inked * (ink[1] - green)
+                            blue += inked * (ink[2] - blue)
+                            key |= np.int64(red + 0.5) << 16 | np.int64(green + 0.5) << 8 | np.int64(blue + 0.5)
                             nearest[j, i] = max(nearest[j, i], key)
                     at_a -= (cy - by) * STEPS
                     at_b -= (ay - cy) * STEPS

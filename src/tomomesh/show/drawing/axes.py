@@ -45,9 +45,9 @@ def decades(low: float, high: float, most: int = 6) -> Floats:
     every = 10.0 ** np.arange(first, last + 1)
     kept = every[(every >= low) & (every <= high)]
     if len(kept) > 2:
-        return kept[:: -(-len(kept) // most)]
-    finer = np.outer(every, [1, 2, 5]).ravel()
-    return np.asarray(finer[(finer >= low) & (finer <= high)])
+        return np.asarray(kept[:: -(-len(kept) // most)], np.float64)
+    finer = np.outer(every, [1.0, 2.0, 5.0]).ravel()
+    return np.asarray(finer[(finer >= low) & (finer <= high)], np.float64)
 
 
 def written(values: Floats) -> list[str]:

@@ -199,7 +199,7 @@ def png(page: Page) -> bytes:
     chunks = (
         (b"IHDR", struct.pack(">2I5B", pixels.shape[1], pixels.shape[0], 8, 2, 0, 0, 0)),  # 8 bits, red green blue
         (b"pHYs", struct.pack(">2IB", per_meter, per_meter, 1)),
-        (b"IDAT", zlib.compress(rows, COMPRESSION)),
+        (b"IDAT", zlib.compress(rows.data, COMPRESSION)),
         (b"IEND", b""),
     )
     return b"\x89PNG\r\n\x1a\n" + b"".join(
