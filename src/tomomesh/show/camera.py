@@ -51,15 +51,10 @@ def normals(corners: NDArray[np.float64], polygons: NDArray[np.int64]) -> NDArra
     first, second = corners[polygons[:, 2]], corners[polygons[:, -1]]
     first -= corners[polygons[:, 0]]
     second -= corners[polygons[:, 1]]
-    return unit(np.cross(first, second))
-
-
-def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (n, 3) vectors of length 1, zero where they have none."""
-    size = np.abs(vectors).max(axis=1, keepdims=True, initial=0)  # squares of huge and of tiny ones have no number
-    scaled = vectors / np.where(size > 0, size, 1.0)
-    length = np.sqrt((scaled**2).sum(axis=1, keepdims=True))
-    return np.asarray(scaled / np.where(length > 0, length, 1.0))
+    across = np.cross(first, second)
+    length = np.sqrt(np.einsum("ij,ij->i", across, across))
+    across /= np.where(length > 0, length, 1.0)[:, None]
+    return across
 
 
 def brightness(directions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -93,7 +93,7 @@ def _curves(
     count = max(map(len, heights))
     ax.limit(1 - 0.03 * count, bottom, count + 0.03 * count, top, equal=False)
     words = [f"{value:g}" for value in 10.0**marked] if log else None
-    rule(ax, along=along, x=ticks(1, max(count, 2), 9, whole=True), y=marked, words=words, grid=True)
+    rule(ax, along=along, x=ticks(1, count, 9, whole=True), y=marked, words=words, grid=True)
     if at is not None and (at > 0 or not log):
         line = np.log10(at) if log else at
         level_line = np.array([[[ax.limits[0], line], [ax.limits[2], line]]])
