@@ -139,7 +139,9 @@ def settle_points(
     strays = int(len(points) - cloud.points[kept, 3].sum())
     bends = planes[kept, 4] / spacing[kept]
     bend = whole.get("bend", lambda: float(np.quantile(bends, STRAIGHTER)) if len(kept) else 1.0)
-    return Samples(settled[kept, :3], settled[kept, 3:6], spacing[kept], noise[kept], width[kept], strays, bend, whole, exact)
+    return Samples(
+        settled[kept, :3], settled[kept, 3:6], spacing[kept], noise[kept], width[kept], strays, bend, whole, exact
+    )
 
 
 def _exact(residuals: Floats) -> float:
