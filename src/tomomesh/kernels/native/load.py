@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from ..compile import Kernel
 from .call import caller
@@ -12,7 +12,8 @@ from .linker import address_of
 from .workers import compiled
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
+    from types import FrameType
 
     from .code import Code
 
@@ -51,12 +52,28 @@ def _name(kernel: Kernel) -> str:
 
 
 def _wanted() -> list[str]:
-    """Name the kernels that are not in the cache and that modules in use can call."""
-    callers = [vars(module) for name, module in [*sys.modules.items()] if _calls(name)]
-    found = {_name(one): None for names in callers for one in [*names.values()] if isinstance(one, Kernel)}
+    """Name the kernels that are not in the cache and that the code underway can call, in any thread."""
+    reached = dict.fromkeys(name for frame in sys._current_frames().values() for name in _modules(frame))
+    found: dict[str, None] = {}
+    for name in (waiting := [*reached]):
+        for one in [*vars(sys.modules[name]).values()]:
+            if isinstance(one, Kernel):
+                found[_name(one)] = None
+            elif (other := getattr(one, "__module__", None)) not in reached and _calls(other):
+                reached[other] = None
+                waiting.append(other)
     return [name for name in found if not kept(name)]
 
 
-def _calls(module: str) -> bool:
+def _modules(frame: FrameType | None) -> Iterator[str]:
+    """Yield the modules of ours that a frame and its callers run in."""
+    while frame is not None:
+        if _calls(name := frame.f_globals.get("__name__")):
+            yield name
+        frame = frame.f_back
+
+
+def _calls(module: Any) -> TypeGuard[str]:
     """Tell whether a module is one of ours that call kernels; kernels are compiled into those that call them."""
-    return module.startswith("tomomesh.") and not module.startswith(OURS)
+    ours = isinstance(module, str) and module.startswith("tomomesh.") and not module.startswith(OURS)
+    return ours and module in sys.modules

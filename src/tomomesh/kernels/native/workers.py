@@ -24,6 +24,8 @@ _changed = threading.Condition()
 _made: dict[str, Code | None] = {}
 _waiting: deque[str] = deque()
 _underway: set[str] = set()
+_urgent: set[str] = set()
+"""Kernels that are waited for."""
 _threads: set[threading.Thread] = set()
 _stops = 0
 
@@ -37,6 +39,7 @@ def compiled(name: str, others: Iterable[str] = ()) -> Code | None:
         return None
     with _changed:
         stops = _stops
+        _urgent.add(name)
         _waiting.extend(one for one in (name, *others) if one not in {*_made, *_underway, *_waiting})
         if name in _waiting:
             _waiting.remove(name)
@@ -79,21 +82,29 @@ def _work() -> None:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
         ) as process:
-            while name := _next():
+            name = ""
+            while name := _next(name):
                 _put(name, _asked(process, name))
     except OSError:
         while name := _next():
             _put(name, None)
 
 
-def _next() -> str:
-    """Take the next kernel; where there is none the thread is not counted on any more."""
+def _next(last: str = "") -> str:
+    """Take the next kernel; where there is none the thread is not counted on any more.
+
+    The first is waited for. Then those of the folder of the last are taken: they call what is compiled there already.
+    """
     with _changed:
         if not _waiting:
             _threads.discard(threading.current_thread())
             return ""
-        _underway.add(_waiting[0])
-        return _waiting.popleft()
+        folder = last.partition(".")[0]
+        near = (one for one in _waiting if one.partition(".")[0] == folder)
+        name = _waiting[0] if _waiting[0] in _urgent else next(near, _waiting[0])
+        _waiting.remove(name)
+        _underway.add(name)
+        return name
 
 
 def _asked(process: subprocess.Popen[bytes], name: str) -> Code | None:
@@ -121,7 +132,7 @@ def _forget() -> None:
     """Begin anew in a copy of this process, where no thread works."""
     global _changed
     _changed = threading.Condition()
-    for kept in (_waiting, _underway, _threads):
+    for kept in (_waiting, _underway, _urgent, _threads):
         kept.clear()
 
 
