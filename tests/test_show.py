@@ -145,7 +145,7 @@ class TestSpace:
         flat = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]])
         faces = np.array([[0, 1, 2], [0, 2, 3]])
         front, back = (pixels(draw_shaded(TriMesh(flat, each), View(Camera(0, 0)))) for each in (faces, faces[:, ::-1]))
-        inked = (front < 255).any(axis=2)
+        inked = np.asarray((front < 255).any(axis=2))
         middle = tuple(n // 2 for n in front.shape[:2])
         assert inked[middle]
         np.testing.assert_array_equal(inked, (back < 255).any(axis=2))
