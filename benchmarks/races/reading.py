@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +15,9 @@ from reading import compare_all
 from tomomesh import PointSet, TriMesh
 from tomomesh.io import read_mesh, read_points, write_mesh, write_points
 from tomomesh.model.icosphere import icosphere
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 MOST = 1.1
 SPLITS, POINTS = 128, 300_000
