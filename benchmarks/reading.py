@@ -186,7 +186,7 @@ def dicom(folder: Path, name: str, voxels: NDArray[Any], *, packed: str = "") ->
         data.Modality, data.InstanceNumber = "CT", k + 1
         data.ImageOrientationPatient, data.ImagePositionPatient = [1, 0, 0, 0, 1, 0], [0, 0, k]
         data.PixelSpacing, data.RescaleSlope, data.RescaleIntercept = [1, 1], 1, 0
-        data.Rows, data.Columns, data.SamplesPerPixel = *pixels.shape, 1
+        data.Rows, data.Columns, data.SamplesPerPixel = pixels.shape[0], pixels.shape[1], 1
         data.BitsAllocated, data.BitsStored, data.HighBit, data.PixelRepresentation = 16, 16, 15, 1
         data.PhotometricInterpretation, data.PixelData = "MONOCHROME2", pixels.tobytes()
         if packed:

@@ -171,9 +171,8 @@ def outlines_of(mask: NDArray[np.bool_], pixel_mm: tuple[float, float] = (1.0, 1
     pixel_mm : (float, float)
         Distance of the columns and of the rows.
     """
-    framed = np.pad(_boxed(mask), ((0, 0), (FRAME, FRAME), (FRAME, FRAME)))
-    count, rows = framed.shape[:2]
-    inside, outside = _runs(framed)
+    inside, outside = _runs(boxed := _boxed(mask))
+    count, rows = len(boxed), boxed.shape[1] + 2 * FRAME
     beside, above = inside.meeting(1, 1), inside.meeting(rows)
     pieces, gaps = inside.joined(beside), outside.joined(outside.meeting(1))
     held = gaps != gaps[0]  # the outside of all slices is one, through their frames
@@ -197,11 +196,10 @@ def _reach(held: ArrayLike) -> slice:
     return slice(int(places[0]), int(places[-1]) + 1) if len(places) else slice(0, 1)
 
 
-def _runs(framed: NDArray[np.bool_]) -> tuple[_Runs, _Runs]:
-    """Part the rows of framed slices into what lies in the window and what lies outside, before and after each."""
-    count, rows, columns = framed.shape
-    flat = framed.ravel()
-    ends = np.flatnonzero(flat[1:] != flat[:-1]) + 1
+def _runs(mask: NDArray[np.bool_]) -> tuple[_Runs, _Runs]:
+    """Part the rows of slices in a frame into what lies in the window and what lies outside, before and after each."""
+    count, (rows, columns) = len(mask), np.array(mask.shape[1:]) + 2 * FRAME
+    ends = np.concatenate([_changes(one) + k * rows * columns for k, one in enumerate(mask)])  # no copy of the window
     row = ends[::2] // columns
     start, stop = ends[::2] - row * columns, ends[1::2] - row * columns
     gap = np.arange(len(row)) + row  # the stretch outside before each inside: every row has one more than insides
@@ -210,6 +208,12 @@ def _runs(framed: NDArray[np.bool_]) -> tuple[_Runs, _Runs]:
     after[gap + 1], before[gap] = stop, start
     width = columns + 2 * FRAME
     return _Runs(row, start, stop, row // rows, width), _Runs(around, after, before, around // rows, width)
+
+
+def _changes(pixels: NDArray[np.bool_]) -> Ints:
+    """Return where, row after row of a slice in its frame, the window begins or ends."""
+    flat = np.pad(pixels, FRAME).ravel()
+    return np.flatnonzero(flat[1:] != flat[:-1]) + 1
 
 
 def _sum(where: Ints, values: NDArray[Any], count: int = 0) -> Floats:

@@ -15,7 +15,7 @@ from ..files.atomic import replacing
 from ..files.limits import require_rows
 from ..files.source import first_bytes, whole
 from ..meshes.obj import VERTEX, unfolded
-from ..text import content, decoded, delimiter_of, first_row, parse_rows, read_lines, typed
+from ..text import content, decoded, delimiter_of, first_row, parse_rows, read_lines, typed, written
 from .columns import PositionColumns, named_positions, positions_among
 
 if TYPE_CHECKING:
@@ -173,8 +173,7 @@ def read_obj(path: Path) -> Cloud:
 
 def write_xyz(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
     """Write positions under a comment."""
-    rows = (f"{x!r} {y!r} {z!r}" for x, y, z in points.positions.tolist())
-    _write_lines(path, [f"# {beside.head}", *rows])
+    _write(path, f"# {beside.head}", written("%r %r %r\n", *points.positions.T.tolist()))
 
 
 def write_csv(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
@@ -183,10 +182,10 @@ def write_csv(points: PointSet, path: str | Path, beside: MeshAttributes) -> Non
     others = flat_columns(points.attributes, len(points), [*AXES, *head, *IDS])
     ids = (points.slices, points.neurons, points.kinds)
     columns: list[NDArray[Any]] = [*points.positions.T, *ids, *others.values()]
-    rows = zip(*(map(repr, column.tolist()) for column in columns), strict=True)
-    _write_lines(path, [",".join([*head, *IDS, *others]), *map(",".join, rows)])
+    rows = written(",".join(["%r"] * len(columns)) + "\n", *(column.tolist() for column in columns))
+    _write(path, ",".join([*head, *IDS, *others]), rows)
 
 
-def _write_lines(path: str | Path, lines: list[str]) -> None:
+def _write(path: str | Path, head: str, rows: str) -> None:
     with replacing(path) as file:
-        file.write(("\n".join(lines) + "\n").encode("ascii"))
+        file.write(f"{head}\n{rows}".encode("ascii"))

@@ -11,6 +11,7 @@ import numpy as np
 from ...errors import FormatError
 from ..colors import named_colors
 from ..files.atomic import replacing
+from ..text import written
 from .cells import fans, weld
 
 if TYPE_CHECKING:
@@ -27,15 +28,15 @@ VERTEX, FACE = (["v"], ["V"]), (["f"], ["F"], ["fo"])
 def write_obj(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
     """Write 64-bit coordinates, and colors as fractions behind them."""
     colors = named_colors(beside.vertex_fields)
-    behind = [""] * len(mesh.vertices)
+    behind = []
     if colors:
         # rounded up: VTK cuts off what it makes of them
         fractions = [f" {math.ceil(value / 255 * 1e6) / 1e6:.6g}" for value in range(256)]
-        behind = ["".join(fractions[value] for value in color) for color in colors[1].tolist()]
-    vertices = (f"v {x!r} {y!r} {z!r}{color}" for (x, y, z), color in zip(mesh.vertices.tolist(), behind, strict=True))
-    faces = (f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist())
+        behind = [["".join(fractions[value] for value in color) for color in colors[1].tolist()]]
+    vertices = written(f"v %r %r %r{'%s' * len(behind)}\n", *mesh.vertices.T.tolist(), *behind)
+    faces = written("f %d %d %d\n", *(mesh.faces + 1).T.tolist())
     with replacing(path) as file:
-        file.write(("\n".join([f"# {beside.head}", *vertices, *faces]) + "\n").encode("ascii"))
+        file.write(f"# {beside.head}\n{vertices}{faces}".encode("ascii"))
 
 
 def read_obj_mesh(data: bytes, file: str) -> Arrays:

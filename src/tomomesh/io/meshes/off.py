@@ -14,6 +14,7 @@ import numpy as np
 from ...errors import FormatError
 from ..files.atomic import replacing
 from ..files.limits import require_rows
+from ..text import written
 from .cells import fans
 
 if TYPE_CHECKING:
@@ -57,8 +58,7 @@ def read_off(data: bytes, file: str) -> Arrays:
 
 def write_off(mesh: TriMesh, path: str | Path, _beside: MeshAttributes) -> None:
     """Write 64-bit coordinates; neither unit nor frame has a place."""
-    vertices = (f"{x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist())
-    faces = (f"3 {a} {b} {c}" for a, b, c in mesh.faces.tolist())
-    head = ["OFF", f"{len(mesh.vertices)} {len(mesh.faces)} 0"]
+    vertices = written("%r %r %r\n", *mesh.vertices.T.tolist())
+    faces = written("3 %d %d %d\n", *mesh.faces.T.tolist())
     with replacing(path) as file:
-        file.write(("\n".join([*head, *vertices, *faces]) + "\n").encode("ascii"))
+        file.write(f"OFF\n{len(mesh.vertices)} {len(mesh.faces)} 0\n{vertices}{faces}".encode("ascii"))

@@ -25,6 +25,7 @@ from ..files.limits import require_memory
 from ..files.markup import parsed_xml
 from ..files.source import third_party
 from ..frames import frame_in_file
+from ..text import written
 from .attributes import single_precision
 
 if TYPE_CHECKING:
@@ -126,19 +127,19 @@ def _model(mesh: TriMesh, beside: MeshAttributes) -> Iterator[str]:
         yield "</m:colorgroup>\n"
     default = f' pid="{COLORS_ID}" pindex="0"' if colors else ""
     yield f'<object id="{MESH_ID}" type="model" name={quoteattr(beside.head)}{default}>\n<mesh>\n<vertices>\n'
-    yield from (f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>\n' for x, y, z in mesh.vertices.tolist())
+    yield written('<vertex x="%r" y="%r" z="%r"/>\n', *mesh.vertices.T.tolist())
     yield "</vertices>\n<triangles>\n"
-    yield from _triangles(mesh, numbers.ravel() if colors else None)
+    yield _triangles(mesh, numbers.ravel() if colors else None)
     yield "</triangles>\n</mesh>\n</object>\n</resources>\n"
     yield f'<build>\n<item objectid="{MESH_ID}"/>\n</build>\n</model>\n'
 
 
-def _triangles(mesh: TriMesh, numbers: np.ndarray[tuple[int], np.dtype[np.int64]] | None) -> Iterator[str]:
-    if numbers is None:
-        yield from (f'<triangle v1="{a}" v2="{b}" v3="{c}"/>\n' for a, b, c in mesh.faces.tolist())
-        return
-    for (a, b, c), (d, e, f) in zip(mesh.faces.tolist(), numbers[mesh.faces].tolist(), strict=True):
-        yield f'<triangle v1="{a}" v2="{b}" v3="{c}" pid="{COLORS_ID}" p1="{d}" p2="{e}" p3="{f}"/>\n'
+def _triangles(mesh: TriMesh, numbers: NDArray[np.int64] | None) -> str:
+    row, columns = '<triangle v1="%d" v2="%d" v3="%d"/>\n', mesh.faces.T.tolist()
+    if numbers is not None:
+        row = row.replace("/>", f' pid="{COLORS_ID}" p1="%d" p2="%d" p3="%d"/>')
+        columns += numbers[mesh.faces].T.tolist()
+    return written(row, *columns)
 
 
 def read_3mf(data: bytes, file: str) -> Arrays:
