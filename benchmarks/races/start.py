@@ -98,7 +98,6 @@ def _first_demo(folder: Path) -> None:
     demo = [*_program(), "demo", "--quiet", "-o", str(folder / "demo")]
     (first,) = costs(lambda: _run(*demo, caches=caches), repeats=1, warm=False)
     at_most("first demo, nothing compiled: wall", first.wall, 6, "s")
-    note("first demo, nothing compiled: CPU", f"{first.cpu:.3g} s")
 
 
 def _run(*command: str, caches: dict[str, str] | None = None) -> None:
