@@ -98,9 +98,9 @@ class Cost(NamedTuple):
     cpu: float
 
 
-def costs(*calls: Callable[[], Any], repeats: int = 7) -> list[Cost]:
-    """Return the median cost of each call, after one warm round; the calls take turns."""
-    for call in calls:
+def costs(*calls: Callable[[], Any], repeats: int = 7, warm: bool = True) -> list[Cost]:
+    """Return the median cost of each call, after one warm round unless it is to be cold; the calls take turns."""
+    for call in calls if warm else ():
         call()
     rounds = [[_cost(call) for call in calls] for _ in range(repeats)]
     return [Cost(*(median(part) for part in zip(*taken, strict=True))) for taken in zip(*rounds, strict=True)]

@@ -94,7 +94,8 @@ class TestSameAsPython:
         count(np.zeros((0, 3, 2), bool), np.zeros((3, 2), np.float32), np.zeros(0, np.int64))
 
     def test_scalars_of_numpy(self) -> None:
-        assert scaled(np.float32(0.5), np.int16(3), np.True_) == (1.5, -3)
+        given: tuple[Any, ...] = (np.float32(0.5), np.int16(3), np.True_)
+        assert scaled(*given) == (1.5, -3)
 
 
 @compiled

@@ -71,7 +71,7 @@ def link_parts(
     list of Link
         Those below what begins, those between, those above what ends; by rising plane.
     """
-    near = _Neighbors(parts, _layers(parts, groups), pixel, complete, scipy.sparse)
+    near = _Neighbors(parts, _layers(parts, groups), pixel, complete, sparse)
     sought = _sought(near)
     pairs = [pair for key in sorted(sought) for pair in near.successors(*sought[key])]
     pairs += _branches(near, sought, pairs)
@@ -104,7 +104,7 @@ class _Neighbors:
     def __init__(
         self, parts: Sequence[Part], groups: list[list[list[int]]], pixel: float, complete: bool, sparse: bool
     ) -> None:
-        self.parts, self.groups, self.pixel, self.complete, self.sparse = parts, groups, pixel, complete, scipy.sparse
+        self.parts, self.groups, self.pixel, self.complete, self.sparse = parts, groups, pixel, complete, sparse
         self.place = {n: (g, k) for g, layers in enumerate(groups) for k, layer in enumerate(layers) for n in layer}
         self.on = {parts[layer[0]].plane: layer for layers in groups for layer in layers}
         self.known: dict[tuple[int, int], int] = {}

@@ -21,6 +21,7 @@ class Kernel:
 
     def __init__(self, signature: str, function: Callable[..., Any]) -> None:
         update_wrapper(self, function)
+        self.__name__: str = function.__name__
         self.function, self.signature = function, signature
         self.call: Callable[..., Any] = self._first_call
 
