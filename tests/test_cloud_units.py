@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from _pytest.capture import CaptureFixture
     from numpy.typing import NDArray
 
+    from tomomesh import TriMesh
+
 WRITTEN = ["ply", "stl", "obj", "glb", "vtp", "3mf", "gii"]
 
 
@@ -36,6 +38,12 @@ def sphere(radius: float = 3.0, count: int = 1500) -> NDArray[np.float64]:
     turn = np.arange(count) + 0.5
     z, angle = 1 - 2 * turn / count, 2.4 * turn
     return radius * np.column_stack([np.sqrt(1 - z**2) * np.cos(angle), np.sqrt(1 - z**2) * np.sin(angle), z])
+
+
+@pytest.fixture(scope="module")
+def mesh() -> TriMesh:
+    """The surface of the sphere, which every format writes."""
+    return reconstruct_points(sphere()).mesh
 
 
 def unit_taken(cloud: PointSet, **changes: Any) -> tuple[str, NDArray[np.float64]]:
@@ -54,8 +62,7 @@ class TestStated:
         np.testing.assert_array_equal(cloud.positions, sphere())
 
     @pytest.mark.parametrize("kind", WRITTEN)
-    def test_by_meshes_of_ours(self, tmp_path: Path, kind: str) -> None:
-        mesh = reconstruct_points(sphere()).mesh
+    def test_by_meshes_of_ours(self, mesh: TriMesh, tmp_path: Path, kind: str) -> None:
         io.write_mesh(mesh, tmp_path / f"m.{kind}", unit="m", frame="LPS")
         cloud, (unit, placed) = read_points(tmp_path / f"m.{kind}"), ("", np.empty(0))
         unit, placed = unit_taken(cloud)
