@@ -205,11 +205,13 @@ class TestLoops:
         wanted = [2 * np.pi * np.sqrt(radius / (8 * OFF)) for radius in (20.0, 80.0)]
         np.testing.assert_allclose(counts, wanted, rtol=0.15)
 
-    def test_a_slice_has_no_more_than_4096_by_default(self) -> None:
-        rows, columns = np.indices((180, 180))
-        found = trained([(rows % 4 < 2) & (columns % 4 < 2)], "loops")
-        assert len(found) == 45 * 45
-        assert {len(one) for one in found.contours} == {8}
+    @pytest.mark.parametrize(("count", "side", "each"), [(3, 10, 20), (16, 10, 16), (25, 2, 8)])
+    def test_a_slice_has_no_more_than_4096_by_default(self, count: int, side: int, each: int) -> None:
+        """Squares of ten pixels want 20 neurons each, and 256 of them share; the least stays."""
+        rows, columns = np.indices([count * (side + 2)] * 2)
+        found = trained([(rows % (side + 2) < side) & (columns % (side + 2) < side)], "loops")
+        assert {len(one) for one in found.contours} == {each}
+        assert len(found) == count**2
 
 
 class TestBetween:

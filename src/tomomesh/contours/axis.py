@@ -94,7 +94,7 @@ def half_planes(positions: Floats) -> HalfPlanes | None:
         return None
     middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
     tree = scipy.spatial.cKDTree(positions - middle)
-    drawn = some_of(tree.data)
+    drawn = np.unique(some_of(tree.data), axis=0)  # each repeat would be asked for all of the others
     if len(drawn) < len(positions) and _axis(drawn, tree) is None:
         return None
     local = np.unique(tree.data, axis=0)
