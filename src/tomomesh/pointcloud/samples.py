@@ -135,11 +135,13 @@ def settle_points(
         settled[:, :3] -= (SIDEWAYS * noise**2 * settled[:, 7])[:, None] * settled[:, 3:6]
     kept = np.flatnonzero(~stray)
     exact = 0.0 if cloud.merges else whole.get("exact", lambda: _exact(settled[:, 6] / spacing))
-    offsets = (exact * (cloud.points[kept, :3] - settled[kept, :3])).astype(np.float32) if exact else None
+    back = (exact * (cloud.points[kept, :3] - settled[kept, :3])).astype(np.float32) if exact else None
     strays = int(len(points) - cloud.points[kept, 3].sum())
     bends = planes[kept, 4] / spacing[kept]
     bend = whole.get("bend", lambda: float(np.quantile(bends, STRAIGHTER)) if len(kept) else 1.0)
-    return Samples(settled[kept, :3], settled[kept, 3:6], spacing[kept], noise[kept], width[kept], strays, bend, whole, offsets)
+    return Samples(
+        settled[kept, :3], settled[kept, 3:6], spacing[kept], noise[kept], width[kept], strays, bend, whole, back
+    )
 
 
 def _exact(residuals: Floats) -> float:
