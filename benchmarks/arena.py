@@ -23,6 +23,7 @@ CACHE = Path(platformdirs.user_cache_dir("tomomesh")) / "peers"
 PINS = (
     "open3d==0.20.0",
     "libusb-package==1.0.30.0",  # Open3D asks for libusb, which not every system has
+    "meshlib==3.1.4.297",
     "pymeshlab==2025.7.post1",
     "pyvista==0.49.1",
     "vtk==9.7.2",

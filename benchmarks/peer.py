@@ -129,6 +129,13 @@ def _pymeshlab(points: Cloud, depth: int) -> Arrays:
     return mesh.vertex_matrix(), mesh.face_matrix().astype(np.int64)
 
 
+def _meshlib(points: Cloud, depth: int) -> Arrays:
+    from meshlib import mrmeshnumpy, mrmeshpy
+
+    mesh = mrmeshpy.triangulatePointCloud(mrmeshnumpy.pointCloudFromPoints(points))
+    return mrmeshnumpy.getNumpyVerts(mesh), mrmeshnumpy.getNumpyFaces(mesh.topology).astype(np.int64)
+
+
 def _vtk(points: Cloud, depth: int) -> Arrays:
     import pyvista
 
@@ -147,6 +154,7 @@ def _sampling_distance(points: Cloud) -> float:
 
 METHODS: dict[str, Callable[[Cloud, int], Arrays]] = {
     "tomomesh": _tomomesh,
+    "meshlib": _meshlib,
     "open3d": _open3d,
     "pymeshlab": _pymeshlab,
     "vtk": _vtk,

@@ -70,7 +70,7 @@ class TestProjection:
         now[0] = 0.0
         nearest = np.zeros(8, np.int32)
         nearest[1] = -1
-        renew_projections(places, nearest, samples[index.order], *index.cells, stale, now, at, 0, 8)
+        renew_projections(places, nearest, samples[index.order], *index.cells, stale, False, now, at, 0, 8)
         moved = np.linalg.norm(places - anchors, axis=1) > stale
         moved[:2] = False
         np.testing.assert_array_equal((now != before).any(axis=1), moved)

@@ -226,8 +226,9 @@ class _Projector:
     @classmethod
     def under(cls, vertices: Floats, ring: OneRing, samples: Samples, threads: int) -> _Projector:
         width = np.maximum(NARROW * samples.spacing, SHARE * samples.width)
-        rows = np.column_stack([samples.positions, samples.normals, width])
-        index = Index.of(samples.positions, SIGHT * float(np.median(width)))
+        positions = samples.positions if samples.offsets is None else samples.positions + samples.offsets
+        rows = np.column_stack([positions, samples.normals, width])
+        index = Index.of(positions, SIGHT * float(np.median(width)))
         rows = rows[index.order]
         vertex = _nearest(rows, vertices, index.frame[3], threads)
         _require_any(vertex >= 0, samples)
@@ -238,7 +239,7 @@ class _Projector:
             index = Index.of(rows[:, :3], index.frame[3])
             rows = np.ascontiguousarray(rows[index.order])
         near = np.empty(len(vertices), np.int32)
-        projector = cls(rows, index, near, samples.exact > 0, threads)
+        projector = cls(rows, index, near, samples.offsets is not None, threads)
         projector.run(lambda a, b: nearest_places(vertices, rows, *index.cells, near, a, b))
         return projector
 

@@ -63,9 +63,9 @@ class Samples:
         How far the points around a point lie off a plane, over how far they lie apart, at the `STRAIGHTER` of them.
     whole : Whole
         What was taken over all points.
-    exact : float
-        Share of the way back to where it was measured that each point has gone: 1 where there is no noise, 0 where it
-        can be seen.
+    offsets : (p, 3) float32 array, optional
+        From there to where the surface goes through: all of the way back to the points where there is no noise, none of
+        it, and no array, where it can be seen.
     """
 
     positions: Floats
@@ -76,7 +76,7 @@ class Samples:
     strays: int
     bend: float
     whole: Whole = field(default_factory=Whole)
-    exact: float = 0.0
+    offsets: NDArray[np.float32] | None = None
 
 
 def settle_points(
@@ -133,22 +133,22 @@ def settle_points(
     stray |= cloud.lonely(settled, spacing)
     if cloud.merges:
         settled[:, :3] -= (SIDEWAYS * noise**2 * settled[:, 7])[:, None] * settled[:, 3:6]
-    exact = 0.0 if cloud.merges else whole.get("exact", lambda: _exact(settled[:, 6] / spacing))
-    settled[:, :3] += exact * (cloud.points[:, :3] - settled[:, :3])
     kept = np.flatnonzero(~stray)
+    exact = 0.0 if cloud.merges else whole.get("exact", lambda: _exact(settled[:, 6] / spacing))
+    back = (exact * (cloud.points[kept, :3] - settled[kept, :3])).astype(np.float32) if exact else None
     strays = int(len(points) - cloud.points[kept, 3].sum())
     bends = planes[kept, 4] / spacing[kept]
     bend = whole.get("bend", lambda: float(np.quantile(bends, STRAIGHTER)) if len(kept) else 1.0)
     return Samples(
-        settled[kept, :3], settled[kept, 3:6], spacing[kept], noise[kept], width[kept], strays, bend, whole, exact
+        settled[kept, :3], settled[kept, 3:6], spacing[kept], noise[kept], width[kept], strays, bend, whole, back
     )
 
 
 def _exact(residuals: Floats) -> float:
-    """Return how exact points are, from the distance of the neighbors of each from its quadratic, sampling distances.
+    """Return how exact points are, 0 to 1, from how far the neighbors of each lie off its quadratic.
 
-    What bends leaves much at some points and next to nothing at others, noise leaves some at all: so the points with
-    the least tell.
+    What bends leaves much at some points and next to nothing at others, noise leaves some at all: so those with the
+    least tell. Distances are over the sampling distance.
     """
     return max(0.0, 1 - (float(np.quantile(residuals, LEAST)) / SEEN) ** 2)
 

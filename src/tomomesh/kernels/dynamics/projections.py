@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 LONGER = 1.25
 """Most that the reach grows where samples are far: at 2.25 x 1.25 = 2.8 widths a Gaussian weight is down to 2 %.
 Chosen: half of it changes the distance by +35 %, twice by +7 %."""
+LOW = 0.75
+"""Height over the surface, widths of the weights, under which a place is put onto what goes through the samples: a half
+of the sampling distance. What is higher lies where few samples face alike, at the rim of what is thin."""
 FACING = 0.2
 """Cosine of the angle between a sample's normal and the mesh's under which the sample belongs to another side: 78
 degrees, so that both planes of a sharp edge have a say and the back of a thin part has none. Chosen: half of it changes
@@ -237,9 +240,10 @@ def renew_projections(
         reach = min(max(1.01 * np.sqrt(away), reach), LONGER * reach)
         if through:
             seen = samples, blocks, start, frame
-            alike = nearest_alike(*seen, places[v], projections[v, 1:], reach, found, near)
+            wide = LONGER * SIGHT * samples[nearest[v], 6]
+            alike = nearest_alike(*seen, places[v], projections[v, 1:], wide, found, near)
             height = height_between(near, alike) if alike >= FEWEST else np.nan
-            if abs(height) < reach:
+            if abs(height) < LOW * samples[nearest[v], 6]:
                 projections[v, 0], anchors[v] = -height, places[v]
                 continue
         if project(samples, blocks, start, frame, places[v], projections[v, 1:], reach, projection, found, weights):
