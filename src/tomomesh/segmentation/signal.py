@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from ..kernels.contours.closing import close_plane
 from ..som.starts import moments
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ slices of a study."""
 NARROW = 0.06
 """Width of the openings that the outside does not pass, over the square root of the window's area. Chosen: half of it
 changes the distance by +62.7 %, twice nothing."""
+WORD = 64
+"""Pixels in a word of bits."""
 
 
 def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
@@ -147,15 +150,16 @@ def closed(plane: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool
         Pixels m that were added around the slice.
     """
     reach = round(NARROW / 2 * float(np.sqrt(np.count_nonzero(plane))))
-    framed = np.pad(plane, reach + 1)
-    open_ = ~_grown(framed, reach)
-    background, _ = ndimage.label(open_)
-    outside = background == background[0, 0]
-    return framed | ~_grown(outside, reach), open_ & ~outside, reach + 1
+    margin = reach + 1
+    rows, columns = (size + 2 * margin for size in plane.shape)
+    framed = np.zeros((rows, -(-columns // WORD) * WORD), np.bool_)
+    framed[margin : rows - margin, margin : columns - margin] = plane
+    filled = np.packbits(framed, axis=1, bitorder="little").view(np.uint64)
+    hollow = np.empty_like(filled)
+    close_plane(filled, reach, hollow)
+    return _unpacked(filled, columns), _unpacked(hollow, columns), margin
 
 
-def _grown(mask: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
-    """Dilate by an octagon: crosses and squares in turn."""
-    for step in range(steps):
-        mask = ndimage.binary_dilation(mask, ndimage.generate_binary_structure(2, 1 + step % 2))
-    return mask
+def _unpacked(words: NDArray[np.uint64], columns: int) -> NDArray[np.bool_]:
+    """Return so many columns of a plane of bits."""
+    return np.unpackbits(words.view(np.uint8), axis=1, count=columns, bitorder="little").view(np.bool_)
