@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from ..kernels.contours.closing import close_plane
-from ..som.starts import moments
+from ..kernels.contours.closing import close_plane, slice_moments
+from ..model.columns import for_kernels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,13 +42,12 @@ def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
     ----------
     mask : (K, J, I) bool array
     """
-    filled = ellipses = 0.0
-    for plane in mask:
-        pixels = pixels_of(plane)
-        if len(pixels) > 2:
-            filled += len(pixels)
-            ellipses += 4 * np.pi * np.sqrt(np.linalg.det(moments(np.ascontiguousarray(pixels.T))[1] + np.eye(2) / 12))
-    return filled > solid * ellipses
+    sums = np.empty((len(mask), 6))
+    slice_moments(for_kernels(mask, np.bool_), sums)
+    filled, *rest = sums[sums[:, 0] > 2].T
+    x, y, xx, yy, xy = (one / filled for one in rest)
+    spread = (xx - x * x + 1 / 12) * (yy - y * y + 1 / 12) - (xy - x * y) ** 2
+    return float(filled.sum()) > solid * float((4 * np.pi * np.sqrt(spread)).sum())
 
 
 def pixels_of(plane: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -112,6 +112,14 @@ def find_roots(roots: Ints) -> int:
     return sets
 
 
+@kernel("i8(i8[::1], i8[::1], i4[::1])")
+def join_pairs(one: NDArray[np.int64], other: NDArray[np.int64], roots: Ints) -> int:
+    """Join the sets of pairs (p,), and let every number point to the lowest of its set; return the number of sets."""
+    for n in range(len(one)):
+        join(roots, one[n], other[n])
+    return int(find_roots(roots))
+
+
 @kernel("void(i4[:,::1], i4[::1])")
 def join_vertices(faces: Ints, roots: Ints) -> None:
     """Join the vertices of every face.
