@@ -19,7 +19,7 @@ from .runs import Runs
 from .surface_nets import Net, NetFit, net_around, settle
 from .thick_slices import thinned
 from .thin import thin_squares
-from .well_composed import without_contacts
+from .well_composed import surface_cells, without_contacts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -125,8 +125,10 @@ def boundary(
     if thin is not None:
         levels, mask, affine = thin.levels, thin.mask, thin.affine
     held, low = _framed(mask)
-    joined = without_contacts(held, lambda voxels: levels.excess(voxels + low), threads)
-    net = net_around(_filled(joined) if surface == "outer" else joined, threads, low)
+    cells = surface_cells(held, threads)
+    joined = without_contacts(held, lambda voxels: levels.excess(voxels + low), threads, cells)
+    whole = _filled(joined) if surface == "outer" else joined
+    net = net_around(whole, threads, low, cells if whole is held else None)
     x, y, z = net.inner.T
     found = crossings(levels, net.inner, net.steps, ~mask[z, y, x], thin)
     if found.stepped:  # gray levels say themselves where their border is
