@@ -94,9 +94,7 @@ class TestMeasure:
 
     @law(60)
     @given(seed=seeds, shape=st.tuples(*[st.integers(1, 24)] * 3), share=st.sampled_from([0.0, 0.002, 0.5]))
-    def test_the_nearest_face_is_the_nearest_of_all(
-        self, seed: int, shape: tuple[int, int, int], share: float
-    ) -> None:
+    def test_the_nearest_face_is_the_nearest_of_all(self, seed: int, shape: tuple[int, int, int], share: float) -> None:
         """Among the voxels and far from them: most are near, as a sparse mask's are not."""
         rng = np.random.default_rng(seed)
         mask = rng.random(shape) < share

@@ -113,10 +113,7 @@ def link_cells(
         for axis in range(3):
             table[v, 2 * axis], table[v, 2 * axis + 1] = -1, -1
             if linked[case, 2 * axis]:
-                if axis == 0:
-                    before = v - 1
-                else:
-                    before = latest[z & 1, y - 1, x] if axis == 1 else latest[z - 1 & 1, y, x]
+                before = v - 1 if axis == 0 else latest[z & 1, y - 1, x] if axis == 1 else latest[z - 1 & 1, y, x]
                 table[v, 2 * axis], table[before, 2 * axis + 1] = before, v
         latest[z & 1, y, x] = v
 
