@@ -34,7 +34,7 @@ def inside_lattice(ring: NDArray[np.float64], x: NDArray[np.float64], y: NDArray
         Rising.
     """
     found = np.zeros((len(y), len(x)), np.bool_)
-    turn_lattice(*(for_kernels(one, np.float64) for one in (ring, x, y)), found)
+    turn_lattice(for_kernels(ring, np.float64), for_kernels(x, np.float64), for_kernels(y, np.float64), found)
     return found
 
 

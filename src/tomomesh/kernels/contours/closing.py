@@ -47,7 +47,7 @@ def grow(plane: Words, start: int, stop: int, spare: Words) -> None:
 
 
 @kernel("u8(u8, u8)")
-def spread(seeds: int, room: int) -> int:
+def spread(seeds: np.uint64, room: np.uint64) -> np.uint64:
     """Let pixels of a word spread both ways through the pixels where there is room; they have room themselves."""
     up = down = seeds
     above = below = room
