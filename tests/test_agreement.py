@@ -23,7 +23,7 @@ from tomomesh.agreement.sides import areas_of, samples_of, sides_in_slabs
 from tomomesh.agreement.voxels import compare_with_voxels, distance_to_voxels
 from tomomesh.cli import main
 from tomomesh.errors import UsageError
-from tomomesh.measure.sides import Sides
+from tomomesh.isosurface.sides import Sides
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -22,8 +22,8 @@ from tomomesh.cli import main
 from tomomesh.errors import GeometryError
 from tomomesh.finish import finish
 from tomomesh.followed import boundary_followed, outline_followed
+from tomomesh.isosurface.sides import Sides
 from tomomesh.judgement import LIMITS, OFF, TOLD, follow
-from tomomesh.measure.sides import Sides
 from tomomesh.progress import silent
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .isosurface.sides import Sides
 from .kernels.threads import in_blocks
 from .measure.links import Links
 from .measure.report import area_samples
 from .measure.shape import areas_and_volumes
-from .measure.sides import Sides
 from .measure.tree import Tree
 from .model.boxes import box_of
 from .segmentation.signal import SOLID, closed

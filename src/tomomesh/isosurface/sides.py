@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.measure.sides import list_sides, nearest_sides
+from ..kernels.isosurface.sides import list_sides, nearest_sides
 from ..kernels.threads import in_blocks
 from ..model.boxes import box_of
 from ..model.columns import for_kernels
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 WORD, BLOCK = 8, 4
-"""Voxels in a word, and along a block. See `tomomesh.kernels.measure.sides`."""
+"""Voxels in a word, and along a block. See `tomomesh.kernels.isosurface.sides`."""
 SOME = 500
 """Places handled at once. No result depends on it."""
 
