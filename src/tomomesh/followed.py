@@ -168,7 +168,8 @@ def outline_followed(mask: Mask, volume: Volume, *, outlined: bool = False, thre
 
 def unit_of(mask: Mask) -> float:
     """Return how many voxels count as one for a network that is laid around a whole window (K, J, I)."""
-    return max(1.0, max(side.stop - side.start for side in box_of(mask)) / PARTS)
+    longest = max(int(side.stop - side.start) for side in box_of(mask))
+    return max(1.0, longest / PARTS)
 
 
 def _filled(mask: Mask, threads: int) -> Mask:
