@@ -7,7 +7,7 @@ window, and, with networks, made of even triangles; what that takes is in the ro
 from __future__ import annotations
 
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from tomomesh import Volume, phantom, read_volume, reconstruct, window
 from voxels import marched, padded, surface
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 WALL, CPU = 1.0, 1.5
 """Marks of a study with networks, over surface nets."""
@@ -40,7 +40,7 @@ def main() -> None:
 def networks() -> None:
     """Race `reconstruct()` at defaults, and what it does besides a surface."""
     head = phantom()
-    window_of = {"lower": head.lower, "upper": head.upper}
+    window_of: dict[str, Any] = {"lower": head.lower, "upper": head.upper}
     ours, nets, report, uneven = costs(
         lambda: reconstruct(head.volume, **window_of),
         _surface_nets(window(head.volume, **window_of), head.volume),
@@ -68,7 +68,7 @@ def bare() -> Iterator[tuple[str, Volume, float]]:
 
 def without(name: str, volume: Volume, lower: float) -> None:
     """Race the mesh of a window's own voxels, checked."""
-    calls = [
+    calls: list[Callable[[], Any]] = [
         lambda: surface(volume, lower),
         _surface_nets(np.pad(window(volume, lower=lower), 1), volume),
     ]

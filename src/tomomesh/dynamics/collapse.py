@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ..measure.links import Links
 
@@ -48,7 +48,7 @@ def without_collapse(smoothed: TriMesh, fitted: TriMesh) -> tuple[TriMesh, int]:
     corners = smoothed.corners
     close = CLOSE * float(np.median(np.sqrt(((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2))))
     for _ in range(MOST):
-        pairs = cKDTree(vertices).query_pairs(close, output_type="ndarray")
+        pairs = scipy.spatial.cKDTree(vertices).query_pairs(close, output_type="ndarray")
         if len(pairs) == 0:
             break
         meeting = np.unique(pairs)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ..kernels.contours.closing import close_plane, slice_moments
 from ..model.columns import for_kernels
@@ -72,7 +72,7 @@ def outline(plane: NDArray[np.bool_]) -> NDArray[np.float64]:
     plane : (J, I) bool array
     """
     filled, _, margin = closed(plane)
-    border = ndimage.binary_dilation(filled) & ~ndimage.binary_erosion(filled)
+    border = scipy.ndimage.binary_dilation(filled) & ~scipy.ndimage.binary_erosion(filled)
     return pixels_of(border) - margin
 
 
