@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
+from scipy.spatial.distance import cdist
 
 from conftest import COMPILED, law, seeds
 from studies import write_nifti
@@ -20,7 +21,8 @@ from tomomesh import Settings, Volume, phantom, read_volume, reconstruct, recons
 from tomomesh.cli import main
 from tomomesh.errors import GeometryError
 from tomomesh.finish import finish
-from tomomesh.followed import boundary_followed, outline_followed, sides_of
+from tomomesh.followed import boundary_followed, outline_followed
+from tomomesh.isosurface.sides import Sides
 from tomomesh.judgement import LIMITS, OFF, TOLD, follow
 from tomomesh.progress import silent
 
@@ -90,9 +92,22 @@ class TestMeasure:
                     place = np.array([k, j, i], float)
                     place[axis] += side / 2
                     expected.add(tuple(place[::-1]))
-        found = [tuple(place) for place in sides_of(mask)]
-        assert len(found) == len(set(found)) == len(expected)
+        sides = Sides.of(mask)
+        found = [tuple(place) for place in sides.some()]
+        assert len(found) == len(set(found)) == len(expected) == len(sides)
         assert set(found) == expected
+        assert [tuple(place) for place in sides.some(3)] == found[::3]
+
+    @law(60)
+    @given(seed=seeds, shape=st.tuples(*[st.integers(1, 24)] * 3), share=st.sampled_from([0.0, 0.002, 0.5]))
+    def test_the_nearest_face_is_the_nearest_of_all(self, seed: int, shape: tuple[int, int, int], share: float) -> None:
+        """Among the voxels and far from them: most are near, as a sparse mask's are not."""
+        rng = np.random.default_rng(seed)
+        mask = rng.random(shape) < share
+        places = rng.uniform(-1.5, 2.5, (40, 3)) * shape[::-1]
+        sides = Sides.of(mask)
+        expected = cdist(places, sides.some()).min(axis=1, initial=np.inf)
+        np.testing.assert_allclose(sides.distances(places), expected, rtol=1e-12)
 
     @law(20)
     @given(seed=seeds, spacing=st.tuples(*[st.floats(0.3, 4.0)] * 3), moved=st.floats(0.0, 6.0))

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
 
 from conftest import law, seeds
 from test_several_contours import disk, trained
 from tomomesh.measure.contour import crossings, crossings_between, measure_contour
+from tomomesh.measure.polygon import along, evenly, inside, inside_lattice
 from tomomesh.model.lattice import lattice
-from tomomesh.segmentation.contours.curved import evened
+from tomomesh.segmentation.contours.curved import FINE, evened, finely
 from tomomesh.segmentation.contours.train import drawn
 from tomomesh.som.even_spacing import bridged_edges, even_spacing
 
@@ -92,6 +95,38 @@ class TestCurves:
         chords, _ = even_spacing(ring, lattice("ring", 40), none)
         assert np.abs(np.hypot(*even.T) - 50).max() < 0.08 < np.abs(np.hypot(*chords.T) - 50).max()
         assert measure_contour(even).evenness < 1e-3
+
+    @law(60)
+    @given(seed=seeds, count=st.integers(3, 90), size=st.sampled_from([1e-3, 1.0, 1e4]), doubled=st.booleans())
+    def test_a_curve_is_scipy_s_periodic_spline(self, seed: int, count: int, size: float, doubled: bool) -> None:
+        """Also where two neurons lie at one place."""
+        ring = size * np.random.default_rng(seed).normal(size=(count, 2))
+        ring[1] = ring[0] if doubled else ring[1]
+        closing = np.concatenate([ring, ring[:1]])
+        chord = np.sqrt((np.diff(closing, axis=0) ** 2).sum(axis=1))
+        step = np.sqrt(np.maximum(chord, 1e-6 * chord.max()))
+        knots = np.concatenate([[0.0], np.cumsum(step)])
+        place = knots[:-1, None] + np.arange(FINE) / FINE * step[:, None]
+        wanted = CubicSpline(knots, closing, bc_type="periodic")(place)
+        np.testing.assert_allclose(finely(ring), wanted, atol=1e-8 * size)
+
+    @law(60)
+    @given(seed=seeds, points=st.integers(1, 40), count=st.integers(1, 50), axes=st.integers(2, 3))
+    def test_even_steps_are_those_of_numpy_s_interpolation(self, seed: int, points: int, count: int, axes: int) -> None:
+        line = np.random.default_rng(seed).normal(size=(points, axes))
+        line[points // 2] = line[points // 3]
+        way = along(line)
+        wanted = np.linspace(0, way[-1], count) if count > 1 else way[-1:] / 2
+        expected = np.stack([np.interp(wanted, way, axis) for axis in line.T], axis=1)
+        np.testing.assert_allclose(evenly(line, count), expected, atol=1e-9)
+
+    @law(60)
+    @given(seed=seeds, count=st.integers(3, 30))
+    def test_places_of_a_lattice_lie_inside_as_each_of_them_does(self, seed: int, count: int) -> None:
+        rng = np.random.default_rng(seed)
+        ring, x, y = rng.normal(size=(count, 2)), *(np.sort(rng.normal(size=size)) for size in rng.integers(1, 20, 2))
+        each = inside(ring, np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)).reshape(len(y), len(x))
+        np.testing.assert_array_equal(inside_lattice(ring, x, y), each)
 
     def test_gaps_stay_where_they_are(self) -> None:
         ring = np.delete(turning(80, 10), [*range(20, 32), *range(60, 68)], axis=0)

@@ -18,7 +18,7 @@ from tomomesh.errors import EmptyError, UsageError
 from tomomesh.measure.polygon import distance
 from tomomesh.model.volume import Volume
 from tomomesh.segmentation.otsu import histogram, otsu_levels, otsu_threshold
-from tomomesh.segmentation.signal import fills_most, outline
+from tomomesh.segmentation.signal import NARROW, closed, fills_most, outline
 from tomomesh.segmentation.window import choose_window, window
 from tomomesh.settings import WindowSettings
 
@@ -159,6 +159,30 @@ class TestOutline:
         filled = np.pad(ndimage.binary_fill_holes(plane), 2)
         wanted = np.argwhere(find_boundaries(filled, connectivity=1, mode="thick"))[:, ::-1] - 2
         np.testing.assert_array_equal(outline(plane), wanted)
+
+    @law(40)
+    @given(seed=seeds, rows=st.integers(1, 150), columns=st.integers(1, 150), share=st.floats(0.02, 0.98))
+    def test_a_plane_is_closed_as_scipy_dilates_and_labels_it(
+        self, seed: int, rows: int, columns: int, share: float
+    ) -> None:
+        """Rows of less and of more than a word of bits; windows with and without openings."""
+        rng = np.random.default_rng(seed)
+        rough = np.abs(ndimage.gaussian_filter(rng.normal(size=(rows, columns)), rng.uniform(0.2, 6)))
+        plane = rough <= np.quantile(rough, share)
+        reach = round(NARROW / 2 * float(np.sqrt(np.count_nonzero(plane))))
+        octagon = [ndimage.generate_binary_structure(2, 1 + step % 2) for step in range(reach)]
+        framed = np.pad(plane, reach + 1)
+        grown = framed
+        for structure in octagon:
+            grown = ndimage.binary_dilation(grown, structure)
+        pieces, _ = ndimage.label(~grown)
+        outside = around = pieces == pieces[0, 0]
+        for structure in octagon:
+            around = ndimage.binary_dilation(around, structure)
+        filled, hollow, margin = closed(plane)
+        assert margin == reach + 1
+        np.testing.assert_array_equal(filled, framed | ~around)
+        np.testing.assert_array_equal(hollow, ~grown & ~outside)
 
     @pytest.mark.parametrize("opening", [0, 2])
     def test_of_a_wall_is_its_outside_also_where_a_narrow_opening_leads_in(self, opening: int) -> None:

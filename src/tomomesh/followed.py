@@ -10,13 +10,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 
+from .isosurface.sides import Sides
 from .kernels.threads import in_blocks
 from .measure.links import Links
 from .measure.report import area_samples
 from .measure.shape import areas_and_volumes
 from .measure.tree import Tree
+from .model.boxes import box_of
 from .segmentation.signal import SOLID, closed
 
 if TYPE_CHECKING:
@@ -74,25 +75,25 @@ class Followed:
         How it is followed, a key of `tomomesh.judgement.LIMITS`.
     affine : (4, 4) float array
         Indices of the voxels that lengths are counted in to patient millimeters.
-    places : (n, 3) float array
-        On the boundary, as voxel indices (x, y, z).
+    places : (n, 3) float array or Sides
+        On the boundary, as voxel indices (x, y, z); or the faces of a window.
     inside : float
         Voxels that the surface should enclose.
     unit : float
         Voxels that count as one: more than 1 where a network cannot be asked to tell voxels apart.
     wall : (K, J, I) bool array or None
         The window, where the surface runs along its middle.
-    besides : (m, 3) float array or None
+    besides : Sides or None
         Where the surface may lie as well: around what lies in a hole, or over the openings of a wall.
     """
 
     what: str
     affine: Floats
-    places: Floats
+    places: Floats | Sides
     inside: float
     unit: float = 1.0
     wall: Mask | None = None
-    besides: Floats | None = None
+    besides: Sides | None = None
 
     @classmethod
     def in_space(cls, found: Boundary, mask: Mask) -> Followed:
@@ -110,26 +111,44 @@ class Followed:
         own = mesh.moved(np.asarray(places, np.float64))
         enclosed = abs(float(areas_and_volumes(Links(own), threads=threads)[1].sum()))
         samples = area_samples(own, SAMPLES, leave_out=leave_out)
-        allowed = self.places if self.besides is None else np.concatenate([self.places, self.besides])
-        there = Tree.of_points(allowed, threads=threads).nearest(samples, threads=threads)[0]
-        every = -(-len(self.places) // SAMPLES)
-        back = Tree.of_faces(own, threads=threads).nearest(self.places[::every], threads=threads)[0]
+        there = self._from(samples, threads)
+        back = Tree.of_faces(own, threads=threads).nearest(_some(self.places), threads=threads)[0]
         if self.wall is not None:
-            there = np.where(_in(self.wall, samples), 0.0, there)
             back = np.maximum(back - WALLS * np.count_nonzero(self.wall) / len(self.places), 0.0)
         offset = (enclosed - self.inside) / len(self.places)
         return Apart(enclosed / max(self.inside, 1.0), offset, there, back)
 
+    def _from(self, samples: Floats, threads: int) -> Floats:
+        """Return how far samples (n, 3) are from where the surface may lie; 0 within a wall."""
+        there, free = np.zeros(len(samples)), np.ones(len(samples), np.bool_)
+        if self.wall is not None:
+            free = ~_in(self.wall, samples)
+        found = [_distances(one, samples[free], threads) for one in (self.places, self.besides) if one is not None]
+        there[free] = np.minimum.reduce(found)
+        return there
+
+
+def _distances(places: Floats | Sides, samples: Floats, threads: int) -> Floats:
+    if isinstance(places, Sides):
+        return places.distances(samples, threads)
+    return Tree.of_points(places, threads=threads).nearest(samples, threads=threads)[0]
+
+
+def _some(places: Floats | Sides) -> Floats:
+    """Return about `SAMPLES` of many places."""
+    every = -(-len(places) // SAMPLES)
+    return places.some(every) if isinstance(places, Sides) else places[::every]
+
 
 def boundary_followed(mask: Mask, volume: Volume) -> Followed:
     """Ask contours for the whole boundary of a window (K, J, I)."""
-    return Followed("contours", volume.affine, sides_of(mask), float(np.count_nonzero(mask)))
+    return Followed("contours", volume.affine, Sides.of(mask), float(np.count_nonzero(mask)))
 
 
 def components_followed(mask: Mask, volume: Volume, *, outlined: bool, threads: int = 0) -> Followed:
     """Ask for the outline of each component of a window (K, J, I); some of them may lie in holes of others."""
     found = outline_followed(mask, volume, outlined=outlined, threads=threads).as_closed("contours")
-    return found if found.wall is not None else replace(found, unit=1.0, besides=sides_of(mask))
+    return found if found.wall is not None else replace(found, unit=1.0, besides=Sides.of(mask))
 
 
 def outline_followed(mask: Mask, volume: Volume, *, outlined: bool = False, threads: int = 0) -> Followed:
@@ -141,40 +160,22 @@ def outline_followed(mask: Mask, volume: Volume, *, outlined: bool = False, thre
     filled = _over_bare(_filled(mask, threads))
     own, enclosed = int(np.count_nonzero(mask)), int(np.count_nonzero(filled))
     if outlined or own > SHELL * enclosed:
-        return Followed("outline", volume.affine, sides_of(filled), float(enclosed), unit=unit_of(mask))
+        return Followed("outline", volume.affine, Sides.of(filled), float(enclosed), unit=unit_of(mask))
     return Followed(
-        "wall", volume.affine, sides_of(mask), enclosed - own / 2, unit_of(mask), wall=mask, besides=sides_of(filled)
+        "wall", volume.affine, Sides.of(mask), enclosed - own / 2, unit_of(mask), wall=mask, besides=Sides.of(filled)
     )  # fmt: skip
 
 
 def unit_of(mask: Mask) -> float:
     """Return how many voxels count as one for a network that is laid around a whole window (K, J, I)."""
-    held = (mask.any(axis=tuple({0, 1, 2} - {axis})) for axis in range(3))
-    return max(1.0, max(int(np.ptp(np.flatnonzero(one))) + 1 for one in held) / PARTS)
-
-
-def sides_of(mask: Mask) -> Floats:
-    """Return the middles of the faces between the voxels of a window (K, J, I) and those outside, (n, 3) indices.
-
-    Examples
-    --------
-    >>> sides_of(np.ones((1, 1, 1), bool)).tolist()
-    [[0.0, 0.0, -0.5], [0.0, 0.0, 0.5], [0.0, -0.5, 0.0], [0.0, 0.5, 0.0], [-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]]
-    """
-    found, box = [], (scipy.ndimage.find_objects(mask.view(np.uint8)) or [(slice(0, 0),) * 3])[0]
-    for axis in range(3):
-        framed = np.pad(mask[box], [(int(n == axis),) * 2 for n in range(3)])
-        places = np.argwhere(np.diff(framed, axis=axis)).astype(np.float64)
-        places += [side.start - 0.5 * (n == axis) for n, side in enumerate(box)]
-        found.append(places[:, ::-1])
-    return np.concatenate(found)
+    longest = max(int(side.stop - side.start) for side in box_of(mask))
+    return max(1.0, longest / PARTS)
 
 
 def _filled(mask: Mask, threads: int) -> Mask:
     """Fill what the outside does not reach in each slice, as `tomomesh.segmentation.signal.outline` does."""
     filled = np.zeros_like(mask)
-    rows, columns = (np.flatnonzero(mask.any(axis=axes)) for axes in ((0, 2), (0, 1)))
-    box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    box = box_of(mask)[1:]
     inner = mask[:, *box]
 
     def work(start: int, stop: int) -> None:

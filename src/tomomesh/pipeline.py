@@ -224,5 +224,5 @@ def _segmented(
     way = begun.value
     assert way.segment is not None
     found = way.segment(kept.value, taken.value, progress)
-    stages = (folded(None, begun, taken, kept, found),)
+    stages = (folded(None, begun, taken, kept, found), *found.value.stages)
     return replace(found.value, way=way.name, settings=settings, stages=stages), way, taken.value

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
-from .low_pass import adjacency
+from ..measure.links import Links
 
 if TYPE_CHECKING:
     from ..model.mesh import TriMesh
@@ -40,18 +40,17 @@ def without_collapse(smoothed: TriMesh, fitted: TriMesh) -> tuple[TriMesh, int]:
     collapsed : int
         Components taken back to their smoothed shape.
     """
-    count, label = scipy.sparse.csgraph.connected_components(
-        adjacency(smoothed.edges, len(smoothed.vertices)), directed=False
-    )
-    owner = label[smoothed.faces[:, 0]]
+    links = Links(smoothed)
+    count, label, owner = links.pieces, links.vertex_pieces, links.face_pieces
     before, after = (np.bincount(owner, mesh.face_volumes, count) for mesh in (smoothed, fitted))
     turned = before * after <= 0
     vertices = np.where(turned[label][:, None], smoothed.vertices, fitted.vertices)
-    ends = smoothed.vertices[smoothed.edges]
-    close = CLOSE * float(np.median(np.sqrt(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1))))
+    corners = smoothed.corners
+    close = CLOSE * float(np.median(np.sqrt(((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2))))
     for _ in range(MOST):
-        meeting = np.unique(scipy.spatial.cKDTree(vertices).query_pairs(close, output_type="ndarray"))
-        if len(meeting) == 0:
+        pairs = scipy.spatial.cKDTree(vertices).query_pairs(close, output_type="ndarray")
+        if len(pairs) == 0:
             break
+        meeting = np.unique(pairs)
         vertices[meeting] += BACK * (smoothed.vertices[meeting] - vertices[meeting])
     return fitted.moved(vertices), int(turned.sum())

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..model.columns import any_of
 from ..model.points import ADDED, BORDER, CROSSING
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class Levels:
         x, y, z = near.T
         levels = self.voxels[z, y, x].astype(np.float64)
         levels = levels[:, None] if levels.ndim == 1 else levels
-        levels[(near != places).any(axis=1)] = np.nan
+        levels[any_of(near != places)] = np.nan
         levels[np.isinf(levels)] = np.nan
         return np.asarray(levels)
 
@@ -88,9 +89,9 @@ class Levels:
         with np.errstate(divide="ignore", invalid="ignore"):  # a voxel that was added may be no brighter than outside
             share = (inside - bound) / (inside - outside)
         if self.layers == "all":
-            leaves = np.where(self.kept(outside), np.inf, share).min(axis=1)
+            leaves = np.minimum.reduce(np.where(self.kept(outside), np.inf, share).T)
         else:
-            leaves = np.where(self.kept(inside), share, -np.inf).max(axis=1)
+            leaves = np.maximum.reduce(np.where(self.kept(inside), share, -np.inf).T)
         return np.where(np.abs(leaves) <= 1, np.clip(leaves, CLOSEST, 1 - CLOSEST), 0.5)
 
     def stepped(self, inner: NDArray[np.int32], steps: NDArray[np.int32]) -> bool:
@@ -178,7 +179,7 @@ def crossings(
     """
     outer, even = inner + steps, thin is None and levels.stepped(inner, steps)
     share = np.full(len(inner), 0.5) if even else np.where(added, BARELY, levels.crossed(inner, outer))
-    beyond = (levels.nearest(outer) != outer).any(axis=1)
+    beyond = any_of(levels.nearest(outer) != outer)
     kinds = np.where(added, ADDED, np.where(beyond, BORDER, CROSSING)).astype(np.uint8)
     positions = inner + share[:, None] * steps
     if thin is None:

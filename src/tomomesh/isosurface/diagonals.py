@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.isosurface.diagonals import NEITHER, OPEN, allow_diagonals, choose_diagonals
+from ..kernels.isosurface.diagonals import NEITHER, OPEN, allow_diagonals, choose_diagonals, split_squares
 from ..kernels.threads import in_blocks
 from ..model.mesh import TriMesh
 from .means import BLOCK
@@ -50,12 +50,11 @@ def triangulated(
     """
     before, after = (placed(indices, affine, threads) for indices in (made.start, made.positions))
     choice = _diagonals(net, made, crossings, after, threads)
-    halves = _halves(net.quads, choice, threads)
-    fours = np.flatnonzero(choice == NEITHER).astype(np.int32)
-    quarters = _quarters(net.quads[fours], len(after))
+    fours, outward = np.flatnonzero(choice == NEITHER).astype(np.int32), right_handed(affine)
+    halves = _halves(net.quads, choice, outward, threads)
+    quarters = _quarters(net.quads[fours], len(after))[:, :, slice(None, None, 1 if outward else -1)]
     halves[fours] = quarters[:, :2]
     faces = np.concatenate([halves.reshape(-1, 3), quarters[:, 2:].reshape(-1, 3)])
-    faces = faces if right_handed(affine) else np.ascontiguousarray(faces[:, ::-1])
     added = placed(crossings.positions[fours], affine, threads)
     start, mesh = (TriMesh(np.concatenate([vertices, added]), faces) for vertices in (before, after))
     return start, mesh, fours
@@ -72,8 +71,8 @@ def _diagonals(
 
     in_blocks(allow, len(allowed), block=BLOCK, threads=threads)
     choice, odd = np.where(allowed > 0, OPEN, NEITHER).astype(np.uint8), _is_odd(net)
-    for parity in ROUNDS:
-        choice = _chosen(net, after, allowed, choice, odd == parity, threads)
+    for count, parity in enumerate(ROUNDS):
+        choice = _chosen(net, after, allowed, choice, odd == parity, threads, alone=count == 0)
     return choice
 
 
@@ -89,28 +88,27 @@ def _chosen(
     choice: NDArray[np.uint8],
     turns: NDArray[np.bool_],
     threads: int,
+    *,
+    alone: bool,
 ) -> NDArray[np.uint8]:
-    """Let some of the squares choose."""
+    """Let some of the squares choose, each alone or with regard to its neighbors."""
     chosen = np.empty_like(choice)
 
     def work(start: int, stop: int) -> None:
-        choose_diagonals(after, net.quads, net.fans, allowed, choice, turns, chosen, start, stop)
+        choose_diagonals(after, net.quads, net.fans, allowed, choice, turns, alone, chosen, start, stop)
 
     in_blocks(work, len(choice), block=BLOCK, threads=threads)
     return chosen
 
 
-def _halves(quads: NDArray[np.int32], choice: NDArray[np.uint8], threads: int) -> NDArray[np.int64]:
-    """Split squares (q, 4) by the diagonal from corner 0 or 1 into two triangles each: (q, 2, 3)."""
-    halves = np.empty((len(quads), 6), np.int64)
-
-    def work(start: int, stop: int) -> None:
-        turned = (choice[start:stop] == 1)[:, None]
-        part = quads[start:stop]
-        halves[start:stop] = np.where(turned, part[:, [1, 2, 3, 1, 3, 0]], part[:, [0, 1, 2, 0, 2, 3]])
-
-    in_blocks(work, len(quads), block=BLOCK, threads=threads)
-    return halves.reshape(-1, 2, 3)
+def _halves(quads: NDArray[np.int32], choice: NDArray[np.uint8], outward: bool, threads: int) -> NDArray[np.int64]:
+    """Split squares (q, 4) by the diagonal from corner 0 or 1 into two triangles each, (q, 2, 3); or turn them over."""
+    halves = np.empty((len(quads), 2, 3), np.int64)
+    in_blocks(
+        lambda start, stop: split_squares(quads, choice, outward, halves, start, stop),
+        len(quads), block=BLOCK, threads=threads,
+    )  # fmt: skip
+    return halves
 
 
 def _quarters(quads: NDArray[np.int32], first: int) -> NDArray[np.int64]:

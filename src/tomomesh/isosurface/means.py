@@ -10,24 +10,19 @@ from ..kernels.isosurface.surface_nets import mean_of
 from ..kernels.threads import in_blocks
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
-    Finish = Callable[[Floats, slice], None]
 
 BLOCK = 40_000
 """Vertices or squares handled in one call: far below 100 ms."""
 
 
-def means(values: Floats, members: NDArray[np.int32], threads: int, finish: Finish = lambda found, at: None) -> Floats:
-    """Average rows (n, 3) of an array over lists of them (m, s), and let each block be finished in place: (m, 3)."""
+def means(values: Floats, members: NDArray[np.int32], threads: int) -> Floats:
+    """Average rows (n, 3) of an array over lists of them (m, s): (m, 3)."""
     found = np.empty((len(members), 3))
 
-    def work(start: int, stop: int) -> None:
-        mean_of(values, members, found, start, stop)
-        finish(found[start:stop], slice(start, stop))
-
-    in_blocks(work, len(members), block=BLOCK, threads=threads)
+    in_blocks(
+        lambda start, stop: mean_of(values, members, found, start, stop), len(members), block=BLOCK, threads=threads
+    )  # fmt: skip
     return found

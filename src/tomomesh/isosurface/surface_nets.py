@@ -9,16 +9,14 @@ import numpy as np
 
 from ..cuberille.neighbors import DIRECTIONS
 from ..dynamics.iterate import iterate
-from ..kernels.cuberille.cells import find_neighbors
-from ..kernels.isosurface.surface_nets import move_in_cells
-from ..kernels.isosurface.voxels import list_faces, list_fans
+from ..kernels.isosurface.surface_nets import lean, move_in_cells, pull_squares
+from ..kernels.isosurface.voxels import link_cells, list_faces, list_fans
 from ..kernels.threads import in_blocks
-from ..model.cubes import key_step, keys_of
 from ..model.trace import Motion
 from ..progress import Progress, silent
 from .means import BLOCK, means
 from .thin import AFTER, given_back
-from .well_composed import CORNERS, cells_where
+from .well_composed import CORNERS, surface_cells
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,7 +24,7 @@ if TYPE_CHECKING:
     from ..model.trace import Trace
     from ..settings import FitSettings
     from .crossings import LevelCrossings
-    from .means import Finish
+    from .well_composed import Cells
 
     Floats = NDArray[np.float64]
 
@@ -39,8 +37,6 @@ than marching cubes by more than a tenth, and lie farther from them than 0.06 an
 SAFE = 0.95
 """Share of the longest step that never overshoots. Derived: at 1 a net that goes up and down would do so for ever."""
 
-STEPS = np.array([key_step(direction) for direction in DIRECTIONS])
-MIXED = np.array([0 < case < 255 for case in range(256)])
 OWNED = np.array([sum((case ^ case >> shift) & 1 for shift in (1, 2, 4)) for case in range(256)])
 """Faces that a cell owns: those between its lowest corner and the next along each axis."""
 
@@ -92,7 +88,9 @@ class Net:
         return np.array(DIRECTIONS, np.int32)[self.directions]
 
 
-def net_around(mask: NDArray[np.bool_], threads: int = 0, lowest: NDArray[np.int32] = BELOW) -> Net:
+def net_around(
+    mask: NDArray[np.bool_], threads: int = 0, lowest: NDArray[np.int32] = BELOW, known: Cells | None = None
+) -> Net:
     """Span a net around the voxels of a mask.
 
     Parameters
@@ -102,16 +100,17 @@ def net_around(mask: NDArray[np.bool_], threads: int = 0, lowest: NDArray[np.int
     threads : int
     lowest : (3,) int32 array
         The voxel (x, y, z) of the study that is its first.
+    known : tuple of arrays, optional
+        What `surface_cells` found of the mask.
 
     Returns
     -------
     Net
         Vertices in the order of their cells, by z, then y, then x.
     """
-    cells, cases = cells_where(mask, MIXED, threads)
+    cells, cases = surface_cells(mask, threads) if known is None else known
     table = np.empty((len(cells), 6), np.int32)
-    find_neighbors(keys_of(cells.astype(np.int64)), STEPS, table)
-    table[~LINKED[cases]] = -1
+    link_cells(cells, cases, LINKED, np.empty((2, *mask.shape[1:]), np.int32), table)
     owned = OWNED[cases]
     first = np.cumsum(owned) - owned
     total = int(owned.sum())
@@ -202,16 +201,21 @@ class _NetSteps:
 
     def step(self, state: _NetState, count: int) -> tuple[_NetState, Motion]:
         """Move every vertex by the forces on it; how far each moved last is changed in place."""
-        sums = np.zeros((-(-len(state.position) // BLOCK), 3))
-
-        def move(steps: Floats, at: slice) -> None:
-            low, moves = self.net.low[at], state.moves[at]
-            move_in_cells(steps, state.position[at], low, MARGIN, moves, sums[at.start // BLOCK], 0, len(steps))
-
         pulls = self._pulls(state) if count in AFTER else state.pulls
-        position = self._drawn(state.position, pulls, move)
+        drawn = self._drawn(state.position, pulls)
+        values, stiff, most = self._resisted(state.position)
+        share = min(1.0, SAFE * 2 / (1 + most))
+        moved, sums = np.empty_like(state.position), np.zeros((-(-len(state.position) // BLOCK), 3))
+
+        def work(start: int, stop: int) -> None:
+            move_in_cells(
+                state.position, drawn, self.net.fans, values, self.net.links, stiff, share, self.net.low, MARGIN,
+                state.moves, moved, sums[start // BLOCK], start, stop,
+            )  # fmt: skip
+
+        in_blocks(work, len(moved), block=BLOCK, threads=self.threads)
         speed, change = sums[:, :2].max(axis=0)
-        return _NetState(position, state.moves, pulls), Motion(speed, change, sums[:, 2].sum())
+        return _NetState(moved, state.moves, pulls), Motion(speed, change, sums[:, 2].sum())
 
     def _pulls(self, state: _NetState) -> Floats:
         """Draw squares out where the mask is thin."""
@@ -221,48 +225,28 @@ class _NetSteps:
         middles = means(state.position, self.net.quads, self.threads)
         return given_back(self.net, thin, places, state.pulls, middles, self.threads)
 
-    def _drawn(self, position: Floats, pulls: Floats, move: Finish) -> Floats:
-        """Move every vertex by the pull of its crossings and by what the springs resist.
+    def _drawn(self, position: Floats, pulls: Floats) -> Floats:
+        """Return how far each square is from where it is drawn to, (q, 3)."""
+        quads, drawn = self.net.quads, np.empty_like(pulls)
 
-        Both together are at most 1 + r times a vertex' distance from rest, r from the springs, and no step up to twice
-        the inverse overshoots.
+        def work(start: int, stop: int) -> None:
+            pull_squares(position, quads, pulls, drawn, start, stop)
+
+        in_blocks(work, len(quads), block=BLOCK, threads=self.threads)
+        return drawn
+
+    def _resisted(self, position: Floats) -> tuple[Floats, float, float]:
+        """Return what springs resist, see `move_in_cells`: values, how stiff, and the most it is of a vertex' distance.
+
+        They resist being stretched by  s l,  or bends by  b (l - mean l_j).  A vertex is drawn by at most 1 + r times
+        its distance from rest, r from the springs, and no step up to twice the inverse overshoots.
         """
-
-        def pull(middle: Floats, at: slice) -> None:
-            np.subtract(pulls[at], middle, out=middle)
-
-        def add(pulled: Floats, at: slice) -> None:
-            pulled += resisted[at]
-            pulled *= share
-            move(pulled, at)
-
-        resisted, most = self._resisted(position)
-        share = min(1.0, SAFE * 2 / (1 + most))
-        return means(means(position, self.net.quads, self.threads, pull), self.net.fans, self.threads, add)
-
-    def _resisted(self, position: Floats) -> tuple[Floats, float]:
-        """Return the force of the springs on every vertex, and the most it is over the vertex' distance from rest.
-
-        They resist being stretched by  s l,  or bends by  b (l - mean l_j).
-        """
-        bending, tension = self.crossings.bending * self.settings.stiffness, self._tension(position)
+        bending = self.crossings.bending * self.settings.stiffness
         if not bending:
-            tension *= TENSION * self.settings.stiffness
-            return tension, 2 * TENSION * self.settings.stiffness
-        bends = self._bends(tension)
-        bends *= bending
-        return bends, 4 * bending
-
-    def _bends(self, tension: Floats) -> Floats:
-        """Return how much more every vertex is drawn to its neighbors than these are to theirs."""
-
-        def less(around: Floats, at: slice) -> None:
-            np.subtract(tension[at], around, out=around)
-
-        return means(tension, self.net.links, self.threads, less)
-
-    def _tension(self, position: Floats) -> Floats:
-        def less(around: Floats, at: slice) -> None:
-            around -= position[at]
-
-        return means(position, self.net.links, self.threads, less)
+            return position, TENSION * self.settings.stiffness, 2 * TENSION * self.settings.stiffness
+        leaning = np.empty_like(position)
+        in_blocks(
+            lambda start, stop: lean(position, self.net.links, leaning, start, stop),
+            len(position), block=BLOCK, threads=self.threads,
+        )  # fmt: skip
+        return leaning, -bending, 4 * bending

@@ -7,9 +7,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 
 from ..kernels.cuberille.cells import label_components
+from ..model.boxes import box_of
 from ..model.mesh import QuadMesh
 from ..model.points import PointSet
 from ..progress import Progress, silent
@@ -19,7 +19,7 @@ from .runs import Runs
 from .surface_nets import Net, NetFit, net_around, settle
 from .thick_slices import thinned
 from .thin import thin_squares
-from .well_composed import without_contacts
+from .well_composed import surface_cells, without_contacts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -125,8 +125,10 @@ def boundary(
     if thin is not None:
         levels, mask, affine = thin.levels, thin.mask, thin.affine
     held, low = _framed(mask)
-    joined = without_contacts(held, lambda voxels: levels.excess(voxels + low), threads)
-    net = net_around(_filled(joined) if surface == "outer" else joined, threads, low)
+    cells = surface_cells(held, threads)
+    joined = without_contacts(held, lambda voxels: levels.excess(voxels + low), threads, cells)
+    whole = _filled(joined) if surface == "outer" else joined
+    net = net_around(whole, threads, low, cells if whole is held else None)
     x, y, z = net.inner.T
     found = crossings(levels, net.inner, net.steps, ~mask[z, y, x], thin)
     if found.stepped:  # gray levels say themselves where their border is
@@ -137,7 +139,7 @@ def boundary(
 
 def _framed(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
     """Return the box of a mask with one layer of background around it, and its lowest voxel (x, y, z)."""
-    box = scipy.ndimage.find_objects(mask.view(np.uint8))[0]
+    box = box_of(mask)
     return np.pad(mask[box], 1), np.array([side.start - 1 for side in box[::-1]], np.int32)
 
 

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.measure.polygons import distance_to_polygon, inside_polygon
+from ..kernels.measure.polygons import distance_to_polygon, inside_polygon, step_evenly, turn_lattice
+from ..model.columns import for_kernels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,14 +33,9 @@ def inside_lattice(ring: NDArray[np.float64], x: NDArray[np.float64], y: NDArray
     x, y : (columns,) and (rows,) float arrays
         Rising.
     """
-    onward = np.roll(ring, -1, axis=0)
-    first, last = (np.searchsorted(y, end(ring[:, 1], onward[:, 1])) for end in (np.minimum, np.maximum))
-    side = np.repeat(np.arange(len(ring)), last - first)
-    row = np.arange(len(side)) - np.repeat(np.cumsum(last - first) - last, last - first)
-    (ax, ay), (bx, by) = ring[side].T, onward[side].T
-    column = np.searchsorted(x, ax + (y[row] - ay) / (by - ay) * (bx - ax))
-    turned = np.bincount(row * (len(x) + 1) + column, minlength=len(y) * (len(x) + 1)).reshape(len(y), -1)
-    return np.asarray(np.cumsum(turned, axis=1)[:, :-1] % 2 == 1)
+    found = np.zeros((len(y), len(x)), np.bool_)
+    turn_lattice(for_kernels(ring, np.float64), for_kernels(x, np.float64), for_kernels(y, np.float64), found)
+    return found
 
 
 def inside(ring: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -70,9 +66,9 @@ def side_lengths(line: NDArray[np.float64], *, closed: bool = True) -> NDArray[n
 
 def evenly(line: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Place points at equal steps along a line, its ends kept; one point alone takes the middle."""
-    way = along(line)
-    wanted = np.linspace(0.0, way[-1], count) if count > 1 else way[-1:] / 2
-    return np.stack([np.interp(wanted, way, axis) for axis in line.T], axis=1)
+    places = np.empty((count if count > 1 else 3, line.shape[1]))
+    step_evenly(for_kernels(line, np.float64), places)
+    return places if count > 1 else places[1:2]
 
 
 def along(line: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from ..isosurface.runs import Runs
+from ..model.boxes import box_of
 from .window import PRESETS_HU
 
 if TYPE_CHECKING:
@@ -148,7 +149,7 @@ def without_specks(mask: NDArray[np.bool_]) -> Cleaned:
     mask : (K, J, I) bool array
         One voxel at least.
     """
-    box = scipy.ndimage.find_objects(mask.view(np.uint8))[0]
+    box = box_of(mask)
     pieces, holes = Runs.of(mask[box], corners=True), Runs.of(mask[box], value=False)
     sizes, room = pieces.sizes, holes.sizes
     limit = min(float(SPECK), SMALL * float(sizes.max()))

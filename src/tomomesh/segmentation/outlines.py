@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy
 
+from ..kernels.measure.edges import join_pairs
 from .signal import SOLID
 
 if TYPE_CHECKING:
@@ -156,10 +156,11 @@ class _Runs:
         return _Runs(self.row[held], self.start[held], self.stop[held], self.slice[held], self.width)
 
     def joined(self, *pairs: tuple[Ints, Ints]) -> Ints:
-        """Return the number of the part that each run belongs to."""
-        one, other = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
-        graph = scipy.sparse.coo_array((np.ones(len(one), np.int8), (one, other)), shape=(len(self.row),) * 2)
-        return np.asarray(scipy.sparse.csgraph.connected_components(graph, directed=False)[1], np.int64)
+        """Return the part that each run belongs to, by the number of its first run."""
+        roots = np.arange(len(self.row), dtype=np.int32)
+        for one, other in pairs:
+            join_pairs(one, other, roots)
+        return roots.astype(np.int64)
 
 
 def outlines_of(mask: NDArray[np.bool_], pixel_mm: tuple[float, float] = (1.0, 1.0)) -> Outlines:
@@ -178,6 +179,7 @@ def outlines_of(mask: NDArray[np.bool_], pixel_mm: tuple[float, float] = (1.0, 1
     held = gaps != gaps[0]  # the outside of all slices is one, through their frames
     hollow = outside.of(held)
     bodies = _sum(inside.joined(beside, above), inside.size)
+    bodies = bodies[bodies > 0]
     return Outlines(
         *_parts(inside, pieces, count), *_parts(hollow, gaps[held], count), _lengths(inside, beside, count, pixel_mm),
         _ellipses(inside, rows, count), _sum(inside.slice, _shared(inside, above), count)[:-1], len(bodies),
@@ -257,5 +259,5 @@ def _ellipses(runs: _Runs, rows: int, count: int) -> Floats:
 
 def _forks(pieces: Ints, above: tuple[Ints, Ints]) -> int:
     """Count the pieces that go on as several, or come of several."""
-    links = np.unique(np.stack([pieces[above[0]], pieces[above[1]]]), axis=1)
+    links = np.stack(np.divmod(np.unique(pieces[above[0]] * len(pieces) + pieces[above[1]]), max(len(pieces), 1)))
     return sum(int(np.count_nonzero(np.bincount(ends) > 1)) for ends in links) if links.size else 0

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import reduce
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -233,19 +232,25 @@ def _caps(networks: Networks, volume: Volume, spacing: float) -> PointSet:
     """
     pixel = np.array(volume.spacing_mm[:2])
     rings, slices = networks.codebooks * pixel, networks.slices.astype(np.float64)
-    found = [_none(volume)]
+    places, heights, kinds = [np.empty((0, 2))], [np.empty(0)], [np.empty(0, np.uint8)]
     for n, ring in enumerate(rings):
         x, y = lattice_over(ring, spacing)
-        own, lattice = inside_lattice(ring, x, y), np.stack(np.meshgrid(x, y), axis=-1)
+        own = inside_lattice(ring, x, y)
         beside = [m for m in (n - 1, n + 1) if 0 <= m < len(rings) and abs(slices[m] - slices[n]) <= REACH]
-        if len(beside) < 2:
-            flat = lattice[own]
-            flat = flat[distance(ring, flat) > spacing / 4]
-            found.append(_made(flat / pixel, np.full(len(flat), slices[n]), volume, CAP))
-        for m in beside:
-            bare = lattice[own & ~inside_lattice(rings[m], x, y)]
-            near, away = distance(ring, bare), distance(rings[m], bare)
+        for m in beside if len(beside) == 2 else (None, *beside):
+            bare = _at(x, y, own if m is None else own & ~inside_lattice(rings[m], x, y))
+            near = distance(ring, bare)
+            away = np.full(len(bare), np.inf) if m is None else distance(rings[m], bare)
             far = (near > spacing / 4) & (away > spacing / 2)
-            height = slices[n] + (slices[m] - slices[n]) * near[far] / (near[far] + away[far])
-            found.append(_made(bare[far] / pixel, height, volume, BRIDGE))
-    return reduce(PointSet.joined, found)
+            places.append(bare[far])
+            height = slices[n] if m is None else slices[m] - (slices[m] - slices[n]) * (away / (near + away))[far]
+            heights.append(np.broadcast_to(height, len(places[-1])))
+            kinds.append(np.full(len(places[-1]), CAP if m is None else BRIDGE, np.uint8))
+    found = _made(np.concatenate(places) / pixel, np.concatenate(heights), volume, CAP)
+    return replace(found, kinds=np.concatenate(kinds))
+
+
+def _at(x: NDArray[np.float64], y: NDArray[np.float64], held: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return some places of a lattice, row by row, (n, 2)."""
+    row, column = np.nonzero(held)
+    return np.stack([x[column], y[row]], axis=1)

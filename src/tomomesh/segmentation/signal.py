@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
-from ..som.starts import moments
+from ..kernels.contours.closing import close_plane, slice_moments
+from ..model.columns import for_kernels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,6 +28,8 @@ slices of a study."""
 NARROW = 0.06
 """Width of the openings that the outside does not pass, over the square root of the window's area. Chosen: half of it
 changes the distance by +62.7 %, twice nothing."""
+WORD = 64
+"""Pixels in a word of bits."""
 
 
 def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
@@ -39,13 +42,12 @@ def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
     ----------
     mask : (K, J, I) bool array
     """
-    filled = ellipses = 0.0
-    for plane in mask:
-        pixels = pixels_of(plane)
-        if len(pixels) > 2:
-            filled += len(pixels)
-            ellipses += 4 * np.pi * np.sqrt(np.linalg.det(moments(np.ascontiguousarray(pixels.T))[1] + np.eye(2) / 12))
-    return filled > solid * ellipses
+    sums = np.empty((len(mask), 6))
+    slice_moments(for_kernels(mask, np.bool_), sums)
+    filled, *rest = sums[sums[:, 0] > 2].T
+    x, y, xx, yy, xy = (one / filled for one in rest)
+    spread = (xx - x * x + 1 / 12) * (yy - y * y + 1 / 12) - (xy - x * y) ** 2
+    return float(filled.sum()) > solid * float((4 * np.pi * np.sqrt(spread)).sum())
 
 
 def pixels_of(plane: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -147,15 +149,16 @@ def closed(plane: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool
         Pixels m that were added around the slice.
     """
     reach = round(NARROW / 2 * float(np.sqrt(np.count_nonzero(plane))))
-    framed = np.pad(plane, reach + 1)
-    open_ = ~_grown(framed, reach)
-    background, _ = scipy.ndimage.label(open_)
-    outside = background == background[0, 0]
-    return framed | ~_grown(outside, reach), open_ & ~outside, reach + 1
+    margin = reach + 1
+    rows, columns = (size + 2 * margin for size in plane.shape)
+    framed = np.zeros((rows, -(-columns // WORD) * WORD), np.bool_)
+    framed[margin : rows - margin, margin : columns - margin] = plane
+    filled = np.packbits(framed, axis=1, bitorder="little").view(np.uint64)
+    hollow = np.empty_like(filled)
+    close_plane(filled, reach, hollow)
+    return _unpacked(filled, columns), _unpacked(hollow, columns), margin
 
 
-def _grown(mask: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
-    """Dilate by an octagon: crosses and squares in turn."""
-    for step in range(steps):
-        mask = scipy.ndimage.binary_dilation(mask, scipy.ndimage.generate_binary_structure(2, 1 + step % 2))
-    return mask
+def _unpacked(words: NDArray[np.uint64], columns: int) -> NDArray[np.bool_]:
+    """Return so many columns of a plane of bits."""
+    return np.unpackbits(words.view(np.uint8), axis=1, count=columns, bitorder="little").view(np.bool_)

@@ -55,7 +55,10 @@ def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> 
         cell_from=settings.cubes.cell_from,
     )  # fmt: skip
     sampling = placed.value
-    found = Segmentation(study, kept.plane, mask, labels, sampling.points, sampling, trained.value)
+    found = Segmentation(
+        study, kept.plane, mask, labels, sampling.points, sampling, trained.value,
+        stages=(partial(_rings_measured, trained.value, study.spacing_mm[:2]),),
+    )  # fmt: skip
     return folded(found, trained, _networks_found(trained.value, kept, settings), placed, sampling_found(placed.value))
 
 
@@ -107,12 +110,17 @@ def _networks_found(networks: Networks, kept: Selected, settings: Settings) -> S
             "slices_without": without,
         }
     }
-    if len(networks.lines):
-        closed = networks.lattice.name == "ring"
-        stats["rings"] = assess_contours(networks.lines, kept.study.spacing_mm[:2], closed=closed)
     other = other_number(networks.lattice, settings.network.neurons)
     told = (*schedule_warnings(settings.network), *((other,) if other else ()))
     return Stage(None, stats, (*told, *lost, *_overlooked(networks, kept, settings)))
+
+
+def _rings_measured(networks: Networks, pixel_mm: tuple[float, float]) -> Stage[None]:
+    """Measure the rings, or the chains, once the report is read."""
+    if not len(networks.lines):
+        return Stage(None)
+    closed = networks.lattice.name == "ring"
+    return Stage(None, {"rings": assess_contours(networks.lines, pixel_mm, closed=closed)})
 
 
 def _overlooked(networks: Networks, kept: Selected, settings: Settings) -> list[str]:

@@ -105,7 +105,7 @@ def bend(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     return float(1.0 - dot / np.sqrt(max(square * length, 1e-300)))
 
 
-@kernel("void(f8[:,::1], i4[:,::1], i4[:,::1], u1[::1], u1[::1], b1[::1], u1[::1], i8, i8)")
+@kernel("void(f8[:,::1], i4[:,::1], i4[:,::1], u1[::1], u1[::1], b1[::1], b1, u1[::1], i8, i8)")
 def choose_diagonals(
     placed: NDArray[np.float64],
     quads: NDArray[np.int32],
@@ -113,6 +113,7 @@ def choose_diagonals(
     allowed: NDArray[np.uint8],
     choice: NDArray[np.uint8],
     turns: NDArray[np.bool_],
+    alone: bool,
     chosen: NDArray[np.uint8],
     start: int,
     stop: int,
@@ -133,6 +134,8 @@ def choose_diagonals(
         not split have no say.
     turns : (q,) bool array
         The squares that choose; the others keep what they have.
+    alone : bool
+        Whether no square is split yet, so that no neighbor has a say.
     chosen : (q,) uint8 array
         Result.
     start, stop : int
@@ -147,7 +150,7 @@ def choose_diagonals(
             for half in range(2):
                 half_normal(placed, quads, f, turn, half, own[turn, half])
             bends[turn] = bend(own[turn, 0], own[turn, 1]) if allowed[f] >> turn & 1 else np.inf
-        for side in range(4):
+        for side in range(0 if alone else 4):
             beyond = across(quads, fans, f, side)
             turned = int(choice[beyond >> 2])
             if turned >= NEITHER:
@@ -156,3 +159,19 @@ def choose_diagonals(
             for turn in range(2):
                 bends[turn] += bend(own[turn, (side - turn & 3) >> 1], other)
         chosen[f] = bends[1] < bends[0]
+
+
+@kernel("void(i4[:,::1], u1[::1], b1, i8[:,:,::1], i8, i8)")
+def split_squares(
+    quads: NDArray[np.int32], choice: NDArray[np.uint8], outward: bool, halves: NDArray[np.int64], start: int, stop: int
+) -> None:
+    """Split squares (q, 4) by the diagonals that were chosen into triangles (q, 2, 3), turned over where not outward.
+
+    One that neither splits is split by the first.
+    """
+    for f in range(start, stop):
+        turn = int(choice[f] == 1)
+        for half in range(2):
+            for corner in range(3):
+                place = turn + (half + corner if corner > 0 else 0)
+                halves[f, half, corner if outward else 2 - corner] = quads[f, place % 4]

@@ -11,6 +11,9 @@ from ..compile import kernel
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    Floats = NDArray[np.float64]
+    Ints = NDArray[np.int32]
+
 
 @kernel("void(f8[:,::1], i4[:,::1], f8[:,::1], i8, i8)")
 def mean_of(
@@ -46,47 +49,107 @@ def mean_of(
         means[m, 0], means[m, 1], means[m, 2] = x * share, y * share, z * share
 
 
-@kernel("void(f8[:,::1], f8[:,::1], f8[:,::1], f8, f8[:,::1], f8[::1], i8, i8)")
-def move_in_cells(
-    steps: NDArray[np.float64],
-    places: NDArray[np.float64],
-    low: NDArray[np.float64],
-    margin: float,
-    moves: NDArray[np.float64],
-    sums: NDArray[np.float64],
-    start: int,
-    stop: int,
-) -> None:
-    """Move vertices, but for what would take them out of their cells.
+@kernel("void(f8[:,::1], i4[:,::1], f8[:,::1], f8[:,::1], i8, i8)")
+def pull_squares(places: Floats, quads: Ints, pulls: Floats, drawn: Floats, start: int, stop: int) -> None:
+    """Find how far the middle of each square is from the place that it is drawn to.
 
     Parameters
     ----------
-    steps : (n, 3) float array
-        Where each would go from where it is; afterwards, where it then is.
+    places : (n, 3) float array
+        The vertices.
+    quads : (q, 4) int32 array
+    pulls : (q, 3) float array
+    drawn : (q, 3) float array
+        Result.
+    start, stop : int
+        Squares to work on.
+    """
+    for f in range(start, stop):
+        a, b, c, d = quads[f, 0], quads[f, 1], quads[f, 2], quads[f, 3]
+        for axis in range(3):
+            middle = places[a, axis] + places[b, axis] + places[c, axis] + places[d, axis]
+            drawn[f, axis] = pulls[f, axis] - 0.25 * middle
+
+
+@kernel("void(f8[:,::1], i4[:,::1], f8[:,::1], i8, i8)")
+def lean(values: Floats, links: Ints, leaning: Floats, start: int, stop: int) -> None:
+    """Find by how much the mean of each vertex' neighbors (n, 6) is more than its own value (n, 3)."""
+    for v in range(start, stop):
+        x = y = z = 0.0
+        count = 0
+        for s in range(links.shape[1]):
+            n = links[v, s]
+            if n >= 0:
+                x, y, z, count = x + values[n, 0], y + values[n, 1], z + values[n, 2], count + 1
+        share = 1.0 / count
+        leaning[v, 0], leaning[v, 1] = x * share - values[v, 0], y * share - values[v, 1]
+        leaning[v, 2] = z * share - values[v, 2]
+
+
+@kernel(
+    "void(f8[:,::1], f8[:,::1], i4[:,::1], f8[:,::1], i4[:,::1], f8, f8, f8[:,::1], f8, f8[:,::1], f8[:,::1], "
+    "f8[::1], i8, i8)"
+)
+def move_in_cells(
+    places: Floats, drawn: Floats, fans: Ints, values: Floats, links: Ints, stiff: float, share: float, low: Floats,
+    margin: float, moves: Floats, moved: Floats, sums: NDArray[np.float64], start: int, stop: int,
+) -> None:  # fmt: skip
+    """Move vertices by the pull of their squares and by what springs resist, but for what would leave their cells.
+
+    Parameters
+    ----------
     places : (n, 3) float array
         Where the vertices are.
+    drawn : (q, 3) float array
+        See `pull_squares`.
+    fans : (n, 6) int32 array
+        The squares around each vertex, then -1.
+    values, links, stiff
+        What springs resist is so many times the mean of the neighbors' values (n, 3) less a vertex' own.
+    share : float
+        Part of the forces' sum that a vertex goes.
     low : (n, 3) float array
         Lowest corners of their cells, whose edge is 1.
     margin : float
         How far a vertex keeps from the faces of its cell.
     moves : (n, 3) float array
         How far each moved last; afterwards, how far it moves now.
+    moved : (n, 3) float array
+        Result: where they are then.
     sums : (3,) float array
         Result over these vertices: longest move, its largest change since the last one, half the sum of squares.
     start, stop : int
         Vertices to work on.
     """
-    sums[:] = 0.0
+    force = np.empty(3)
+    longest, changed, energy = 0.0, 0.0, 0.0
     for v in range(start, stop):
+        x = y = z = 0.0
+        count = 0
+        for s in range(fans.shape[1]):
+            f = fans[v, s]
+            if f < 0:
+                break
+            x, y, z, count = x + drawn[f, 0], y + drawn[f, 1], z + drawn[f, 2], count + 1
+        part = 1.0 / count
+        force[0], force[1], force[2] = x * part, y * part, z * part
+        x = y = z = 0.0
+        count = 0
+        for s in range(links.shape[1]):
+            n = links[v, s]
+            if n >= 0:
+                x, y, z, count = x + values[n, 0], y + values[n, 1], z + values[n, 2], count + 1
+        part = 1.0 / count
+        force[0] += (x * part - values[v, 0]) * stiff
+        force[1] += (y * part - values[v, 1]) * stiff
+        force[2] += (z * part - values[v, 2]) * stiff
         speed = change = 0.0
         for axis in range(3):
-            place = places[v, axis] + steps[v, axis]
+            place = places[v, axis] + force[axis] * share
             place = min(max(place, low[v, axis] + margin), low[v, axis] + (1 - margin))
             move = place - places[v, axis]
             speed += move * move
             change += (move - moves[v, axis]) ** 2
-            steps[v, axis], moves[v, axis] = place, move
-        sums[0] = max(sums[0], speed)
-        sums[1] = max(sums[1], change)
-        sums[2] += 0.5 * speed
-    sums[0], sums[1] = np.sqrt(sums[0]), np.sqrt(sums[1])
+            moved[v, axis], moves[v, axis] = place, move
+        longest, changed, energy = max(longest, speed), max(changed, change), energy + 0.5 * speed
+    sums[0], sums[1], sums[2] = np.sqrt(longest), np.sqrt(changed), energy

@@ -86,6 +86,38 @@ def list_cells(
                 left = right
 
 
+@kernel("void(i4[:,::1], u1[::1], b1[:,::1], i4[:,:,::1], i4[:,::1])")
+def link_cells(
+    cells: NDArray[np.int32],
+    cases: NDArray[np.uint8],
+    linked: NDArray[np.bool_],
+    latest: NDArray[np.int32],
+    table: NDArray[np.int32],
+) -> None:
+    """Find the neighbors of cells with which they share sides of faces.
+
+    Parameters
+    ----------
+    cells : (n, 3) int32 array
+        Ordered by z, then y, then x.
+    cases : (n,) uint8 array
+    linked : (256, 6) bool array
+        Whether a cell of a case shares one in a direction; the cell there does so too.
+    latest : (2, J, I) int32 array
+        Overwritten: the cell that was last seen at a place of even and of odd layers.
+    table : (n, 6) int32 array
+        Result: the neighbor in each direction, -1 where none is linked.
+    """
+    for v in range(len(cells)):
+        x, y, z, case = cells[v, 0], cells[v, 1], cells[v, 2], cases[v]
+        for axis in range(3):
+            table[v, 2 * axis], table[v, 2 * axis + 1] = -1, -1
+            if linked[case, 2 * axis]:
+                before = v - 1 if axis == 0 else latest[z & 1, y - 1, x] if axis == 1 else latest[z - 1 & 1, y, x]
+                table[v, 2 * axis], table[before, 2 * axis + 1] = before, v
+        latest[z & 1, y, x] = v
+
+
 @kernel("void(u1[::1], i4[:,::1], i8[::1], i4[:,::1], u1[::1], i8, i8)")
 def list_faces(
     cases: NDArray[np.uint8],

@@ -18,10 +18,32 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int32]
 
 
+FEW = 64
+"""Half edges of a vertex up to which they are sorted by insertion. Only speed depends on it."""
+
+
 @kernel("i8(i8)")
 def corner_after(corner: int) -> int:
     """Return the next corner of the same face."""
     return corner - 2 if corner % 3 == 2 else corner + 1
+
+
+@kernel("void(i4[::1], i4[::1], i8, i8)")
+def sort_few(keys: Ints, numbers: Ints, start: int, stop: int) -> None:
+    """Sort keys and their numbers from `start` to before `stop`, equal ones in their order: few by insertion.
+
+    Where there are many, by halves that are merged: a vertex may have all edges of a mesh.
+    """
+    if stop - start <= FEW:
+        for n in range(start + 1, stop):
+            key, number, m = keys[n], numbers[n], n
+            while m > start and keys[m - 1] > key:
+                keys[m], numbers[m] = keys[m - 1], numbers[m - 1]
+                m -= 1
+            keys[m], numbers[m] = key, number
+        return
+    ranked = np.argsort(keys[start:stop], kind="mergesort")
+    keys[start:stop], numbers[start:stop] = keys[start:stop][ranked], numbers[start:stop][ranked]
 
 
 @kernel("i8(i4[:,::1], i8, i4[::1], i4[::1])")
@@ -46,35 +68,33 @@ def order_half_edges(faces: Ints, count: int, order: Ints, first: Ints) -> int:
 
     Notes
     -----
-    Sorts by counting, first by the higher ends and then by the lower, so the cost is linear.
+    Sorts by counting by the lower ends, and then the few of each by insertion, so the cost is linear.
     """
-    vertex = faces.reshape(-1)
-    before = np.empty_like(order)
-    begin = np.zeros((2, count + 1), np.int32)
-    for half in range(len(vertex)):
-        a, b = vertex[half], vertex[corner_after(half)]
-        begin[0, max(a, b) + 1] += 1
-        begin[1, min(a, b) + 1] += 1
+    begin = np.zeros(count + 1, np.int32)
+    highs = np.empty(len(order), np.int32)
+    for face in range(len(faces)):
+        a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
+        begin[min(a, b) + 1] += 1
+        begin[min(b, c) + 1] += 1
+        begin[min(c, a) + 1] += 1
     for v in range(count):
-        begin[0, v + 1] += begin[0, v]
-        begin[1, v + 1] += begin[1, v]
-    for half in range(len(vertex)):
-        high = max(vertex[half], vertex[corner_after(half)])
-        before[begin[0, high]] = half
-        begin[0, high] += 1
-    for n in range(len(before)):
-        half = int(before[n])
-        low = min(vertex[half], vertex[corner_after(half)])
-        order[begin[1, low]] = half
-        begin[1, low] += 1
-    edges, pair = 0, (-1, -1)
-    for n in range(len(order)):
-        half = int(order[n])
-        a, b = int(vertex[half]), int(vertex[corner_after(half)])
-        if (min(a, b), max(a, b)) != pair:
-            pair = (min(a, b), max(a, b))
-            first[edges] = n
-            edges += 1
+        begin[v + 1] += begin[v]
+    for face in range(len(faces)):
+        for k in range(3):
+            a, b = faces[face, k], faces[face, (k + 1) % 3]
+            low, high = min(a, b), max(a, b)
+            place = begin[low]
+            order[place], highs[place] = 3 * face + k, high
+            begin[low] += 1
+    edges, start = 0, 0
+    for v in range(count):
+        stop = begin[v]
+        sort_few(highs, order, start, stop)
+        for n in range(start, stop):
+            if n == start or highs[n] != highs[n - 1]:
+                first[edges] = n
+                edges += 1
+        start = stop
     first[edges] = len(order)
     return edges
 
@@ -110,6 +130,14 @@ def find_roots(roots: Ints) -> int:
         roots[n] = roots[roots[n]]
         sets += roots[n] == n
     return sets
+
+
+@kernel("i8(i8[::1], i8[::1], i4[::1])")
+def join_pairs(one: NDArray[np.int64], other: NDArray[np.int64], roots: Ints) -> int:
+    """Join the sets of pairs (p,), and let every number point to the lowest of its set; return the number of sets."""
+    for n in range(len(one)):
+        join(roots, one[n], other[n])
+    return int(find_roots(roots))
 
 
 @kernel("void(i4[:,::1], i4[::1])")

@@ -6,9 +6,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 
+from ...kernels.contours.curves import draw_closed
 from ...measure.polygon import along, evenly
+from ...model.columns import for_kernels
 from ...som.even_spacing import even_arcs
 from ...som.fit import fit
 
@@ -32,13 +33,9 @@ def finely(ring: Floats) -> Floats:
 
     Returns (u, `FINE`, 2). A periodic cubic spline over the roots of the chords (centripetal: Lee 1989).
     """
-    closed = np.concatenate([ring, ring[:1]])
-    chord = np.sqrt((np.diff(closed, axis=0) ** 2).sum(axis=1))
-    # a millionth of the longest chord at least: neurons at one place get knots of their own
-    step = np.sqrt(np.maximum(chord, 1e-6 * max(float(chord.max()), 1e-300)))
-    knots = np.concatenate([[0.0], np.cumsum(step)])
-    place = knots[:-1, None] + np.arange(FINE) / FINE * step[:, None]
-    return np.asarray(scipy.interpolate.CubicSpline(knots, closed, bc_type="periodic")(place))
+    fine = np.empty((len(ring), FINE, 2))
+    draw_closed(for_kernels(ring, np.float64), fine)
+    return fine
 
 
 def unshrunk(

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...kernels.contours.curves import unshrink
 from ...kernels.som.neighborhoods import GAUSSIAN, weigh
+from ...model.columns import for_kernels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,14 +43,10 @@ def unshrunk(ring: Floats, gaps: NDArray[np.bool_], radius: float, half_width: f
     -------
     (u, 2) float array
     """
-    lengths = np.sqrt(((np.roll(ring, -1, axis=0) - ring) ** 2).sum(axis=1))[~gaps]
-    spacing = float(lengths.mean()) if len(lengths) else 0.0
-    if spacing == 0 or len(ring) <= 2 * STRIDE:
-        return ring
-    inward = 1 / 24 + bell_variance(radius, len(ring)) / 2 - (half_width / spacing) ** 2 / 3
-    bend = np.roll(ring, STRIDE, axis=0) + np.roll(ring, -STRIDE, axis=0) - 2 * ring
-    near = np.any([np.roll(gaps, n) for n in range(1 - STRIDE, STRIDE + 1)], axis=0)
-    return np.asarray(ring - inward / STRIDE**2 * np.where(near[:, None], 0.0, bend))
+    put = np.empty((len(ring), 2))
+    averaged = 1 / 24 + bell_variance(radius, len(ring)) / 2
+    unshrink(for_kernels(ring, np.float64), for_kernels(gaps, np.bool_), averaged, half_width, STRIDE, put)
+    return put
 
 
 def bell_variance(radius: float, count: int) -> float:
