@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from tomomesh.kernels.som import online as kernels
 from tomomesh.kernels.som.neighborhoods import BUBBLE, GAUSSIAN, LATERAL, weigh
 from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
 from tomomesh.som import products
+from tomomesh.som.blocks import Blocks
 from tomomesh.som.fit import match
 
 if TYPE_CHECKING:
@@ -74,6 +75,12 @@ def box_of(inputs: Floats) -> Floats:
     return np.stack([inputs.min(axis=0), inputs.max(axis=0)])
 
 
+def train_in_blocks(codebook: Floats, by_axis: Floats, amounts: Floats, *falls: Any) -> int:
+    """Train on inputs (d, n) as `products.train_batch` does, by the compiled loops."""
+    blocks = Blocks.of(by_axis, box_of(by_axis.T))
+    return batch_kernels.train_batch(codebook, blocks.places, blocks.boxes, blocks.filled(amounts), *falls)
+
+
 shapes = st.sampled_from([BUBBLE, GAUSSIAN, LATERAL])
 
 
@@ -113,7 +120,7 @@ class TestBatch:
     @given(
         seed=seeds, name=topologies, d=st.integers(2, 4), sigma=st.floats(0.3, 6), inhibition=st.sampled_from([0, 0.03])
     )
-    @pytest.mark.parametrize("run", [batch_kernels.train_batch, products.train_batch])
+    @pytest.mark.parametrize("run", [train_in_blocks, products.train_batch])
     def test_is_the_definition(self, run: Train, seed: int, name: str, d: int, sigma: float, inhibition: float) -> None:
         graph, start, inputs, rng = made(seed, name, d, 100)
         fall, amounts = sigma * np.array([[1.0], [0.7], [0.4]]), rng.uniform(0, 2, 100)
@@ -129,7 +136,7 @@ class TestBatch:
             moved = np.linalg.norm(wanted[epoch + 1] - wanted[epoch], axis=1).max()
             assert history[epoch, 1] == pytest.approx(moved, rel=1e-6, abs=1e-9)
 
-    @pytest.mark.parametrize("run", [batch_kernels.train_batch, products.train_batch])
+    @pytest.mark.parametrize("run", [train_in_blocks, products.train_batch])
     def test_a_neuron_that_nothing_reaches_stays_and_one_at_rest_ends_it(self, run: Train) -> None:
         codebook, history = np.array([[0.0, 10.0, 20.0], [0.0, 0.0, 0.0]]), np.empty((9, 2))
         weights, inputs = np.repeat([[1.0, 0.0, 0.0]], 9, axis=0), np.array([[1.0, 3.0], [0.0, 0.0]])
@@ -149,7 +156,7 @@ class TestMatch:
         codebook, inputs = rng.normal(size=(9, d)) * 3, rng.normal(size=(n, d)) * 3
         if whole:  # many exact ties
             codebook, inputs = np.round(codebook), np.round(inputs)
-        winners, squared = match(np.ascontiguousarray(codebook.T), np.ascontiguousarray(inputs.T))
+        winners, squared = match(codebook, inputs)
         wanted = ((inputs[:, None] - codebook) ** 2).sum(axis=2)
         np.testing.assert_allclose(squared, wanted.min(axis=1), rtol=1e-4, atol=1e-4)
         np.testing.assert_allclose(wanted[np.arange(n), winners], wanted.min(axis=1), rtol=1e-4, atol=1e-4)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.som.neighborhoods import BUBBLE, GAUSSIAN, LATERAL
-from .inputs import Shown, flat
-from .passes import Watch, match, train_batch, train_online
+from .inputs import Shown, flat, match
+from .passes import Watch, train_batch, train_online
 from .schedules import Fall, falling, radius_power
 from .starts import CLOSED, start_positions
 
@@ -194,7 +194,7 @@ def _without_strays(codebook: NDArray[np.float64], shown: Shown, trim: float) ->
     """Keep the inputs that are nearer to their neuron than `trim` times the median; all where `trim` is 0."""
     if trim == 0:
         return np.ones(len(shown), bool)
-    _, squared = match(codebook, shown.by_axis)
+    _, squared = shown.match(codebook)
     return np.asarray(squared <= trim**2 * _median(squared, shown.weights))
 
 

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import UsageError
-from .products import WIDE
+from .blocks import Blocks
+from .products import WIDE, best_matching_units
 from .starts import moments
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ class Shown:
     @cached_property
     def by_axis(self) -> NDArray[np.float64]:
         """The inputs, one row an axis, (d, n): contiguous unless they go through matrix products."""
-        return self.rows.T if self.inputs.shape[1] > WIDE else np.ascontiguousarray(self.inputs.T)
+        return self.rows.T if self.wide else np.ascontiguousarray(self.inputs.T)
 
     @cached_property
     def amounts(self) -> NDArray[np.float64]:
@@ -94,9 +95,35 @@ class Shown:
         return np.stack([self.by_axis.min(axis=1), self.by_axis.max(axis=1)])
 
     @cached_property
+    def blocks(self) -> Blocks:
+        """The inputs in blocks of near ones, of `products.WIDE` dimensions at most."""
+        return Blocks.of(self.by_axis, self.box)
+
+    @cached_property
+    def filled(self) -> NDArray[np.float64]:
+        """The weights in the order of the blocks."""
+        return self.blocks.filled(self.amounts)
+
+    @property
+    def wide(self) -> bool:
+        """Whether they go through matrix products."""
+        return self.inputs.shape[1] > WIDE
+
+    def match(self, codebook: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Return the winner of each input and the squared distance to it (eq. 1), for neurons (d, u)."""
+        return best_matching_units(codebook.T, self.inputs) if self.wide else self.blocks.match(codebook)
+
+    @cached_property
     def spread(self) -> Moments:
         """Mean and covariance."""
         return moments(self.by_axis, self.weights)
+
+
+def match(
+    codebook: NDArray[np.float64], inputs: NDArray[np.float64]
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return the winner of each input (n, d) among neurons (u, d), and the squared distance to it (eq. 1)."""
+    return Shown.of(inputs, None).match(np.ascontiguousarray(flat(codebook).T))
 
 
 def flat(places: NDArray[np.float64]) -> NDArray[np.float64]:
