@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..kernels.contours.splines import place_evenly
 from ..kernels.measure.polygons import distance_to_polygon, inside_polygon
 
 if TYPE_CHECKING:
@@ -64,15 +65,18 @@ def area(ring: NDArray[np.float64]) -> float:
 
 def side_lengths(line: NDArray[np.float64], *, closed: bool = True) -> NDArray[np.float64]:
     """Return the lengths of the sides of a line (u, 2), the first from point 0 to point 1."""
-    onward = np.roll(line, -1, axis=0) if closed else line[1:]
-    return np.asarray(np.sqrt(((onward - line[: len(onward)]) ** 2).sum(axis=1)))
+    line = np.concatenate([line, line[:1]]) if closed else line
+    off = line[1:] - line[:-1]
+    return np.asarray(np.sqrt(np.einsum("ua,ua->u", off, off)))
 
 
 def evenly(line: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Place points at equal steps along a line, its ends kept; one point alone takes the middle."""
-    way = along(line)
-    wanted = np.linspace(0.0, way[-1], count) if count > 1 else way[-1:] / 2
-    return np.stack([np.interp(wanted, way, axis) for axis in line.T], axis=1)
+    if len(line) == 1:
+        return np.repeat(line, count, axis=0)
+    placed = np.empty((max(count, 3), line.shape[1]))
+    place_evenly(np.ascontiguousarray(line, np.float64), placed)
+    return placed if count > 2 else placed[1:2] if count == 1 else placed[::2]
 
 
 def along(line: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -119,9 +119,7 @@ class Shown:
         return moments(self.by_axis, self.weights)
 
 
-def match(
-    codebook: NDArray[np.float64], inputs: NDArray[np.float64]
-) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+def match(codebook: NDArray[np.float64], inputs: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return the winner of each input (n, d) among neurons (u, d), and the squared distance to it (eq. 1)."""
     return Shown.of(inputs, None).match(np.ascontiguousarray(flat(codebook).T))
 

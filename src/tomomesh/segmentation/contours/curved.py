@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
-from ...measure.polygon import along, evenly
+from ...kernels.contours.splines import draw_closed_spline
+from ...measure.polygon import along, evenly, side_lengths
 from ...som.even_spacing import even_arcs
 from ...som.fit import fit
 
@@ -32,13 +32,12 @@ def finely(ring: Floats) -> Floats:
 
     Returns (u, `FINE`, 2). A periodic cubic spline over the roots of the chords (centripetal: Lee 1989).
     """
-    closed = np.concatenate([ring, ring[:1]])
-    chord = np.sqrt((np.diff(closed, axis=0) ** 2).sum(axis=1))
+    chord = side_lengths(ring)
     # a millionth of the longest chord at least: neurons at one place get knots of their own
     step = np.sqrt(np.maximum(chord, 1e-6 * max(float(chord.max()), 1e-300)))
-    knots = np.concatenate([[0.0], np.cumsum(step)])
-    place = knots[:-1, None] + np.arange(FINE) / FINE * step[:, None]
-    return np.asarray(CubicSpline(knots, closed, bc_type="periodic")(place))
+    drawn = np.empty((len(ring) * FINE, 2))
+    draw_closed_spline(np.ascontiguousarray(ring), step, np.full(len(ring), FINE), drawn)
+    return drawn.reshape(len(ring), FINE, 2)
 
 
 def unshrunk(

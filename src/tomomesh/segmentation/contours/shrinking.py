@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...kernels.som.neighborhoods import GAUSSIAN, weigh
+from ...measure.polygon import side_lengths
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,14 +42,16 @@ def unshrunk(ring: Floats, gaps: NDArray[np.bool_], radius: float, half_width: f
     -------
     (u, 2) float array
     """
-    lengths = np.sqrt(((np.roll(ring, -1, axis=0) - ring) ** 2).sum(axis=1))[~gaps]
+    lengths = side_lengths(ring)[~gaps]
     spacing = float(lengths.mean()) if len(lengths) else 0.0
     if spacing == 0 or len(ring) <= 2 * STRIDE:
         return ring
     inward = 1 / 24 + bell_variance(radius, len(ring)) / 2 - (half_width / spacing) ** 2 / 3
-    bend = np.roll(ring, STRIDE, axis=0) + np.roll(ring, -STRIDE, axis=0) - 2 * ring
-    near = np.any([np.roll(gaps, n) for n in range(1 - STRIDE, STRIDE + 1)], axis=0)
-    return np.asarray(ring - inward / STRIDE**2 * np.where(near[:, None], 0.0, bend))
+    around = np.concatenate([ring[-STRIDE:], ring, ring[:STRIDE]])
+    bend = around[2 * STRIDE :] + around[: -2 * STRIDE] - 2 * ring
+    if gaps.any():
+        bend[np.any([np.roll(gaps, n) for n in range(1 - STRIDE, STRIDE + 1)], axis=0)] = 0.0
+    return np.asarray(ring - inward / STRIDE**2 * bend)
 
 
 def bell_variance(radius: float, count: int) -> float:
