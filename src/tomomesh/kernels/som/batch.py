@@ -12,10 +12,6 @@ from .search import best_matching_units
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-COLUMNS = 64
-"""Columns of the totals that are added together: 1,000 rows of them are half a megabyte, and stay in the second cache.
-No result depends on it."""
-
 
 @kernel("void(f8[:,::1], f8[::1], i4[::1], f4[::1], f8[:,::1])")
 def sum_by_winner(
@@ -103,42 +99,6 @@ def move_to_means(
                 moved[i] += (place - codebook[axis, i]) ** 2
                 codebook[axis, i] = place
     return float(np.sqrt(moved.max()))
-
-
-@kernel("void(f8[:,::1], i4[:,::1], f8[::1], f8[:,::1])")
-def add_shares(
-    totals: NDArray[np.float64],
-    hops: NDArray[np.int32],
-    neighborhood: NDArray[np.float64],
-    sums: NDArray[np.float64],
-) -> None:
-    """Add up sum_c h(hops(i, c)) totals_c for each neuron i, for totals of many columns.
-
-    Parameters
-    ----------
-    totals : (u, k) float array
-    hops : (u, u) int array
-    neighborhood : (h,) float array
-        h by the number of hops.
-    sums : (u, k) float array
-        Result.
-
-    Notes
-    -----
-    In the order of c, `COLUMNS` columns at a time, whose totals stay in the second cache.
-    """
-    u, k = totals.shape
-    for start in range(0, k, COLUMNS):
-        some = totals[:, start : start + COLUMNS].copy()
-        for i in range(u):
-            own = sums[i, start : start + COLUMNS]
-            own[:] = 0.0
-            for c in range(u):
-                share = neighborhood[hops[i, c]]
-                if share != 0.0:
-                    row = some[c]
-                    for column in range(len(own)):
-                        own[column] += share * row[column]
 
 
 @kernel("i8(f8[:,::1], f8[:,::1], f8[:,:,::1], f8[::1], i4[:,::1], f8[:,::1], f8[:,::1], f8, i8, f8[:,::1])")
