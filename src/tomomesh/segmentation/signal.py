@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from ..som.starts import moments
+from ..kernels.contours.moments import plane_moments
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,13 +39,12 @@ def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
     ----------
     mask : (K, J, I) bool array
     """
-    filled = ellipses = 0.0
-    for plane in mask:
-        pixels = pixels_of(plane)
-        if len(pixels) > 2:
-            filled += len(pixels)
-            ellipses += 4 * np.pi * np.sqrt(np.linalg.det(moments(np.ascontiguousarray(pixels.T))[1] + np.eye(2) / 12))
-    return filled > solid * ellipses
+    sums = np.empty((len(mask), 6))
+    plane_moments(np.ascontiguousarray(mask), sums)
+    count, x, y, xx, xy, yy = sums[sums[:, 0] > 2].T
+    spread = (xx / count - (x / count) ** 2 + 1 / 12) * (yy / count - (y / count) ** 2 + 1 / 12)
+    ellipses = 4 * np.pi * np.sqrt(np.maximum(spread - (xy / count - x * y / count**2) ** 2, 0.0))
+    return bool(count.sum() > solid * ellipses.sum())
 
 
 def pixels_of(plane: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -122,6 +122,20 @@ class Shown:
 def match(codebook: NDArray[np.float64], inputs: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return the winner of each input (n, d) among neurons (u, d), and the squared distance to it (eq. 1)."""
     return Shown.of(inputs, None).match(np.ascontiguousarray(flat(codebook).T))
+
+
+def median(values: NDArray[Any], weights: NDArray[np.float64] | None = None) -> float:
+    """Return the median of weighted values (n,), none NaN: that of values repeated as often as they weigh.
+
+    NumPy's own takes three times as long on the sides of a ring.
+    """
+    if weights is None:
+        middle = [(len(values) - 1) // 2, len(values) // 2]
+        return float(np.partition(values, middle)[middle].mean())
+    order = np.argsort(values, kind="stable")
+    steps = np.cumsum(weights[order])
+    ends = np.searchsorted(steps, steps[-1] / 2, side="left"), np.searchsorted(steps, steps[-1] / 2, side="right")
+    return float(values[order[np.minimum(ends, len(order) - 1)]].mean())
 
 
 def flat(places: NDArray[np.float64]) -> NDArray[np.float64]:
