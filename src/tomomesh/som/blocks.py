@@ -30,7 +30,7 @@ class Blocks:
     """
 
     count: int
-    order: NDArray[np.int32]
+    order: NDArray[np.uint32]
     places: Floats
     boxes: Floats
 
@@ -39,7 +39,7 @@ class Blocks:
         """Sort inputs (d, n), d > 1, that lie in a box (2, d)."""
         d, n = by_axis.shape
         blocks = -(-n // BLOCK)
-        found = cls(n, np.empty(blocks * BLOCK, np.int32), np.empty((d, blocks * BLOCK)), np.empty((2, d, blocks)))
+        found = cls(n, np.empty(blocks * BLOCK, np.uint32), np.empty((d, blocks * BLOCK)), np.empty((2, d, blocks)))
         sort_into_blocks(by_axis, box, found.order, found.places, found.boxes)
         return found
 

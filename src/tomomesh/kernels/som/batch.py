@@ -38,7 +38,7 @@ def sum_by_winner(
     x, y = inputs[0], inputs[1]
     totals[:] = 0.0
     for n in range(len(winners)):
-        c, amount = winners[n], amounts[n]
+        c, amount = np.uint32(winners[n]), amounts[n]
         totals[c, 0] += amount * x[n]
         totals[c, 1] += amount * y[n]
         for axis in range(2, d):
@@ -86,7 +86,7 @@ def move_to_means(
         won = totals[c, d]
         if won > 0.0:
             for i in range(u):
-                share[i] = neighborhood[hops[c, i]]
+                share[i] = neighborhood[np.uint32(hops[c, i])]
                 reached[i] += share[i] * won
             for axis in range(d):
                 total, row = totals[c, axis], sums[axis]

@@ -7,51 +7,53 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compile import kernel
+from .online import INDEX_BITS, LANES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 BLOCK = 64
 """Inputs of a block. Measured on slices of a skull: blocks of 32 take 1.3 times as long, of 128 as long."""
-LANES = 32
-"""Neurons that one turn of a vectorized loop takes; what is left over would be gone through one by one."""
+ROUNDING = np.float32(1e-5)
+"""Share of squared distances by which a neuron must be farther to be left out: 80 times the rounding of one."""
 MOST_BITS = 20
 """Most bits of a cell's number: a million cells, whose table has 4 MB."""
 
 
-@kernel("void(f8[:,::1], f8[:,::1], i4[::1])")
-def _sort_by_cell(inputs: NDArray[np.float64], box: NDArray[np.float64], order: NDArray[np.int32]) -> None:
+@kernel("void(f8[:,::1], f8[:,::1], u4[::1])")
+def _sort_by_cell(inputs: NDArray[np.float64], box: NDArray[np.float64], order: NDArray[np.uint32]) -> None:
+    """Sort inputs by the cells that they lie in; numbers without a sign need no look for those that count from the end."""
     d, n = inputs.shape
     bits = max(1, min(MOST_BITS, int(np.log2(n))) // d)
     extent = 0.0
     for axis in range(d):
         extent = max(extent, box[1, axis] - box[0, axis])
     scale = ((1 << bits) - 1e-6) / extent if extent > 0.0 else 0.0
-    spread = np.zeros(1 << bits, np.int32)
+    spread = np.zeros(1 << bits, np.uint32)
     for place in range(1 << bits):
         for bit in range(bits):
-            spread[place] |= np.int32(((place >> bit) & 1) << (bit * d))
-    cell = np.zeros(n, np.int32)
+            spread[place] |= np.uint32(((place >> bit) & 1) << (bit * d))
+    cell = np.zeros(n, np.uint32)
     for axis in range(d):
         row, least = inputs[axis], box[0, axis]
         for k in range(n):
-            cell[k] |= spread[np.int32((row[k] - least) * scale)] << np.int32(axis)
-    starts = np.zeros((1 << (bits * d)) + 1, np.int32)
+            cell[k] |= spread[np.uint32((row[k] - least) * scale)] << np.uint32(axis)
+    starts = np.zeros((1 << (bits * d)) + 1, np.uint32)
     for k in range(n):
-        starts[cell[k] + 1] += 1
+        starts[cell[k] + np.uint32(1)] += np.uint32(1)
     for c in range(1, len(starts)):
         starts[c] += starts[c - 1]
     for k in range(n):
         at = starts[cell[k]]
         order[at] = k
-        starts[cell[k]] = at + 1
+        starts[cell[k]] = at + np.uint32(1)
 
 
-@kernel("void(f8[:,::1], f8[:,::1], i4[::1], f8[:,::1], f8[:,:,::1])")
+@kernel("void(f8[:,::1], f8[:,::1], u4[::1], f8[:,::1], f8[:,:,::1])")
 def sort_into_blocks(
     inputs: NDArray[np.float64],
     box: NDArray[np.float64],
-    order: NDArray[np.int32],
+    order: NDArray[np.uint32],
     places: NDArray[np.float64],
     boxes: NDArray[np.float64],
 ) -> None:
@@ -70,7 +72,7 @@ def sort_into_blocks(
     places : (d, b * BLOCK) float array
         Result: where they are.
     boxes : (2, d, b) float array
-        Result: low and high corner of each block.
+        Result: middle and half the size of each block.
 
     Notes
     -----
@@ -87,45 +89,46 @@ def sort_into_blocks(
                 place[n] = row[order[n]]
                 bits = np.float64(place[n] - least).view(np.int64)
                 lowest, highest = min(lowest, bits), max(highest, bits)
-            boxes[0, axis, block] = least + np.int64(lowest).view(np.float64)
-            boxes[1, axis, block] = least + np.int64(highest).view(np.float64)
+            low, high = np.int64(lowest).view(np.float64), np.int64(highest).view(np.float64)
+            boxes[0, axis, block], boxes[1, axis, block] = least + (low + high) / 2, (high - low) / 2
 
 
 @kernel("i8(f4[:,::1], f4[::1], f4[:,::1], i4[::1])")
 def _candidates(
-    codebook: NDArray[np.float32], reach: NDArray[np.float32], bounds: NDArray[np.float32], chosen: NDArray[np.int32]
+    codebook: NDArray[np.float32], half: NDArray[np.float32], bounds: NDArray[np.float32], chosen: NDArray[np.int32]
 ) -> int:
-    """Choose the neurons of which one or the other may be the nearest to some place between 0 and a reach.
+    """Choose the neurons of which one or the other may be the nearest to some place in a box around 0.
 
-    Those whose least distance from that box is at most the least of the farthest distances. Rounding keeps that order:
-    no place in the box is computed to be nearer than the first, nor farther than the second.
+    A neuron i is out where a neuron j is nearer to all of the box: by how much it is nearer is linear in the place,
+    |x - i|^2 - |x - j|^2, and least in a corner, where it is |i|^2 - |j|^2 - 2 half . |i - j|. For j any would do;
+    one of the nearest to the middle is taken.
     """
-    x, y, wide, high = codebook[0], codebook[1], reach[0], reach[1]
-    nearest, near_rest, far_rest = bounds[0], bounds[1], bounds[2]
+    x, y, wide, high = codebook[0], codebook[1], half[0], half[1]
+    squared, rest, nearer = bounds[0], bounds[1], bounds[2]
+    size = wide * wide + high * high
     for axis in range(2, len(codebook)):
-        row, deep = codebook[axis], reach[axis]
+        row = codebook[axis]
+        size += half[axis] * half[axis]
         for i in range(len(row)):
-            below, above = -row[i], row[i] - deep
-            outside = below if below > above else above
-            outside = outside if outside > np.float32(0.0) else np.float32(0.0)
-            near_rest[i] = outside * outside if axis == 2 else near_rest[i] + outside * outside
+            rest[i] = row[i] * row[i] if axis == 2 else rest[i] + row[i] * row[i]
+    nearest = np.int32(2**31 - 1)
+    for i in range(len(squared)):
+        squared[i] = rest[i] + x[i] * x[i] + y[i] * y[i]
+        nearest = min(nearest, (np.float32(squared[i]).view(np.int32) & np.int32(~INDEX_BITS)) | np.int32(i))
+    j = nearest & np.int32(INDEX_BITS)
+    for axis in range(2, len(codebook)):
+        row, deep, place = codebook[axis], half[axis], codebook[axis, j]
         for i in range(len(row)):
-            below, above = row[i], deep - row[i]
-            across = below if below > above else above
-            far_rest[i] = across * across if axis == 2 else far_rest[i] + across * across
-    least = np.int32(2**31 - 1)
-    for i in range(len(nearest)):
-        below, above, left, right = -y[i], y[i] - high, -x[i], x[i] - wide
-        beyond, down = (below, above) if below > above else (above, below)
-        beside, across = (left, right) if left > right else (right, left)
-        beyond = beyond if beyond > np.float32(0.0) else np.float32(0.0)
-        beside = beside if beside > np.float32(0.0) else np.float32(0.0)
-        nearest[i] = near_rest[i] + beside * beside + beyond * beyond
-        least = min(least, np.float32(far_rest[i] + across * across + down * down).view(np.int32))
+            across = deep * np.abs(row[i] - place)
+            rest[i] = across if axis == 2 else rest[i] + across
+    least, x_j, y_j = squared[j], x[j], y[j]
+    for i in range(len(nearer)):
+        across = rest[i] + wide * np.abs(x[i] - x_j) + high * np.abs(y[i] - y_j)
+        nearer[i] = squared[i] - least - across - across - ROUNDING * (squared[i] + size)
     count = 0
-    for i in range(len(nearest)):
+    for i in range(len(nearer)):
         chosen[count] = i
-        count += np.float32(nearest[i]).view(np.int32) <= least
+        count += nearer[i] <= np.float32(0.0)
     return count
 
 
@@ -195,7 +198,7 @@ def best_matching_units(
 
     Notes
     -----
-    Two axes at least. Single precision, twice as many lanes as double; relative to each block's corner it loses
+    Two axes at least. Single precision, twice as many lanes as double; relative to each block's middle it loses
     nothing. A block looks only at the neurons that may be the nearest to a place in it: ten of 82, on a skull. In the
     plane four are compared in a pass, which loads and stores the best a quarter as often. Neurons at infinity fill the
     last vector.
@@ -203,18 +206,18 @@ def best_matching_units(
     d, u = codebook.shape
     lanes = -(-u // LANES) * LANES
     own, bounds = np.full((d, lanes), np.inf, np.float32), np.zeros((3, lanes), np.float32)
-    near, reach, chosen = np.empty((d, BLOCK), np.float32), np.empty(d, np.float32), np.empty(lanes + 1, np.int32)
-    squared[:] = np.inf
+    near, half, chosen = np.empty((d, BLOCK), np.float32), np.empty(d, np.float32), np.empty(lanes + 1, np.int32)
+    winners[:], squared[:] = 0, np.inf
     for block in range(boxes.shape[2]):
         here = slice(block * BLOCK, (block + 1) * BLOCK)
         for axis in range(d):
-            corner, row, place = boxes[0, axis, block], codebook[axis], places[axis, here]
-            reach[axis] = np.float32(boxes[1, axis, block] - corner)
+            middle, row, place = boxes[0, axis, block], codebook[axis], places[axis, here]
+            half[axis] = np.float32(boxes[1, axis, block])
             for i in range(u):
-                own[axis, i] = np.float32(row[i] - corner)
+                own[axis, i] = np.float32(row[i] - middle)
             for n in range(BLOCK):
-                near[axis, n] = np.float32(place[n] - corner)
-        count = _candidates(own, reach, bounds, chosen)
+                near[axis, n] = np.float32(place[n] - middle)
+        count = _candidates(own, half, bounds, chosen)
         if d == 2:
             _nearest_in_plane(own, chosen[:count], near, squared[here], winners[here])
         else:
