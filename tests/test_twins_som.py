@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from conftest import law, seeds, size
 from tomomesh.kernels.som import batch as batch_kernels
 from tomomesh.kernels.som import online as kernels
+from tomomesh.kernels.som import products as around
 from tomomesh.kernels.som.neighborhoods import BUBBLE, GAUSSIAN, LATERAL, weigh
+from tomomesh.kernels.som.search import BLOCK
 from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
 from tomomesh.som import products
 from tomomesh.som.blocks import Blocks
@@ -173,3 +175,50 @@ def test_near_ties_in_many_dimensions_are_decided_in_double_at_every_scale(seed:
     inputs = scale * (apart[rng.integers(12, size=30)] + 1e-2 * rng.normal(size=(30, d)))
     nearest = [int(((codebook - one) ** 2).sum(axis=1).argmin()) for one in inputs]
     np.testing.assert_array_equal(products.best_matching_units(codebook, inputs)[0], nearest)
+
+
+@law(40)
+@given(seed=seeds, d=st.integers(2, 5), n=st.integers(1, 700), shrunk=st.sampled_from([1e-3, 1.0, 30.0]))
+def test_a_block_leaves_out_no_neuron_that_may_win(seed: int, d: int, n: int, shrunk: float) -> None:
+    """Many neurons, near each other or far apart, among inputs in clusters: what is found is the nearest of all."""
+    rng = np.random.default_rng(seed)
+    inputs = rng.normal(size=(7, d))[rng.integers(7, size=n)] + 0.1 * rng.normal(size=(n, d))
+    codebook = shrunk * rng.normal(size=(rng.integers(1, 120), d))
+    winners, squared = match(codebook, inputs)
+    wanted = ((inputs[:, None] - codebook) ** 2).sum(axis=2)
+    np.testing.assert_allclose(squared, wanted.min(axis=1), rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(wanted[np.arange(n), winners], wanted.min(axis=1), rtol=1e-5, atol=1e-9)
+
+
+@law(40)
+@given(seed=seeds, n=st.integers(1, 300), d=st.integers(2, 4))
+def test_blocks_hold_every_input_once_and_their_boxes_hold_it(seed: int, n: int, d: int) -> None:
+    inputs = np.random.default_rng(seed).normal(size=(d, n))
+    blocks = Blocks.of(inputs, box_of(inputs.T))
+    np.testing.assert_array_equal(np.sort(blocks.order[:n]), np.arange(n))
+    np.testing.assert_array_equal(blocks.places, inputs[:, blocks.order])
+    middle, half = (np.repeat(edge, BLOCK, axis=1) for edge in blocks.boxes)
+    assert (np.abs(blocks.places - middle) <= half * (1 + 1e-9) + 1e-12).all()
+    assert blocks.filled(None).sum() == n
+
+
+@law(40)
+@given(seed=seeds, n=st.integers(1, 20), u=st.integers(1, 50), rounding=st.sampled_from([0.0, 0.1, 10.0]))
+def test_the_highest_scores_and_those_close_to_them(seed: int, n: int, u: int, rounding: float) -> None:
+    score = np.round(np.random.default_rng(seed).normal(size=(n, u)), 1).astype(np.float32)
+    best, close = np.empty(n, np.int32), np.empty(n, np.int32)
+    off = np.full(n, rounding, np.float32)
+    around.highest(score, off, best, close)
+    np.testing.assert_array_equal(best, score.argmax(axis=1))
+    np.testing.assert_array_equal(close, (score >= (score.max(axis=1) - off)[:, None]).sum(axis=1))
+
+
+@law(20)
+@given(seed=seeds, name=topologies, k=st.sampled_from([1, 9, 80, 81, 200]))
+def test_shares_are_a_product(seed: int, name: str, k: int) -> None:
+    graph, _, _, rng = made(seed, name, 2, 1)
+    totals, by_hop = rng.normal(size=(len(graph), k)), np.exp(-np.arange(graph.farthest + 1.0))
+    by_hop[2:] = 0.0
+    sums = np.empty_like(totals)
+    around.add_shares(totals, graph.hops, by_hop, sums)
+    np.testing.assert_allclose(sums, by_hop[graph.hops] @ totals, rtol=0, atol=1e-12)

@@ -52,8 +52,8 @@ class Blocks:
             own[self.order] = values
         return found
 
-    def filled(self, amounts: Floats) -> Floats:
-        """Return weights (n,) in the order of the blocks; what fills the last block has none."""
-        shown = amounts[self.order]
+    def filled(self, weights: Floats | None) -> Floats:
+        """Return weights (n,), or 1 each, in the order of the blocks; what fills the last block has none."""
+        shown = np.ones(len(self.order)) if weights is None else weights[self.order]
         shown[self.count :] = 0.0
         return shown

@@ -102,7 +102,7 @@ class Shown:
     @cached_property
     def filled(self) -> NDArray[np.float64]:
         """The weights in the order of the blocks."""
-        return self.blocks.filled(self.amounts)
+        return self.blocks.filled(self.weights)
 
     @property
     def wide(self) -> bool:

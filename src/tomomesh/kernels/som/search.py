@@ -22,7 +22,7 @@ MOST_BITS = 20
 
 @kernel("void(f8[:,::1], f8[:,::1], u4[::1])")
 def _sort_by_cell(inputs: NDArray[np.float64], box: NDArray[np.float64], order: NDArray[np.uint32]) -> None:
-    """Sort inputs by the cells that they lie in; numbers without a sign need no look for those that count from the end."""
+    """Sort inputs by the cells that they lie in. Unsigned numbers index faster: none counts from the end."""
     d, n = inputs.shape
     bits = max(1, min(MOST_BITS, int(np.log2(n))) // d)
     extent = 0.0
