@@ -18,8 +18,7 @@ from tomomesh.kernels.som.neighborhoods import BUBBLE, GAUSSIAN, LATERAL, weigh
 from tomomesh.kernels.som.search import BLOCK
 from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
 from tomomesh.som import products
-from tomomesh.som.blocks import Blocks
-from tomomesh.som.fit import match
+from tomomesh.som.inputs import Blocks, match
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import UsageError
-from .blocks import Blocks
+from ..kernels.som.search import BLOCK, sort_into_blocks
+from ..kernels.som.search import best_matching_units as match_in_blocks
 from .products import WIDE, best_matching_units
 from .starts import moments
 
@@ -26,6 +27,50 @@ LOOKED_AT = 2_000
 """Inputs at which it is told, at most: the median of so many is known to some percent."""
 THIN = 0.25
 """Half width of a band over its mean radius up to which inputs count as one; a filled disc has .35 / .71, one half."""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Inputs as `tomomesh.kernels.som.search.sort_into_blocks` lays them out.
+
+    Attributes
+    ----------
+    count : int
+        Inputs n; the last is repeated to fill the last block.
+    order : (b * BLOCK,) int array
+        Which input stands where.
+    places : (d, b * BLOCK) float array
+    boxes : (2, d, b) float array
+    """
+
+    count: int
+    order: NDArray[np.uint32]
+    places: NDArray[np.float64]
+    boxes: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, by_axis: NDArray[np.float64], box: NDArray[np.float64]) -> Blocks:
+        """Sort inputs (d, n), d > 1, that lie in a box (2, d)."""
+        d, n = by_axis.shape
+        blocks = -(-n // BLOCK)
+        found = cls(n, np.empty(blocks * BLOCK, np.uint32), np.empty((d, blocks * BLOCK)), np.empty((2, d, blocks)))
+        sort_into_blocks(by_axis, box, found.order, found.places, found.boxes)
+        return found
+
+    def match(self, codebook: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Return the winner of each input and the squared distance to it (eq. 1), for neurons (d, u)."""
+        winners, squared = np.empty(len(self.order), np.int32), np.empty(len(self.order), np.float32)
+        match_in_blocks(codebook, self.places, self.boxes, winners, squared)
+        found = np.empty(self.count, np.int32), np.empty(self.count, np.float32)
+        for values, own in zip((winners, squared), found, strict=True):
+            own[self.order] = values
+        return found
+
+    def filled(self, weights: NDArray[np.float64] | None) -> NDArray[np.float64]:
+        """Return weights (n,), or 1 each, in the order of the blocks; what fills the last block has none."""
+        shown = np.ones(len(self.order)) if weights is None else weights[self.order]
+        shown[self.count :] = 0.0
+        return shown
 
 
 @dataclass(frozen=True)
@@ -107,7 +152,7 @@ class Shown:
     @property
     def wide(self) -> bool:
         """Whether they go through matrix products."""
-        return self.inputs.shape[1] > WIDE
+        return bool(self.inputs.shape[1] > WIDE)
 
     def match(self, codebook: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Return the winner of each input and the squared distance to it (eq. 1), for neurons (d, u)."""
