@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ..measure.polygon import along, area, evenly
 from .direction import FEWEST, axes_across, some_of
@@ -93,12 +93,12 @@ def half_planes(positions: Floats) -> HalfPlanes | None:
     if not 6 * SLICES <= len(positions) <= MOST:
         return None
     middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
-    tree = cKDTree(positions - middle)
+    tree = scipy.spatial.cKDTree(positions - middle)
     drawn = some_of(tree.data)
     if len(drawn) < len(positions) and _axis(drawn, tree) is None:
         return None
     local = np.unique(tree.data, axis=0)
-    tree = cKDTree(local)
+    tree = scipy.spatial.cKDTree(local)
     found = _axis(local, tree)
     if found is None:
         return None
@@ -114,7 +114,7 @@ def half_planes(positions: Floats) -> HalfPlanes | None:
     return HalfPlanes(origin + middle, axes, angles, curves, spacing)
 
 
-def _axis(some: Floats, tree: cKDTree) -> tuple[Floats, Floats] | None:
+def _axis(some: Floats, tree: scipy.spatial.cKDTree) -> tuple[Floats, Floats] | None:
     """Return a place on the line that the lines along most steps meet, and directions across and along it.
 
     None where they meet none, or one at infinity.
