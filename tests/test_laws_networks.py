@@ -188,7 +188,7 @@ class TestRegion:
         assert trained.measures["seed"] == 1
         assert (trained.codebook >= 0).all()
         assert (trained.codebook <= 1).all()
-        _, squared = match(np.ascontiguousarray(trained.codebook.T), np.ascontiguousarray(inputs.T))
+        _, squared = match(trained.codebook, inputs)
         assert trained.measures["quantization_error"] == pytest.approx(np.sqrt(squared).mean())
         assert trained.measures["quantization_error"] < 0.4
 

@@ -138,7 +138,7 @@ class TestStart:
         seen: list[Floats] = []
         fit(circle(), RING, NetworkSettings(trim=0.0, radius=(0.0, 0.0), epochs=1), rng(), start=given_start,
               callback=lambda codebook, epoch: seen.append(codebook))  # fmt: skip
-        winners, _ = match(np.ascontiguousarray(given_start.T), np.ascontiguousarray(circle().T))
+        winners, _ = match(given_start, circle())
         dead = np.setdiff1d(np.arange(20), winners)
         np.testing.assert_array_equal(seen[0][dead], given_start[dead])
 
@@ -258,7 +258,7 @@ class TestNeighborhoods:
         codebook = fit(inputs, lattice(name, 30), kind, rng()).codebook
         assert (codebook >= inputs.min(axis=0)).all()
         assert (codebook <= inputs.max(axis=0)).all()
-        _, squared = match(np.ascontiguousarray(codebook.T), np.ascontiguousarray(inputs.T))
+        _, squared = match(codebook, inputs)
         assert np.sqrt(squared).mean() < 0.8 * np.linalg.norm(inputs, axis=1).mean()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -13,10 +13,12 @@ from hypothesis import strategies as st
 from conftest import law, seeds, size
 from tomomesh.kernels.som import batch as batch_kernels
 from tomomesh.kernels.som import online as kernels
+from tomomesh.kernels.som import products as around
 from tomomesh.kernels.som.neighborhoods import BUBBLE, GAUSSIAN, LATERAL, weigh
+from tomomesh.kernels.som.search import BLOCK
 from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
 from tomomesh.som import products
-from tomomesh.som.fit import match
+from tomomesh.som.inputs import Blocks, match
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -74,6 +76,12 @@ def box_of(inputs: Floats) -> Floats:
     return np.stack([inputs.min(axis=0), inputs.max(axis=0)])
 
 
+def train_in_blocks(codebook: Floats, by_axis: Floats, amounts: Floats, *falls: Any) -> int:
+    """Train on inputs (d, n) as `products.train_batch` does, by the compiled loops."""
+    blocks = Blocks.of(by_axis, box_of(by_axis.T))
+    return batch_kernels.train_batch(codebook, blocks.places, blocks.boxes, blocks.filled(amounts), *falls)
+
+
 shapes = st.sampled_from([BUBBLE, GAUSSIAN, LATERAL])
 
 
@@ -113,7 +121,7 @@ class TestBatch:
     @given(
         seed=seeds, name=topologies, d=st.integers(2, 4), sigma=st.floats(0.3, 6), inhibition=st.sampled_from([0, 0.03])
     )
-    @pytest.mark.parametrize("run", [batch_kernels.train_batch, products.train_batch])
+    @pytest.mark.parametrize("run", [train_in_blocks, products.train_batch])
     def test_is_the_definition(self, run: Train, seed: int, name: str, d: int, sigma: float, inhibition: float) -> None:
         graph, start, inputs, rng = made(seed, name, d, 100)
         fall, amounts = sigma * np.array([[1.0], [0.7], [0.4]]), rng.uniform(0, 2, 100)
@@ -129,7 +137,7 @@ class TestBatch:
             moved = np.linalg.norm(wanted[epoch + 1] - wanted[epoch], axis=1).max()
             assert history[epoch, 1] == pytest.approx(moved, rel=1e-6, abs=1e-9)
 
-    @pytest.mark.parametrize("run", [batch_kernels.train_batch, products.train_batch])
+    @pytest.mark.parametrize("run", [train_in_blocks, products.train_batch])
     def test_a_neuron_that_nothing_reaches_stays_and_one_at_rest_ends_it(self, run: Train) -> None:
         codebook, history = np.array([[0.0, 10.0, 20.0], [0.0, 0.0, 0.0]]), np.empty((9, 2))
         weights, inputs = np.repeat([[1.0, 0.0, 0.0]], 9, axis=0), np.array([[1.0, 3.0], [0.0, 0.0]])
@@ -149,7 +157,7 @@ class TestMatch:
         codebook, inputs = rng.normal(size=(9, d)) * 3, rng.normal(size=(n, d)) * 3
         if whole:  # many exact ties
             codebook, inputs = np.round(codebook), np.round(inputs)
-        winners, squared = match(np.ascontiguousarray(codebook.T), np.ascontiguousarray(inputs.T))
+        winners, squared = match(codebook, inputs)
         wanted = ((inputs[:, None] - codebook) ** 2).sum(axis=2)
         np.testing.assert_allclose(squared, wanted.min(axis=1), rtol=1e-4, atol=1e-4)
         np.testing.assert_allclose(wanted[np.arange(n), winners], wanted.min(axis=1), rtol=1e-4, atol=1e-4)
@@ -166,3 +174,50 @@ def test_near_ties_in_many_dimensions_are_decided_in_double_at_every_scale(seed:
     inputs = scale * (apart[rng.integers(12, size=30)] + 1e-2 * rng.normal(size=(30, d)))
     nearest = [int(((codebook - one) ** 2).sum(axis=1).argmin()) for one in inputs]
     np.testing.assert_array_equal(products.best_matching_units(codebook, inputs)[0], nearest)
+
+
+@law(40)
+@given(seed=seeds, d=st.integers(2, 5), n=st.integers(1, 700), shrunk=st.sampled_from([1e-3, 1.0, 30.0]))
+def test_a_block_leaves_out_no_neuron_that_may_win(seed: int, d: int, n: int, shrunk: float) -> None:
+    """Many neurons, near each other or far apart, among inputs in clusters: what is found is the nearest of all."""
+    rng = np.random.default_rng(seed)
+    inputs = rng.normal(size=(7, d))[rng.integers(7, size=n)] + 0.1 * rng.normal(size=(n, d))
+    codebook = shrunk * rng.normal(size=(rng.integers(1, 120), d))
+    winners, squared = match(codebook, inputs)
+    wanted = ((inputs[:, None] - codebook) ** 2).sum(axis=2)
+    np.testing.assert_allclose(squared, wanted.min(axis=1), rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(wanted[np.arange(n), winners], wanted.min(axis=1), rtol=1e-5, atol=1e-9)
+
+
+@law(40)
+@given(seed=seeds, n=st.integers(1, 300), d=st.integers(2, 4))
+def test_blocks_hold_every_input_once_and_their_boxes_hold_it(seed: int, n: int, d: int) -> None:
+    inputs = np.random.default_rng(seed).normal(size=(d, n))
+    blocks = Blocks.of(inputs, box_of(inputs.T))
+    np.testing.assert_array_equal(np.sort(blocks.order[:n]), np.arange(n))
+    np.testing.assert_array_equal(blocks.places, inputs[:, blocks.order])
+    middle, half = (np.repeat(edge, BLOCK, axis=1) for edge in blocks.boxes)
+    assert (np.abs(blocks.places - middle) <= half * (1 + 1e-9) + 1e-12).all()
+    assert blocks.filled(None).sum() == n
+
+
+@law(40)
+@given(seed=seeds, n=st.integers(1, 20), u=st.integers(1, 50), rounding=st.sampled_from([0.0, 0.1, 10.0]))
+def test_the_highest_scores_and_those_close_to_them(seed: int, n: int, u: int, rounding: float) -> None:
+    score = np.round(np.random.default_rng(seed).normal(size=(n, u)), 1).astype(np.float32)
+    best, close = np.empty(n, np.int32), np.empty(n, np.int32)
+    off = np.full(n, rounding, np.float32)
+    around.highest(score, off, best, close)
+    np.testing.assert_array_equal(best, score.argmax(axis=1))
+    np.testing.assert_array_equal(close, (score >= (score.max(axis=1) - off)[:, None]).sum(axis=1))
+
+
+@law(20)
+@given(seed=seeds, name=topologies, k=st.sampled_from([1, 9, 80, 81, 200]))
+def test_shares_are_a_product(seed: int, name: str, k: int) -> None:
+    graph, _, _, rng = made(seed, name, 2, 1)
+    totals, by_hop = rng.normal(size=(len(graph), k)), np.exp(-np.arange(graph.farthest + 1.0))
+    by_hop[2:] = 0.0
+    sums = np.empty_like(totals)
+    around.add_shares(totals, graph.hops, by_hop, sums)
+    np.testing.assert_allclose(sums, by_hop[graph.hops] @ totals, rtol=0, atol=1e-12)

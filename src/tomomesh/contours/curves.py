@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
+from ..kernels.contours.splines import draw_closed_spline
 from ..measure.polygon import side_lengths
 
 if TYPE_CHECKING:
@@ -60,14 +61,11 @@ def redrawn(ring: Floats, distance: float) -> Floats:
     A periodic cubic spline over the roots of the chords (centripetal: Lee 1989), which neither overshoots at uneven
     points nor cuts off the bulge between them.
     """
-    closed = np.concatenate([ring, ring[:1]])
-    chord = np.sqrt((np.diff(closed, axis=0) ** 2).sum(axis=1))
-    knots = np.concatenate([[0.0], np.cumsum(np.sqrt(chord))])
+    chord = side_lengths(ring)
     pieces = np.maximum(np.ceil(chord / distance), 1).astype(np.int64)
-    first = np.repeat(np.cumsum(pieces) - pieces, pieces)
-    share = (np.arange(len(first)) - first) / np.repeat(pieces, pieces)
-    place = np.repeat(knots[:-1], pieces) + share * np.repeat(np.diff(knots), pieces)
-    return np.asarray(scipy.interpolate.CubicSpline(knots, closed, bc_type="periodic")(place))
+    drawn = np.empty((int(pieces.sum()), 2))
+    draw_closed_spline(np.ascontiguousarray(ring), np.sqrt(chord), pieces, drawn)
+    return drawn
 
 
 def fine_curve(ring: Floats, distance: float) -> Floats:

@@ -60,8 +60,9 @@ def area(ring: NDArray[np.float64]) -> float:
 
 def side_lengths(line: NDArray[np.float64], *, closed: bool = True) -> NDArray[np.float64]:
     """Return the lengths of the sides of a line (u, 2), the first from point 0 to point 1."""
-    onward = np.roll(line, -1, axis=0) if closed else line[1:]
-    return np.asarray(np.sqrt(((onward - line[: len(onward)]) ** 2).sum(axis=1)))
+    line = np.concatenate([line, line[:1]]) if closed else line
+    off = line[1:] - line[:-1]
+    return np.asarray(np.sqrt(np.einsum("ua,ua->u", off, off)))
 
 
 def evenly(line: NDArray[np.float64], count: int) -> NDArray[np.float64]:

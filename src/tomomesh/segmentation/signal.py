@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
-from ..kernels.contours.closing import close_plane, slice_moments
+from ..kernels.contours.closing import close_plane
+from ..kernels.contours.moments import plane_moments
 from ..model.columns import for_kernels
 
 if TYPE_CHECKING:
@@ -43,11 +44,11 @@ def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
     mask : (K, J, I) bool array
     """
     sums = np.empty((len(mask), 6))
-    slice_moments(for_kernels(mask, np.bool_), sums)
-    filled, *rest = sums[sums[:, 0] > 2].T
-    x, y, xx, yy, xy = (one / filled for one in rest)
-    spread = (xx - x * x + 1 / 12) * (yy - y * y + 1 / 12) - (xy - x * y) ** 2
-    return float(filled.sum()) > solid * float((4 * np.pi * np.sqrt(spread)).sum())
+    plane_moments(for_kernels(mask, np.bool_), sums)
+    count, x, y, xx, xy, yy = sums[sums[:, 0] > 2].T
+    spread = (xx / count - (x / count) ** 2 + 1 / 12) * (yy / count - (y / count) ** 2 + 1 / 12)
+    ellipses = 4 * np.pi * np.sqrt(np.maximum(spread - (xy / count - x * y / count**2) ** 2, 0.0))
+    return bool(count.sum() > solid * ellipses.sum())
 
 
 def pixels_of(plane: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -289,8 +289,7 @@ def regions(
     def work(start: int, stop: int) -> None:
         for k in found.slices[start:stop]:
             codebook = found.codebook_on(int(k)) * pixel_mm
-            by_axis = np.ascontiguousarray((pixels_of(mask[k]) * pixel_mm).T)
-            winners, _ = match(np.ascontiguousarray(codebook.T), by_axis)
+            winners, _ = match(codebook, pixels_of(mask[k]) * pixel_mm)
             labels[k][mask[k]] = winners + 1
 
     in_blocks(work, len(found.slices), block=1, threads=threads)

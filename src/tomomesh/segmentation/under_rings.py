@@ -141,7 +141,7 @@ class _Steps:
         vectors, nearest = np.zeros_like(places), np.zeros(places.shape[:2], np.int64)
         for n in range(max(0, -way), len(places) - max(0, way)):
             if abs(slices[n + way] - slices[n]) <= REACH:
-                nearest[n], _ = match(np.ascontiguousarray(places[n + way].T), np.ascontiguousarray(places[n].T))
+                nearest[n], _ = match(places[n + way], places[n])
                 vectors[n] = places[n + way][nearest[n]] - places[n]
         return cls(vectors, nearest, way)
 

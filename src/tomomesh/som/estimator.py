@@ -11,7 +11,7 @@ import numpy as np
 from ..settings import NetworkSettings
 from .checks import as_parameters, checked_lattice, checked_matrix, checked_weights, not_fitted, seed_of, warnings_of
 from .fit import fit, match
-from .inputs import area_of_each, flat
+from .inputs import area_of_each
 from .measures import quantization_error
 from .parameters import Parametrized
 from .saving import load_network, save_network
@@ -285,8 +285,7 @@ class SOM(Parametrized):
         return self
 
     def _winners(self, inputs: NDArray[np.float64]) -> NDArray[np.int64]:
-        by_axis = (np.ascontiguousarray(flat(places).T) for places in (self.codebook_, inputs))
-        return match(*by_axis)[0].astype(np.int64)
+        return match(self.codebook_, inputs)[0].astype(np.int64)
 
     def _check_fitted(self) -> None:
         if not hasattr(self, "codebook_"):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..measure.polygon import along, evenly
+from .inputs import median
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,8 +23,9 @@ def bridged_edges(codebook: NDArray[np.float64], lattice: Lattice, bridge: float
     None where `bridge` is 0.
     """
     ends = codebook[lattice.edges]
-    lengths = np.sqrt(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1))
-    return np.asarray((lengths > bridge * np.median(lengths)) & (bridge > 0))
+    off = ends[:, 1] - ends[:, 0]
+    lengths = np.sqrt(np.einsum("ea,ea->e", off, off))
+    return np.asarray((lengths > bridge * median(lengths)) & (bridge > 0))
 
 
 def even_spacing(

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.som.neighborhoods import BUBBLE, GAUSSIAN, LATERAL
-from .inputs import Shown, flat
-from .passes import Watch, match, train_batch, train_online
+from .inputs import Shown, flat, match, median
+from .passes import Watch, train_batch, train_online
 from .schedules import Fall, falling, radius_power
 from .starts import CLOSED, start_positions
 
@@ -194,15 +194,5 @@ def _without_strays(codebook: NDArray[np.float64], shown: Shown, trim: float) ->
     """Keep the inputs that are nearer to their neuron than `trim` times the median; all where `trim` is 0."""
     if trim == 0:
         return np.ones(len(shown), bool)
-    _, squared = match(codebook, shown.by_axis)
-    return np.asarray(squared <= trim**2 * _median(squared, shown.weights))
-
-
-def _median(values: NDArray[np.float32], weights: NDArray[np.float64] | None) -> float:
-    """Return the median of weighted values: that of values repeated as often as they weigh."""
-    if weights is None:
-        return float(np.median(values))
-    order = np.argsort(values, kind="stable")
-    steps = np.cumsum(weights[order])
-    middle = np.searchsorted(steps, steps[-1] / 2, side="left"), np.searchsorted(steps, steps[-1] / 2, side="right")
-    return float(values[order[np.minimum(middle, len(order) - 1)]].mean())
+    _, squared = shown.match(codebook)
+    return np.asarray(squared <= trim**2 * median(squared, shown.weights))

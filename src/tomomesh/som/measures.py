@@ -10,7 +10,6 @@ import scipy
 from ..errors import UsageError
 from ..kernels.som.neighborhoods import GAUSSIAN, weigh
 from .inputs import Shown, flat
-from .passes import match
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -66,13 +65,13 @@ def quantization_error(codebook: Floats, inputs: Floats, *, weights: Floats | No
     It does not measure a contour: neurons without any topology score better.
     """
     shown, m = _shown(codebook, inputs, weights)
-    return float(np.average(np.sqrt(match(m, shown.by_axis)[1], dtype=np.float64), weights=shown.weights))
+    return float(np.average(np.sqrt(shown.match(m)[1], dtype=np.float64), weights=shown.weights))
 
 
 def dead_neurons(codebook: Floats, inputs: Floats, *, weights: Floats | None = None) -> int:
     """Count the neurons that win no input."""
     shown, m = _shown(codebook, inputs, weights)
-    return int(len(codebook) - len(np.unique(match(m, shown.by_axis)[0])))
+    return int(len(codebook) - len(np.unique(shown.match(m)[0])))
 
 
 def topographic_error(codebook: Floats, lattice: Lattice, inputs: Floats, *, weights: Floats | None = None) -> float:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..kernels.som import batch as batch_kernels
+from ..kernels.som import batch as kernels_of_batch
 from ..kernels.som import online as kernels
 from ..kernels.som.neighborhoods import LATERAL, weigh
 from . import products as wide
@@ -141,22 +141,8 @@ def _present(
 
 
 def _error(codebook: Floats, shown: Shown) -> float:
-    _, squared = match(codebook, shown.by_axis)
+    _, squared = shown.match(codebook)
     return float(np.average(np.sqrt(squared, dtype=np.float64), weights=shown.weights))
-
-
-def match(codebook: Floats, by_axis: Floats) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return the winner of each input and the squared distance to it (eq. 1); arrays are (d, u) and (d, n), d > 1.
-
-    In single precision, relative to the first neuron, or to their middle in over `products.WIDE` dimensions.
-    """
-    if len(codebook) > wide.WIDE:
-        return wide.best_matching_units(codebook.T, by_axis.T)
-    first = codebook[:, :1]
-    winners, squared = np.empty(by_axis.shape[1], np.int32), np.empty(by_axis.shape[1], np.float32)
-    near_codebook, near_inputs = (np.ascontiguousarray(places - first, np.float32) for places in (codebook, by_axis))
-    kernels.best_matching_units(near_codebook, near_inputs, winners, squared)
-    return winners, squared
 
 
 def train_batch(
@@ -170,17 +156,20 @@ def train_batch(
     for weights, reach in zip(neighborhoods, radius, strict=True):
         weigh(weights, reach, 1.0, shape)
     settled = int(np.argmax(radius <= radius[-1] * (1 + SETTLED)))
-    run = wide.train_batch if len(codebook) > wide.WIDE else batch_kernels.train_batch
     rows, box = np.empty((len(radius), 2)), _box(shown, shape)
     step = len(radius) if watch.callback is None else 1
     done = 0
     while done < len(radius):
         some = slice(done, done + step)
-        done += run(
-            codebook, shown.by_axis, shown.amounts, lattice.hops, neighborhoods[some], box,
-            watch.tolerance, settled - done, rows[some],
-        )  # fmt: skip
+        falls = (lattice.hops, neighborhoods[some], box, watch.tolerance, settled - done, rows[some])
+        done += _run(codebook, shown, falls)
         watch.tell(codebook, first_epoch + done - 1)
         if rows[done - 1, 1] <= watch.tolerance and done > settled:
             break
     return History(rows[:done, 0], rows[:done, 1], radius[:done], np.ones(done))
+
+
+def _run(codebook: Floats, shown: Shown, falls: tuple[Any, ...]) -> int:
+    if shown.wide:
+        return wide.train_batch(codebook, shown.by_axis, shown.amounts, *falls)
+    return kernels_of_batch.train_batch(codebook, shown.blocks.places, shown.blocks.boxes, shown.filled, *falls)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.som.batch import add_shares
+from ..kernels.som.products import add_rows, add_shares, highest, squared_distances
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,23 +38,22 @@ def best_matching_units(codebook: Floats, inputs: Floats) -> tuple[NDArray[np.in
         np.subtract(rows, middle, out=block[:, :-1], casting="same_kind")
         lengths = np.sqrt(np.einsum("nd,nd->n", block[:, :-1], block[:, :-1]))
         rounding = 2 * len(factors) * np.finfo(np.float32).eps * longest * (lengths + longest)
-        nearest, distance = _decided(block @ factors, rounding, codebook, rows)
-        winners[start : start + BLOCK], squared[start : start + BLOCK] = nearest, distance
+        winners[start : start + BLOCK] = _decided(block @ factors, rounding.astype(np.float32), codebook, rows)
+    squared_distances(np.ascontiguousarray(codebook), np.ascontiguousarray(inputs), winners, squared)
     return winners, squared
 
 
 def _decided(
     score: NDArray[np.float32], rounding: NDArray[np.float32], codebook: Floats, rows: Floats
-) -> tuple[NDArray[np.intp], Floats]:
-    """Return the nearest neurons, and the squared distances to them, from scores that are off by their rounding."""
-    best = score.argmax(axis=1)
-    close = score >= (score[np.arange(len(best)), best] - rounding)[:, None]
-    for n in np.flatnonzero(np.count_nonzero(close, axis=1) > 1):
-        candidates = np.flatnonzero(close[n])
+) -> NDArray[np.int32]:
+    """Return the nearest neurons from scores that are off by their rounding."""
+    best, close = np.empty(len(rows), np.int32), np.empty(len(rows), np.int32)
+    highest(score, rounding, best, close)
+    for n in np.flatnonzero(close > 1):
+        candidates = np.flatnonzero(score[n] >= score[n, best[n]] - rounding[n])
         off = codebook[candidates] - rows[n]
         best[n] = candidates[np.einsum("cd,cd->c", off, off).argmin()]
-    off = codebook[best] - rows
-    return best, np.einsum("nd,nd->n", off, off)
+    return best
 
 
 def train_batch(
@@ -69,13 +68,10 @@ def train_batch(
     history: Floats,
 ) -> int:
     """Do what `tomomesh.kernels.som.batch.train_batch` does."""
-    from scipy.sparse import csr_array
-
-    u, n = codebook.shape[1], inputs.shape[1]
+    rows, totals = np.ascontiguousarray(inputs.T), np.empty((codebook.shape[1], len(codebook) + 1))
     for epoch, neighborhood in enumerate(neighborhoods):
-        winners, squared = best_matching_units(codebook.T, inputs.T)
-        won = csr_array((amounts, (winners, np.arange(n))), shape=(u, n))
-        totals = np.column_stack([np.asarray(won @ inputs.T), np.asarray(won.sum(axis=1))])
+        winners, squared = best_matching_units(codebook.T, rows)
+        add_rows(rows, amounts, winners, totals)
         history[epoch, 0] = (np.sqrt(squared) * amounts).sum() / amounts.sum()
         history[epoch, 1] = _move_to_means(codebook, totals, hops, neighborhood, box)
         if history[epoch, 1] <= tolerance and epoch >= settled:

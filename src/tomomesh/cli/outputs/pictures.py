@@ -68,7 +68,7 @@ def pictures_of_network(trained: TrainedNetwork, title: str, axes: slice) -> Ite
     yield "02-network", draw_adapted(inputs[:, axes], codebook[:, axes], graph, start=start, title=title)
     yield "02-learning", draw_learning(trained.history)
     if graph.name in SHEETS:
-        winners, _ = match(np.ascontiguousarray(codebook.T), np.ascontiguousarray(inputs.T))
+        winners, _ = match(codebook, inputs)
         yield "02-maps", draw_maps(codebook, graph, winners)
 
 

@@ -1,6 +1,6 @@
-"""Planes of pixels: how they are spread; and as bits, grown by octagons, and what their outside reaches.
+"""Planes of pixels as bits: grown by octagons, and what their outside reaches.
 
-Of bits a row is a row of words, pixel i bit i % 64 of word i // 64.
+A plane's row is a row of words: pixel i is bit i % 64 of word i // 64.
 """
 
 from __future__ import annotations
@@ -112,21 +112,3 @@ def close_plane(plane: Words, reach: int, hollow: Words) -> None:
     for j in range(rows):
         for w in range(plane.shape[1]):
             plane[j, w] |= ~outside[j, w]
-
-
-@kernel("void(b1[:,:,::1], f8[:,::1])")
-def slice_moments(mask: NDArray[np.bool_], sums: NDArray[np.float64]) -> None:
-    """Add up over the pixels of each slice of a mask (K, J, I) 1, x, y, x^2, y^2 and x y, (K, 6)."""
-    for k in range(len(mask)):
-        sums[k] = 0.0
-        for j in range(mask.shape[1]):
-            count, along, squared = 0, 0, 0
-            for i in range(mask.shape[2]):
-                held = int(mask[k, j, i])
-                count, along, squared = count + held, along + held * i, squared + held * i * i
-            sums[k, 0] += count
-            sums[k, 1] += along
-            sums[k, 2] += count * j
-            sums[k, 3] += squared
-            sums[k, 4] += count * j * j
-            sums[k, 5] += along * j

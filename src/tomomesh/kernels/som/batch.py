@@ -7,14 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compile import kernel
-from .online import best_matching_units
+from .search import best_matching_units
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-COLUMNS = 64
-"""Columns of the totals that are added together: 1,000 rows of them are half a megabyte, and stay in the second cache.
-No result depends on it."""
 
 
 @kernel("void(f8[:,::1], f8[::1], i4[::1], f4[::1], f8[:,::1])")
@@ -42,7 +38,7 @@ def sum_by_winner(
     x, y = inputs[0], inputs[1]
     totals[:] = 0.0
     for n in range(len(winners)):
-        c, amount = winners[n], amounts[n]
+        c, amount = np.uint32(winners[n]), amounts[n]
         totals[c, 0] += amount * x[n]
         totals[c, 1] += amount * y[n]
         for axis in range(2, d):
@@ -90,7 +86,7 @@ def move_to_means(
         won = totals[c, d]
         if won > 0.0:
             for i in range(u):
-                share[i] = neighborhood[hops[c, i]]
+                share[i] = neighborhood[np.uint32(hops[c, i])]
                 reached[i] += share[i] * won
             for axis in range(d):
                 total, row = totals[c, axis], sums[axis]
@@ -105,46 +101,11 @@ def move_to_means(
     return float(np.sqrt(moved.max()))
 
 
-@kernel("void(f8[:,::1], i4[:,::1], f8[::1], f8[:,::1])")
-def add_shares(
-    totals: NDArray[np.float64],
-    hops: NDArray[np.int32],
-    neighborhood: NDArray[np.float64],
-    sums: NDArray[np.float64],
-) -> None:
-    """Add up sum_c h(hops(i, c)) totals_c for each neuron i, for totals of many columns.
-
-    Parameters
-    ----------
-    totals : (u, k) float array
-    hops : (u, u) int array
-    neighborhood : (h,) float array
-        h by the number of hops.
-    sums : (u, k) float array
-        Result.
-
-    Notes
-    -----
-    In the order of c, `COLUMNS` columns at a time, whose totals stay in the second cache.
-    """
-    u, k = totals.shape
-    for start in range(0, k, COLUMNS):
-        some = totals[:, start : start + COLUMNS].copy()
-        for i in range(u):
-            own = sums[i, start : start + COLUMNS]
-            own[:] = 0.0
-            for c in range(u):
-                share = neighborhood[hops[i, c]]
-                if share != 0.0:
-                    row = some[c]
-                    for column in range(len(own)):
-                        own[column] += share * row[column]
-
-
-@kernel("i8(f8[:,::1], f8[:,::1], f8[::1], i4[:,::1], f8[:,::1], f8[:,::1], f8, i8, f8[:,::1])")
+@kernel("i8(f8[:,::1], f8[:,::1], f8[:,:,::1], f8[::1], i4[:,::1], f8[:,::1], f8[:,::1], f8, i8, f8[:,::1])")
 def train_batch(
     codebook: NDArray[np.float64],
-    inputs: NDArray[np.float64],
+    places: NDArray[np.float64],
+    boxes: NDArray[np.float64],
     amounts: NDArray[np.float64],
     hops: NDArray[np.int32],
     neighborhoods: NDArray[np.float64],
@@ -159,9 +120,10 @@ def train_batch(
     ----------
     codebook : (d, u) float array
         Changed in place.
-    inputs : (d, n) float array
+    places, boxes : arrays
+        The inputs (d, n), see `tomomesh.kernels.som.search.sort_into_blocks`.
     amounts : (n,) float array
-        Weight of each input, none negative.
+        Weight of each input, none negative; 0 of those that fill the last block.
     hops : (u, u) int array
     neighborhoods : (epochs, h) float array
         Neighborhood of each epoch by the number of hops.
@@ -181,24 +143,15 @@ def train_batch(
 
     Notes
     -----
-    Two axes at least. Winners are sought in single precision, relative to the first input; everything else is
-    double.
+    Two axes at least. Winners are sought in single precision; everything else is double.
     """
-    d, u = codebook.shape
-    winners = np.empty(inputs.shape[1], np.int32)
-    squared = np.empty(inputs.shape[1], np.float32)
-    totals = np.empty((u, d + 2))
-    near_inputs = np.empty(inputs.shape, np.float32)
-    near_codebook = np.empty((d, u), np.float32)
-    for axis in range(d):
-        near_inputs[axis] = inputs[axis] - inputs[axis, 0]
+    winners, squared = np.empty(places.shape[1], np.int32), np.empty(places.shape[1], np.float32)
+    totals = np.empty((codebook.shape[1], len(codebook) + 2))
     amount = amounts.sum()
     for epoch in range(len(neighborhoods)):
-        for axis in range(d):
-            near_codebook[axis] = codebook[axis] - inputs[axis, 0]
-        best_matching_units(near_codebook, near_inputs, winners, squared)
-        sum_by_winner(inputs, amounts, winners, squared, totals)
-        history[epoch, 0] = totals[:, d + 1].sum() / amount
+        best_matching_units(codebook, places, boxes, winners, squared)
+        sum_by_winner(places, amounts, winners, squared, totals)
+        history[epoch, 0] = totals[:, -1].sum() / amount
         history[epoch, 1] = move_to_means(codebook, totals, hops, neighborhoods[epoch], box)
         if history[epoch, 1] <= tolerance and epoch >= settled:
             return epoch + 1

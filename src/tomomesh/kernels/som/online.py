@@ -1,6 +1,6 @@
-"""Self-organising map: matching (eq. 1) and updating (eq. 2).
+"""Self-organising map: presentations one by one, each matched (eq. 1) and followed (eq. 2).
 
-Positions are stored one row an axis, (d, u) and (d, n), so that the loops over neurons and pixels vectorize.
+Positions are stored one row an axis, (d, u), so that the loops over neurons vectorize.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ from .neighborhoods import BUBBLE, LATERAL, weigh
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-BLOCK = 512
-"""Pixels matched together: their distances stay in the first cache."""
 LANES = 32
 """Neurons that one turn of the vectorized search takes; what is left over would be searched one by one."""
 INDEX_BITS = 16_383
@@ -108,80 +106,3 @@ def train_online(
                 for i in range(u):
                     neurons[axis, i] = min(max(neurons[axis, i], box[0, axis]), box[1, axis])
     codebook[:] = neurons[:, :u]
-
-
-@kernel("void(f4[:,::1], f4[::1], f4[::1], f4[::1], i4[::1])")
-def _nearest_in_plane(
-    codebook: NDArray[np.float32],
-    x: NDArray[np.float32],
-    y: NDArray[np.float32],
-    best: NDArray[np.float32],
-    unit: NDArray[np.int32],
-) -> None:
-    last = codebook.shape[1] - 1
-    across, down = codebook[0], codebook[1]
-    for i in range(0, last + 1, 4):
-        j, k, m = min(i + 1, last), min(i + 2, last), min(i + 3, last)
-        for n in range(len(best)):
-            near, number = best[n], unit[n]
-            total = (x[n] - across[i]) ** 2 + (y[n] - down[i]) ** 2
-            near, number = (total, np.int32(i)) if total < near else (near, number)
-            total = (x[n] - across[j]) ** 2 + (y[n] - down[j]) ** 2
-            near, number = (total, np.int32(j)) if total < near else (near, number)
-            total = (x[n] - across[k]) ** 2 + (y[n] - down[k]) ** 2
-            near, number = (total, np.int32(k)) if total < near else (near, number)
-            total = (x[n] - across[m]) ** 2 + (y[n] - down[m]) ** 2
-            near, number = (total, np.int32(m)) if total < near else (near, number)
-            best[n], unit[n] = near, number
-
-
-@kernel("void(f4[:,::1], f4[:,:], f4[::1], i4[::1])")
-def _nearest_in_space(
-    codebook: NDArray[np.float32], inputs: NDArray[np.float32], best: NDArray[np.float32], unit: NDArray[np.int32]
-) -> None:
-    distance = np.empty(len(best), np.float32)
-    for i in range(codebook.shape[1]):
-        distance[:] = np.float32(0.0)
-        for axis in range(2, len(codebook)):
-            m = codebook[axis, i]
-            for n in range(len(best)):
-                distance[n] += (inputs[axis, n] - m) ** 2
-        a, b = codebook[0, i], codebook[1, i]
-        for n in range(len(best)):
-            total = distance[n] + (inputs[0, n] - a) ** 2 + (inputs[1, n] - b) ** 2
-            nearer = total < best[n]
-            best[n] = total if nearer else best[n]
-            unit[n] = np.int32(i) if nearer else unit[n]
-
-
-@kernel("void(f4[:,::1], f4[:,::1], i4[::1], f4[::1])")
-def best_matching_units(
-    codebook: NDArray[np.float32],
-    inputs: NDArray[np.float32],
-    winners: NDArray[np.int32],
-    squared: NDArray[np.float32],
-) -> None:
-    """Find the neuron nearest to every input (eq. 1).
-
-    Parameters
-    ----------
-    codebook : (d, u) float array
-    inputs : (d, n) float array
-    winners : (n,) int array
-        Result: number of the nearest neuron, the lowest where several are equally near.
-    squared : (n,) float array
-        Result: squared distance to it.
-
-    Notes
-    -----
-    Two axes at least. Single precision, twice as many lanes as double: give positions relative to one of them, so
-    that none is lost. On two axes four neurons are compared in a pass, which loads and stores the best a quarter
-    as often; on more the first two are compared in the pass that adds them.
-    """
-    for start in range(0, inputs.shape[1], BLOCK):
-        best, unit = squared[start : start + BLOCK], winners[start : start + BLOCK]
-        best[:] = np.inf
-        if len(codebook) == 2:
-            _nearest_in_plane(codebook, inputs[0, start:], inputs[1, start:], best, unit)
-        else:
-            _nearest_in_space(codebook, inputs[:, start:], best, unit)

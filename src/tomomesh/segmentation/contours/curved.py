@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kernels.contours.curves import draw_closed
-from ...measure.polygon import along, evenly
-from ...model.columns import for_kernels
+from ...kernels.contours.splines import draw_closed_spline
+from ...measure.polygon import along, evenly, side_lengths
 from ...som.even_spacing import even_arcs
 from ...som.fit import fit
 
@@ -33,9 +32,12 @@ def finely(ring: Floats) -> Floats:
 
     Returns (u, `FINE`, 2). A periodic cubic spline over the roots of the chords (centripetal: Lee 1989).
     """
-    fine = np.empty((len(ring), FINE, 2))
-    draw_closed(for_kernels(ring, np.float64), fine)
-    return fine
+    chord = side_lengths(ring)
+    # a millionth of the longest chord at least: neurons at one place get knots of their own
+    step = np.sqrt(np.maximum(chord, 1e-6 * max(float(chord.max()), 1e-300)))
+    drawn = np.empty((len(ring) * FINE, 2))
+    draw_closed_spline(np.ascontiguousarray(ring), step, np.full(len(ring), FINE), drawn)
+    return drawn.reshape(len(ring), FINE, 2)
 
 
 def unshrunk(

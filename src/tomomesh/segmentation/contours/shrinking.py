@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kernels.contours.curves import unshrink
+from ...kernels.contours.shrinking import unshrink
 from ...kernels.som.neighborhoods import GAUSSIAN, weigh
 from ...model.columns import for_kernels
 
