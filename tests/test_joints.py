@@ -13,9 +13,10 @@ from conftest import law, seeds
 from test_clouds import assert_sound, on_box, on_sphere
 from tomomesh import reconstruct_points
 from tomomesh.kernels.pointcloud.stars import beside, fill_triangle, spread_out
+from tomomesh.model.cubes import cells_of
 from tomomesh.pointcloud.bridges import bridges
 from tomomesh.pointcloud.samples import settle_points
-from tomomesh.pointcloud.stars import cells_between
+from tomomesh.pointcloud.stars import keys_between
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -174,7 +175,7 @@ class TestStars:
     def test_cubes_of_a_plane_are_all_of_them(self) -> None:
         rng = np.random.default_rng(0)
         flat = np.column_stack([rng.uniform(0, 40, (1_600, 2)), np.full(1_600, 0.5)])
-        cells = cells_between(settle_points(flat), np.zeros(3), np.full(3, 0.5))
+        cells = cells_of(keys_between(settle_points(flat), np.zeros(3), np.full(3, 0.5)))
         inner = cells[((cells[:, :2] >= 6) & (cells[:, :2] < 74)).all(axis=1)]
         assert set(cells[:, 2]) <= {0, 1}  # the plane is where they meet
         assert len(np.unique(inner[:, :2], axis=0)) >= 0.999 * 68 * 68  # but for corners that are grazed

@@ -56,6 +56,12 @@ def block_number(blocks: Integers, wanted: int) -> int:
     return low if low < len(blocks) and blocks[low] == wanted else -1
 
 
+@kernel("i8(f8, f8, f8)")
+def cell_at(place: float, low: float, edge: float) -> int:
+    """Return the number of the cell along an axis that holds a place; 0 where it lies below all."""
+    return int(np.floor(max((place - low) / edge, 0.0)))
+
+
 @kernel("i8(f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], f8, i8[::1])")
 def gather(
     points: Floats,
@@ -72,26 +78,24 @@ def gather(
     -----
     Cubes that follow each other along x within a block are one range of points.
     """
-    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
-    for axis in range(3):
-        low[axis] = np.int64(np.floor(max((place[axis] - radius - frame[axis]) / frame[3], 0.0)))
-        high[axis] = np.int64(np.floor((place[axis] + radius - frame[axis]) / frame[3]))
-    count = 0
-    for bz in range(low[2] >> 3, (high[2] >> 3) + 1):
-        for by in range(low[1] >> 3, (high[1] >> 3) + 1):
-            for bx in range(low[0] >> 3, (high[0] >> 3) + 1):
+    x, y, z, edge, squares = place[0], place[1], place[2], frame[3], radius * radius
+    x0, x1 = cell_at(x - radius, frame[0], edge), cell_at(x + radius, frame[0], edge)
+    y0, y1 = cell_at(y - radius, frame[1], edge), cell_at(y + radius, frame[1], edge)
+    z0, z1 = cell_at(z - radius, frame[2], edge), cell_at(z + radius, frame[2], edge)
+    count, room = 0, len(found)
+    for bz in range(z0 >> 3, (z1 >> 3) + 1):
+        for by in range(y0 >> 3, (y1 >> 3) + 1):
+            for bx in range(x0 >> 3, (x1 >> 3) + 1):
                 block = block_number(blocks, (((bz << BITS) | by) << BITS) | bx)
                 if block < 0:
                     continue
-                first, last = max(low[0] - 8 * bx, 0), min(high[0] - 8 * bx, 7)
-                for z in range(max(low[2] - 8 * bz, 0), min(high[2] - 8 * bz, 7) + 1):
-                    for y in range(max(low[1] - 8 * by, 0), min(high[1] - 8 * by, 7) + 1):
-                        row = 512 * block + 64 * z + 8 * y
+                first, last = max(x0 - 8 * bx, 0), min(x1 - 8 * bx, 7)
+                for cz in range(max(z0, 8 * bz), min(z1, 8 * bz + 7) + 1):
+                    for cy in range(max(y0, 8 * by), min(y1, 8 * by + 7) + 1):
+                        row = 512 * block + 64 * (cz - 8 * bz) + 8 * (cy - 8 * by)
                         for p in range(start[row + first], start[row + last + 1]):
-                            squared = 0.0
-                            for axis in range(3):
-                                squared += (points[p, axis] - place[axis]) ** 2
-                            if squared <= radius * radius and count < len(found):
+                            squared = (points[p, 0] - x) ** 2 + (points[p, 1] - y) ** 2 + (points[p, 2] - z) ** 2
+                            if squared <= squares and count < room:
                                 found[count] = p
                                 count += 1
     return count

@@ -15,7 +15,8 @@ from ...cuberille.parting import joint, neck
 from ...cuberille.partition import cubes_over
 from ...measure.tree import Tree
 from ...model.cubes import cells_of, keys_of
-from ...pointcloud.stars import cells_between
+from ...pointcloud.facing import facing_pairs
+from ...pointcloud.stars import keys_between
 from ...stage import Stage
 from .samples import NOISE
 
@@ -51,18 +52,30 @@ passes a sample by: all that are joined do both, a rounded edge only one."""
 PASSED, BESIDE = 24, 4.0
 """Samples passed by that tell of a joint, within how many sampling distances of one of them: 36 and more where turns of
 a coil were joined, at most 17 in the clouds of docs/clouds.md (cat, skull, fandisk; measured)."""
-FACING, ACROSS, TAKEN_IN = 2.0, 0.9, 0.1
-"""How near, sampling distances, two samples lie that face one another, the cosine from which the step between them is
-along the normals of both, and how far off, over the noise, the mesh passes a pair by that it has joined; of more noise
-than that nothing is said, for its normals face anywhere (bunny and wingnut of .1 % noise were warned of). It passes 2
-to 12 pairs by where rods cross 1 s apart (six seeds), none in the clouds of docs/clouds.md. With a cosine of .8 the
-skull has 15 and the rocker-arm 1; with .25 s two seeds of six have none; 2.5 s changes nothing of it."""
+FACING, TAKEN_IN = 2.0, 0.1
+"""How near, sampling distances, two samples lie that face one another, and how far off, over the noise, the mesh passes
+a pair by that it has joined; of more noise than that nothing is said, for its normals face anywhere (bunny and wingnut
+of .1 % noise were warned of). It passes 2 to 12 pairs by where rods cross 1 s apart (six seeds), none in the clouds of
+docs/clouds.md. With .25 s two seeds of six have none; 2.5 s changes nothing of it."""
+NO_PAIRS = np.empty((0, 2), np.int64)
+"""Of samples in noise."""
 
 
-def may_join(shell: Shell) -> bool:
-    """Tell whether a shell has handles, or points deep inside: what is near one another may have been joined."""
+def may_join(shell: Shell, samples: Samples, *, threads: int = 0) -> bool:
+    """Tell whether a shell may have joined what is near one another.
+
+    Either it has points deep inside; or it has handles, and samples face one another that its cubes can join. In noise
+    these face anywhere, and handles suffice.
+    """
     test = shell.leak_test
-    return test.tight and (test.faces.handles > 0 or joint(test.shell) is not None)
+    if not test.tight or joint(test.shell) is not None:
+        return test.tight
+    if test.faces.handles == 0 or not _is_clean(samples):
+        return test.faces.handles > 0
+    widest = 2 * (1 + test.shell.closing) * shell.cell  # along each axis, of cubes that touch once they are dilated
+    pairs = facing_pairs(samples, float(np.linalg.norm(widest)), threads=threads)
+    steps = np.abs(np.diff(samples.positions[pairs], axis=1)[:, 0])
+    return bool((steps <= widest).all(axis=1).any())
 
 
 def apart(
@@ -119,8 +132,8 @@ def of_small_cubes(shell: Shell, samples: Samples, settings: Settings, progress:
         return shell
     threads = settings.run.threads
     lowest, keys = cubes_over(np.concatenate([samples.positions, shell.spanned.places]), cell)
-    between = cells_between(samples, lowest, cell, threads=threads, progress=progress)
-    cells = cells_of(once_each(np.concatenate([keys, keys_of(between)])))
+    between = keys_between(samples, lowest, cell, threads=threads, progress=progress)
+    cells = cells_of(once_each(np.concatenate([keys, between])))
     cavities = settings.cubes.surface != "outer"
     test = close_leaks(cells, CLOSINGS, cavities=cavities, threads=threads, progress=progress)
     return replace(shell, cell=cell, lowest=lowest, cubes=len(cells), leak_test=test, finer=FINER)
@@ -199,7 +212,7 @@ def passed_by(mesh: TriMesh, samples: Samples, *, threads: int = 0) -> Floats | 
     normals = mesh.face_vectors[face]
     across = np.abs((normals * samples.normals).sum(axis=1)) / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
     spacing = float(np.median(samples.spacing))
-    between = facing(samples)
+    between = facing_pairs(samples, FACING * spacing, threads=threads) if _is_clean(samples) else NO_PAIRS
     taken_in = away[between].max(axis=1, initial=0)
     if taken_in.max(initial=0) > TAKEN_IN * spacing + float(np.median(samples.noise)):
         return np.asarray(samples.positions[between[taken_in.argmax()]].mean(axis=0))
@@ -210,12 +223,6 @@ def passed_by(mesh: TriMesh, samples: Samples, *, threads: int = 0) -> Floats | 
     return np.asarray(passed[beside.argmax()]) if beside.max() >= PASSED else None
 
 
-def facing(samples: Samples) -> NDArray[np.int64]:
-    """Return the pairs (k, 2) of samples that face one another across what parts two sheets; none in noise."""
-    spacing = float(np.median(samples.spacing))
-    if float(np.median(samples.noise)) > TAKEN_IN * spacing:
-        return np.empty((0, 2), np.int64)
-    pairs = cKDTree(samples.positions).query_pairs(FACING * spacing, output_type="ndarray")
-    step = np.diff(samples.positions[pairs], axis=1)
-    along = np.abs((step * samples.normals[pairs]).sum(axis=2)).min(axis=1)
-    return np.asarray(pairs[along > ACROSS * np.linalg.norm(step[:, 0], axis=1)])
+def _is_clean(samples: Samples) -> bool:
+    """Tell whether there is so little noise that normals tell which samples face one another."""
+    return float(np.median(samples.noise)) <= TAKEN_IN * float(np.median(samples.spacing))
