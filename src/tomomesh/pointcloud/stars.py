@@ -14,7 +14,7 @@ import numpy as np
 from ..cuberille.neighbors import once_each
 from ..kernels.pointcloud.stars import lay_stars
 from ..kernels.threads import in_blocks
-from ..model.cubes import key_step, keys_of
+from ..model.cubes import keys_of
 from ..progress import Progress, silent
 from .search import Index
 
@@ -56,7 +56,8 @@ def keys_between(
     """
     index = Index.of(samples.positions, SIGHT * float(np.median(samples.spacing)))
     rows = np.column_stack([samples.positions, samples.normals, samples.spacing])[index.order]
-    steps = np.array([*(key_step(axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))), *keys_of(np.zeros((1, 3), np.int64))])
+    first = keys_of(np.zeros((1, 3), np.int64))
+    steps = np.append(keys_of(np.eye(3, dtype=np.int64)) - first, first)
     seen = (*index.cells, SIGHT, lowest, cell, DENSE * float(cell.min()), steps)
     found: dict[int, NDArray[np.int64]] = {}
 

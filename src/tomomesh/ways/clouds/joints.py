@@ -15,6 +15,7 @@ from ...cuberille.parting import joint, neck
 from ...cuberille.partition import cubes_over
 from ...measure.tree import Tree
 from ...model.cubes import cells_of, keys_of
+from ...model.mesh import TriMesh
 from ...pointcloud.facing import facing_pairs
 from ...pointcloud.stars import keys_between
 from ...stage import Stage
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...cuberille.bitmasks import Bitmask
-    from ...model.mesh import TriMesh
     from ...pointcloud.samples import Samples
     from ...progress import Progress
     from ...settings import Settings
@@ -156,8 +156,9 @@ def _is_noisy(samples: Samples) -> bool:
 
 
 def _without_say(shell: Shell, samples: Samples) -> int:
-    away = cKDTree(shell.middles(shell.leak_test.faces.cells)).query(samples.positions)[0]
-    return int(np.count_nonzero(away > BURIED * float(np.median(samples.spacing))))
+    reach, order = BURIED * float(np.median(samples.spacing)), np.arange(len(samples.positions), dtype=np.int32)
+    tree = Tree.of_points(shell.middles(shell.leak_test.faces.cells))
+    return int(np.count_nonzero(tree.nearest(samples.positions, order=order, enough=reach)[0] > reach))
 
 
 def _leaks_more(other: Shell, shell: Shell, samples: Samples) -> bool:
@@ -168,7 +169,7 @@ def _leaks_more(other: Shell, shell: Shell, samples: Samples) -> bool:
     """
     reach = BESIDE * float(np.median(samples.spacing))
     looked_at = _places(other, other.leak_test.shell.occupied & ~other.leak_test.shell.witnesses)
-    _, once = np.unique(np.floor(looked_at / reach), axis=0, return_index=True)
+    _, once = np.unique(keys_of(np.floor(looked_at / reach).astype(np.int64)), return_index=True)
     shares = (_share_around(looked_at[once], one, reach) for one in (other, shell))
     return any(after < HOPELESS and before >= TIGHT for after, before in zip(*shares, strict=True))
 
@@ -188,13 +189,15 @@ def _places(shell: Shell, bitmask: Bitmask) -> Floats:
     return shell.middles(shell.leak_test.shell.blocks.cells(bitmask))
 
 
-def follows(shell: Shell, mesh: TriMesh, samples: Samples, origin: Floats, *, threads: int = 0) -> Stage[None]:
-    """Say where points lie deep inside of a mesh, or it passes them by."""
+def follows(
+    shell: Shell, mesh: TriMesh, samples: Samples, origin: Floats, tree: Tree | None, *, threads: int = 0
+) -> Stage[None]:
+    """Say where points lie deep inside of a mesh, or it passes them by; the tree is that of its faces."""
     if not shell.leak_test.tight or shell.doubt:
         return Stage(None)
     deep = joint(shell.leak_test.shell, shell.finer)
     inside = None if deep is None else shell.middles(deep)
-    place = passed_by(mesh, samples, threads=threads) if inside is None else inside
+    place = passed_by(mesh, samples, tree, threads=threads) if inside is None else inside
     if place is None:
         return Stage(None)
     where = f"points lie deep inside of the surface around {place_in_words(place + origin)}"
@@ -206,17 +209,21 @@ def place_in_words(place: Floats) -> str:
     return "(" + ", ".join(f"{c:.6g}" for c in place) + ")"
 
 
-def passed_by(mesh: TriMesh, samples: Samples, *, threads: int = 0) -> Floats | None:
+def passed_by(mesh: TriMesh, samples: Samples, tree: Tree | None = None, *, threads: int = 0) -> Floats | None:
     """Return the place (3,) where a mesh passes samples by, facing pairs or most; None if it follows all but a few."""
-    away, face = Tree.of_faces(mesh, threads=threads).nearest(samples.positions, threads=threads)
-    normals = mesh.face_vectors[face]
-    across = np.abs((normals * samples.normals).sum(axis=1)) / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
-    spacing = float(np.median(samples.spacing))
+    spacing, noise = float(np.median(samples.spacing)), float(np.median(samples.noise))
+    enough = min(OFF * spacing, TAKEN_IN * spacing + noise)
+    tree = Tree.of_faces(mesh, threads=threads) if tree is None else tree
+    order = np.arange(len(samples.positions), dtype=np.int32)  # that of their cubes
+    away, face = tree.nearest(samples.positions, order=order, enough=enough, threads=threads)
     between = facing_pairs(samples, FACING * spacing, threads=threads) if _is_clean(samples) else NO_PAIRS
     taken_in = away[between].max(axis=1, initial=0)
-    if taken_in.max(initial=0) > TAKEN_IN * spacing + float(np.median(samples.noise)):
+    if taken_in.max(initial=0) > TAKEN_IN * spacing + noise:
         return np.asarray(samples.positions[between[taken_in.argmax()]].mean(axis=0))
-    passed = samples.positions[(away > OFF * spacing) & (across < TURNED)]
+    off = np.flatnonzero(away > OFF * spacing)
+    normals = TriMesh(mesh.vertices, mesh.faces[face[off]]).face_vectors
+    across = np.abs((normals * samples.normals[off]).sum(axis=1)) / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+    passed = samples.positions[off[across < TURNED]]
     if len(passed) < PASSED:
         return None
     beside = cKDTree(passed).query_ball_point(passed, BESIDE * spacing, return_length=True)
