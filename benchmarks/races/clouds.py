@@ -54,7 +54,8 @@ def _clean(name: str) -> None:
     if find_spec(PEER) is None:
         note(f"50,000 points of a {name}: CPU", f"{costs(lambda: _ours(points), repeats=3)[0].cpu:.3g} s, no {PEER}")
         return
-    race(f"50,000 points of a {name}", *costs(lambda: _ours(points), lambda: _meshlib(points), repeats=3), 0.5)
+    ours, theirs = costs(lambda: _ours(points), lambda: _meshlib(points), repeats=3)
+    race(f"50,000 points of a {name}", ours, theirs, 0.5)
 
 
 def _large(count: int, memory: float) -> None:
@@ -111,7 +112,7 @@ def _ours(points: Cloud) -> None:
 
 
 def _meshlib(points: Cloud) -> None:
-    from meshlib import mrmeshnumpy, mrmeshpy
+    from meshlib import mrmeshnumpy, mrmeshpy  # type: ignore[import-not-found]
 
     mrmeshpy.triangulatePointCloud(mrmeshnumpy.pointCloudFromPoints(points))
 

@@ -50,4 +50,4 @@ def facing_pairs(samples: Samples, reach: float, *, threads: int = 0) -> NDArray
         found[start] = pairs[:room]
 
     in_blocks(look, len(rows), block=BLOCK, threads=threads)
-    return index.order[np.concatenate([found[start] for start in sorted(found)])]
+    return np.asarray(index.order[np.concatenate([found[start] for start in sorted(found)])])
