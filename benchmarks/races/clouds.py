@@ -112,7 +112,7 @@ def _ours(points: Cloud) -> None:
 
 
 def _meshlib(points: Cloud) -> None:
-    from meshlib import mrmeshnumpy, mrmeshpy  # type: ignore[import-not-found]
+    from meshlib import mrmeshnumpy, mrmeshpy
 
     mrmeshpy.triangulatePointCloud(mrmeshnumpy.pointCloudFromPoints(points))
 
