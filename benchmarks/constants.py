@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba.core.caching import NullCache
-from numba.core.dispatcher import Dispatcher
 
 from tomomesh import TomomeshError, Volume, reconstruct, reconstruct_points
+from tomomesh.kernels.compile import Kernel
+from tomomesh.kernels.native import compiler
 from tomomesh.measure.thickness import walls_and_gaps
 
 if TYPE_CHECKING:
@@ -228,13 +228,14 @@ def other(module: Any, name: str, new: Any) -> Iterator[None]:
 def recompile(modules: list[Any], name: str) -> None:
     """Compile anew, callees first, the kernels in which a number of some modules is baked in."""
     stale: set[str] = set()
+    compiler.dispatcher.cache_clear()
+    compiler.inner.cache_clear()
     for module in [one for key, one in sys.modules.items() if key.startswith("tomomesh.kernels")]:
         for key, found in list(vars(module).items()):
-            if isinstance(found, Dispatcher) and found.py_func.__module__ == module.__name__:
-                used = set(found.py_func.__code__.co_names)
+            if isinstance(found, Kernel) and found.__module__ == module.__name__:
+                used = set(found.function.__code__.co_names)
                 if used & stale or (name in used and module in modules):
-                    vars(found)["_cache"] = NullCache()
-                    found.recompile()
+                    found.call = compiler.dispatcher(found)
                     stale.add(key)
 
 

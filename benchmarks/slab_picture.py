@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import argparse
-from io import BytesIO
 from typing import TYPE_CHECKING
 
 from PIL import Image
@@ -14,12 +13,10 @@ from PIL import Image
 from slab_peers import sinc
 from slabs import STUDIES, WAYS, majority, ours, score, slab, thin, truth
 from tomomesh.show.camera import Camera
+from tomomesh.show.drawing.page import Page, canvas
 from tomomesh.show.render import View, draw_faces, frame
-from tomomesh.show.style import canvas, heading, save, styled
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from tomomesh.model.mesh import TriMesh
 
 HEADS = [name for name, (_, labels, _) in STUDIES.items() if labels]
@@ -42,21 +39,18 @@ def main() -> None:
     for name, mesh in zip(("Marching cubes, smoothed as 3D Slicer does", "tomomesh"), meshes, strict=True):
         found = score(mesh, true)
         panels.append((name, f"{found['mean']:.2f} mm from the true surface, faces turn by {found['turn']:.1f}°", mesh))
-    picture = BytesIO()
-    save(pair(panels), picture)
-    Image.open(picture).convert("RGB").quantize(dither=Image.Dither.NONE).save(asked.file, optimize=True)
+    pair(panels).image().quantize(dither=Image.Dither.NONE).save(asked.file, optimize=True)
 
 
-@styled
-def pair(panels: list[tuple[str, str, TriMesh]]) -> Figure:
+def pair(panels: list[tuple[str, str, TriMesh]]) -> Page:
     """Draw surfaces side by side from the same place, each face in one shade, all at one scale."""
     view = View(Camera(elevation=32))
-    figure, axes = canvas(4.8 * len(panels), 5.2, 1, len(panels))
+    page, axes = canvas(4.8 * len(panels), 5.2, 1, len(panels))
     for ax, (name, told, mesh) in zip(axes, panels, strict=True):
-        draw_faces(ax, mesh.corners, view.camera)
         frame(ax, panels[0][2].vertices, view)
-        heading(ax, name, told)
-    return figure
+        draw_faces(ax, mesh.vertices, mesh.faces, view.camera)
+        ax.heading(name, told)
+    return page
 
 
 if __name__ == "__main__":

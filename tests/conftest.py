@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from numba.core import config
 
-from tomomesh import kernels
+import tomomesh
 from tomomesh.cuberille.bitmasks import Blocks
 from tomomesh.cuberille.closing import Shell
 from tomomesh.cuberille.faces import Faces, exposed_faces
+from tomomesh.kernels.compile import COMPILED as COMPILED
+from tomomesh.kernels.compile import Kernel
+from tomomesh.kernels.native.load import loaded
 from tomomesh.model.cubes import keys_of
 from tomomesh.model.mesh import QuadMesh
 
@@ -27,10 +29,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Number = TypeVar("Number", int, float)
-
-COMPILED = not config.DISABLE_JIT
-"""Whether the kernels run as machine code; where they do not, the tests are smaller."""
-
 
 settings.register_profile(
     "repeatable", deadline=None, derandomize=True, database=None,
@@ -48,8 +46,10 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
 def pytest_configure(config: pytest.Config) -> None:
     """Compile the kernels once, before there are several processes that would."""
     if config.getoption("dist", "no") != "no" and not hasattr(config, "workerinput"):
-        for module in pkgutil.walk_packages(kernels.__path__, f"{kernels.__name__}."):
-            import_module(module.name)
+        names = [one.name for one in pkgutil.walk_packages(tomomesh.__path__, "tomomesh.")]
+        modules = [import_module(name) for name in names if not name.endswith("__main__")]
+        for kernel in {one for module in modules for one in vars(module).values() if isinstance(one, Kernel)}:
+            loaded(kernel)
 
 
 def size(compiled: Number, plain: Number) -> Number:

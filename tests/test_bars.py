@@ -60,3 +60,36 @@ class TestBars:
             progress("voxels", 0, 2)
             progress("voxels", 2, 2)
             assert lines.getvalue().startswith("voxels     2/2")
+
+    def test_says_where_a_long_stage_is_now_and_then_elsewhere(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Also where it reports nothing; and never more after its end, nor as often as it reports."""
+        lines, again = io.StringIO(), Event()
+        say = Bars._say
+
+        def said(bars: Bars) -> None:
+            say(bars)
+            again.set()
+
+        monkeypatch.setattr(sys, "stderr", lines)
+        monkeypatch.setattr(bars, "TICK", 0.001)
+        monkeypatch.setattr(bars, "EVERY", 0.0)
+        monkeypatch.setattr(Bars, "_say", said)
+        with Bars() as progress:
+            progress("fit", 3, 9)
+            assert again.wait(SOON)
+            progress("fit", 9, 9)
+            told = lines.getvalue()
+            again.clear()
+            assert not again.wait(0.05)
+        assert told.startswith("fit        3/9")
+        assert told.splitlines()[-1].startswith("fit        9/9")
+        assert lines.getvalue() == told
+
+    def test_says_a_line_a_report_only_where_time_has_passed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        lines = io.StringIO()
+        monkeypatch.setattr(sys, "stderr", lines)
+        monkeypatch.setattr(bars, "EVERY", 1e9)
+        with Bars() as progress:
+            for done in range(100):
+                progress("fit", done, 100)
+            assert lines.getvalue() == ""

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING
 
 import pytest
@@ -13,7 +14,8 @@ import pytest
 from doors import as_program
 from studies import write_nifti
 from test_faults_studies import AFFINE, ball
-from tomomesh.kernels.compile import CACHE
+from tomomesh.kernels.native.code import Code
+from tomomesh.kernels.native.code import folder as cache
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the cache's place is set by XDG_CACHE_HOME on Linux")
 
 STARTS = 8
+NEEDED = ("edges.order_half_edges", "positions.first_equal", "shapes.face_sizes")
 
 
 @pytest.fixture
@@ -36,9 +39,9 @@ def line_of(study: Path, mesh: Path) -> list[str]:
 
 def cached(folder: Path) -> Path:
     """Return a cache home with a copy of this user's warm cache."""
-    if not CACHE.is_dir():
+    if not cache().is_dir():
         pytest.skip("the kernels were not compiled yet")
-    shutil.copytree(CACHE, folder / "tomomesh" / CACHE.name)
+    shutil.copytree(cache(), folder / "tomomesh" / cache().name)
     return folder
 
 
@@ -56,37 +59,87 @@ def emptied(path: Path) -> None:
 
 @pytest.mark.parametrize("damage", [garbage, cut, emptied])
 def test_a_broken_cache_is_made_anew(study: Path, tmp_path: Path, damage: Callable[[Path], None]) -> None:
-    """Three kernels that every run needs are broken; the others are deleted with them, so few are warm again."""
+    """Kernels that every run needs are broken."""
     home = cached(tmp_path / "cache")
-    for path in sorted((home / "tomomesh" / CACHE.name).rglob("*voxels*.nb?"))[:3]:
+    broken = [home / "tomomesh" / cache().name / f"measure.{name}" for name in NEEDED]
+    for path in broken:
         damage(path)
     done = as_program(line_of(study, tmp_path / "m.ply"), env={"XDG_CACHE_HOME": str(home)})
     assert done.returncode == 0, done.stderr
     assert len(done.stderr.splitlines()) <= 1
     assert (tmp_path / "m.ply").exists()
+    assert all(Code.unpacked(path.read_bytes()) for path in broken)
 
 
-def test_a_cache_that_cannot_be_written(study: Path, tmp_path: Path) -> None:
+CALLS = """
+import numpy as np
+from tomomesh.kernels.remeshing.links import after, face_shape
+assert after(5) == 3
+assert face_shape(np.eye(3), 0, 1, 2)[3] > 0
+"""
+
+
+def test_a_cache_that_cannot_be_written(tmp_path: Path) -> None:
     """Neither the cache nor home are folders: not even root may write there."""
     (tmp_path / "none").touch()
-    env = {"XDG_CACHE_HOME": str(tmp_path / "none"), "HOME": str(tmp_path / "none")}
-    done = as_program(["inspect", str(study)], env=env)
-    assert done.returncode == 0, done.stderr
-    assert len(done.stderr.splitlines()) <= 1
+    env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "none"), "HOME": str(tmp_path / "none")}
+    done = subprocess.run([sys.executable, "-c", CALLS], env=env, capture_output=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
 
 
 def test_eight_cold_starts_at_once(tmp_path: Path) -> None:
     """All compile and write the same kernels; `benchmarks/crash.py` does it with whole runs."""
-    program = "from tomomesh.kernels.measure import polygons; from tomomesh.kernels.isosurface import surface_nets"
     env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cold")}
     starts = [
-        subprocess.Popen([sys.executable, "-c", program], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        subprocess.Popen([sys.executable, "-c", CALLS], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         for _ in range(STARTS)
     ]
     said = [start.communicate(timeout=500) for start in starts]
     assert [start.returncode for start in starts] == [0] * STARTS, said
     assert {words for _, words in said} == {b""}
-    assert any((tmp_path / "cold").rglob("*.nbc"))
+    kept = [path for path in (tmp_path / "cold").rglob("*") if path.is_file()]
+    assert sorted(path.name for path in kept) == ["remeshing.links.after", "remeshing.links.face_shape"]
+    assert all(Code.unpacked(path.read_bytes()) for path in kept)
+
+
+STOPPED = """
+import os, signal, subprocess, threading
+from tomomesh.kernels.native import workers
+from tomomesh.kernels.remeshing.surface import mix_normals
+from tomomesh.kernels.threads import in_blocks
+
+processes = []
+class Noted(subprocess.Popen):
+    def __init__(self, *given, **named):
+        super().__init__(*given, **named)
+        processes.append(self)
+        print(self.pid, flush=True)
+        threading.Timer(0.2, os.kill, [os.getpid(), signal.SIGINT]).start()
+
+workers.subprocess.Popen = Noted
+in_blocks(lambda start, stop: mix_normals(), 8, block=1, threads=2)
+"""
+
+
+def test_ctrl_c_while_threads_wait_for_a_kernel(tmp_path: Path) -> None:
+    """The run ends though its kernel is not there yet, and what compiles ends with it."""
+    env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cold")}
+    done = subprocess.run([sys.executable, "-c", STOPPED], env=env, capture_output=True, text=True, check=False)
+    assert "KeyboardInterrupt" in done.stderr
+    assert not list((tmp_path / "cold").rglob("*"))
+    for pid in map(int, done.stdout.split()):
+        _ended(pid)
+
+
+def _ended(pid: int) -> None:
+    """Wait until a process is gone; what reads the end of its input ends at once."""
+    for _ in range(1000):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"{pid} is still there")
 
 
 INTERRUPT = """

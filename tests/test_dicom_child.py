@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pydicom
 import pytest
-from pydicom.uid import RLELossless
+from pydicom.uid import JPEGLSLossless
 
 from studies import AFFINES, save, slice_dataset
 from tomomesh.cli import main
@@ -33,7 +33,7 @@ HEAD = '{"kind": "<u2", "shape": [20, 24], "photometric": "MONOCHROME2"}'
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     data = slice_dataset(PIXELS, AFFINES["axial"], 0)
-    data.compress(RLELossless, generate_instance_uid=False)
+    data.compress(JPEGLSLossless, generate_instance_uid=False)
     return save(data, tmp_path / "study" / "a.dcm")
 
 
@@ -64,7 +64,7 @@ class TestTheEndOfAChild:
     def test_a_crash_is_an_error_of_the_file(self, run: Callable[[str], TomomeshError]) -> None:
         fault = run("os.kill(os.getpid(), signal.SIGSEGV)")
         assert isinstance(fault, FormatError)
-        assert "a.dcm [TransferSyntaxUID = RLE Lossless, crash]" in str(fault)
+        assert "a.dcm [TransferSyntaxUID = JPEG-LS Lossless Image Compression, crash]" in str(fault)
 
     def test_a_child_that_takes_too_long_is_ended(
         self, run: Callable[[str], TomomeshError], monkeypatch: pytest.MonkeyPatch

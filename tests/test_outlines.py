@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from conftest import cuberille_of, law, solids
 from tomomesh.measure.section import section
 from tomomesh.model.mesh import TriMesh
-from tomomesh.show.outline import draw_outlines
+from tomomesh.show.drawing.style import rgb
+from tomomesh.show.outline import OUTLINE, draw_outlines
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -56,10 +57,10 @@ class TestPages:
         mesh = sphere(20.0).moved(sphere(20.0).vertices + np.array([25.0, 25.0, 22.0]))
         images = np.random.default_rng(0).integers(0, 255, (60, 50, 50)).astype(np.uint8)
         pages = list(draw_outlines(images, mesh))
-        shown = [ax for page in pages for ax in page.axes if ax.images]
+        shown = [ax for page in pages for ax in page.panels]
         assert len(pages) == 2
         assert len(shown) == 41
-        assert all(len(ax.collections) for ax in shown)
+        assert all((ax.pixels == rgb(OUTLINE)).all(axis=2).any() for ax in shown)
 
     def test_a_mesh_between_two_slices_has_no_page(self) -> None:
         mesh = sphere(0.2).moved(sphere(0.2).vertices + np.array([5.0, 5.0, 2.5]))

@@ -16,10 +16,12 @@ from tomomesh.model.networks import Networks
 from tomomesh.model.points import BRIDGE, CAP, PointSet
 from tomomesh.model.trace import Trace
 from tomomesh.show import draw_all, space
-from tomomesh.show.camera import Camera
+from tomomesh.show.camera import Camera, normals
+from tomomesh.show.drawing.axes import decades, ticks
+from tomomesh.show.drawing.style import ACCENT, HEIGHT, INK, NETWORK, rgb
 from tomomesh.show.fit import draw_fit
 from tomomesh.show.gallery import median_slice
-from tomomesh.show.plane import Plane, gray
+from tomomesh.show.plane import PIXELS, Plane, gray
 from tomomesh.show.relief import draw_relief
 from tomomesh.show.render import View, nice_length
 from tomomesh.show.slices import draw_contour, draw_regions, draw_window
@@ -27,8 +29,9 @@ from tomomesh.show.space import draw_points, draw_shaded, draw_surfaces, draw_wi
 from tomomesh.show.topologies import draw_adapted, draw_update_regions
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+    from tomomesh.show.drawing.page import Page
 
 
 def round_mesh() -> TriMesh:
@@ -82,50 +85,93 @@ def trace() -> Trace:
     return Trace(fall, 2 * fall, np.append(0.0, fall[1:]), 5 + fall, 1 + fall, counts, 0 * counts, True)
 
 
-def pixels(figure: Figure) -> NDArray[np.uint8]:
-    """Draw a figure and return its canvas, (rows, columns, 4)."""
-    figure.canvas.draw()
-    return np.asarray(figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
+def pixels(page: Page) -> NDArray[np.uint8]:
+    """Return the colors of a page with its words, (rows, columns, 3)."""
+    return np.asarray(page.image())
 
 
-def is_drawn(figure: Figure) -> bool:
-    """Whether paper and ink are both there, the paper at the rim."""
-    seen = pixels(figure)[:, :, :3]
+def words(page: Page) -> list[str]:
+    return [word.text for word in page.words]
+
+
+def at(seen: NDArray[np.uint8], place: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return the color of the pixel that holds a place."""
+    column, row = np.floor(place).astype(int)
+    return np.asarray(seen[row, column])
+
+
+def is_drawn(page: Page) -> bool:
+    """Whether paper and ink are both there, the paper at the rim, and all words on it."""
+    seen = pixels(page)
     rim = np.concatenate([seen[0], seen[-1], seen[:, 0], seen[:, -1]])
-    return bool((rim == 255).all() and (seen < 255).any(axis=2).mean() > 0.002)
+    high, wide, _ = seen.shape
+    held = all(x0 >= 0 and y0 >= 0 and x1 <= wide and y1 <= high for x0, y0, x1, y1 in (w.box for w in page.words))
+    return held and bool((rim == 255).all() and (seen < 255).any(axis=2).mean() > 0.002)
 
 
 class TestSpace:
     def test_ball_covers_its_disk(self, ball: TriMesh) -> None:
-        figure = draw_shaded(ball)
-        (ax,) = figure.axes
-        seen = pixels(figure)
-        center, rim = ax.transData.transform([[0, 0], [20, 0]])
+        page = draw_shaded(ball)
+        (ax,) = page.panels
+        seen = pixels(page)
+        center, rim = ax.place(np.array([[0.0, 0], [20, 0]]))
         rows, columns = np.mgrid[: len(seen), : len(seen[0])]
-        away = np.hypot(columns + 0.5 - center[0], len(seen) - rows - 0.5 - center[1]) / (rim - center)[0]
-        inked = seen[:, :, :3].min(axis=2) < 250
-        assert inked[away < 0.97].all()
-        assert not inked[(away > 1.02) & (away < 1.08)].any()
+        away = np.hypot(columns + 0.5 - center[0], rows + 0.5 - center[1]) / (rim - center)[0]
+        inked = seen.min(axis=2) < 250
+        assert inked[away < 0.99].all()
+        assert not inked[(away > 1.005) & (away < 1.08)].any()
 
     def test_ball_is_lit_from_the_upper_left(self, ball: TriMesh) -> None:
-        figure = draw_shaded(ball)
-        seen = pixels(figure)[:, :, :3].mean(axis=2)
+        page = draw_shaded(ball)
         upper_left, lower_right = (
-            figure.axes[0].transData.transform(place).astype(int) for place in ([-8, 8], [8, -12])
+            at(pixels(page), page.panels[0].place(np.array(place))).mean() for place in ([-8.0, 8.0], [8.0, -12.0])
         )
-        assert seen[len(seen) - upper_left[1], upper_left[0]] > 40 + seen[len(seen) - lower_right[1], lower_right[0]]
+        assert upper_left > 40 + lower_right
 
     def test_wireframe_hides_the_back(self, cube: QuadMesh) -> None:
-        figure = draw_wireframe(cube.triangulated())
-        assert len(figure.axes[0].collections[0].get_paths()) == 6
-        assert is_drawn(figure)
+        """Without the three squares that turn away the picture is the same; without those in front it is not."""
+        camera = Camera(30, 20)
+        faces = cube.triangulated().faces
+        toward = normals(camera.project(cube.vertices), faces)[:, 2] > 0
+        whole, front, back = (
+            draw_wireframe(TriMesh(cube.vertices, part), View(camera)).pixels
+            for part in (faces, faces[toward], faces[~toward])
+        )
+        np.testing.assert_array_equal(whole, front)
+        assert (whole != back).any()
+
+    def test_both_sides_of_a_sheet_are_drawn(self) -> None:
+        """In their own colors, one as the mirror image of the other."""
+        flat = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]])
+        faces = np.array([[0, 1, 2], [0, 2, 3]])
+        front, back = (pixels(draw_shaded(TriMesh(flat, each), View(Camera(0, 0)))) for each in (faces, faces[:, ::-1]))
+        inked = (front < 255).any(axis=2)
+        middle = tuple(n // 2 for n in front.shape[:2])
+        assert inked[middle]
+        np.testing.assert_array_equal(inked, (back < 255).any(axis=2))
+        assert front[middle][0] > front[middle][2]
+        assert back[middle][0] < back[middle][2]
+
+    def test_faces_that_interlock_hide_each_other_by_halves(self) -> None:
+        """Two squares through each other: left the one is in front, right the other."""
+        one = np.array([[-1.0, -1, -1], [1, 1, -1], [1, 1, 1], [-1, -1, 1]])
+        other = one * [1, -1, 1]
+        faces = np.array([[0, 1, 2], [0, 2, 3]])
+        mesh = TriMesh(np.concatenate([one, other]), np.concatenate([faces, faces + 4]))
+        alone = [pixels(draw_surfaces(None, TriMesh(each, faces), None, View(Camera(0, 0)))) for each in (one, other)]
+        both = pixels(draw_surfaces(None, mesh, None, View(Camera(0, 0))))
+        row, column = (n // 2 for n in both.shape[:2])
+        left, right = column - column // 3, column + column // 3
+        np.testing.assert_array_equal(both[row, left], alone[0][row, left])
+        np.testing.assert_array_equal(both[row, right], alone[1][row, right])
+        assert (both[row, left] != both[row, right]).any()
 
     @pytest.mark.parametrize("given", [(1, 1, 1), (1, 0, 0), (0, 0, 1)])
     def test_surfaces_side_by_side(self, cube: QuadMesh, given: tuple[int, ...]) -> None:
         stages = (cube, cube.triangulated(), cube.triangulated())
-        figure = draw_surfaces(*(stage if one else None for one, stage in zip(given, stages, strict=True)))  # type: ignore[arg-type]
-        assert len(figure.axes) == sum(given)
-        assert is_drawn(figure)
+        page = draw_surfaces(*(stage if one else None for one, stage in zip(given, stages, strict=True)))  # type: ignore[arg-type]
+        assert len(page.panels) == sum(given)
+        assert is_drawn(page)
 
     @pytest.mark.parametrize(
         ("neuron", "names"),
@@ -135,25 +181,38 @@ class TestSpace:
         rng = np.random.default_rng(0)
         kinds = np.repeat([0, BRIDGE, CAP], 20).astype(np.uint8)
         neurons = np.where(kinds == 0, neuron, -1).astype(np.int32)
-        figure = draw_points(PointSet(rng.normal(size=(60, 3)), np.repeat([2, 3, 3], 20), neurons, kinds))
-        legend = figure.axes[0].get_legend()
-        assert legend is not None
-        assert [entry.get_text() for entry in legend.get_texts()] == [f"{name} (20)" for name in names]
-        drawn = [c for c in figure.axes[0].collections if np.shape(c.get_offsets()) == (20, 2)]
-        assert len(drawn) == 3
-        assert is_drawn(figure)
+        page = draw_points(PointSet(rng.normal(size=(60, 3)), np.repeat([2, 3, 3], 20), neurons, kinds))
+        assert [word for word in words(page) if word.endswith("(20)")] == [f"{name} (20)" for name in names]
+        shown = {tuple(color) for color in pixels(page).reshape(-1, 3)}
+        assert {tuple(int(level) for level in rgb(color)) for color in (ACCENT, INK)} < shown
+        assert is_drawn(page)
 
-    def test_nearest_points_are_drawn_last(self) -> None:
-        positions = np.array([[0.0, -5, 0], [0, 5, 0], [0, 0, 0]])
-        figure = draw_points(PointSet.from_positions(positions), View(Camera(0, 0)))
-        assert figure.axes[0].get_legend() is None
-        strength = np.asarray(figure.axes[0].collections[0].get_facecolor())[:, 3]
-        assert (np.diff(strength) > 0).all()
+    def test_the_nearest_point_hides_those_behind_it(self) -> None:
+        positions = np.array([[0.0, -5, 0], [0, 5, 9], [0, 0, 4]])
+        for order in ([0, 1, 2], [2, 1, 0], [1, 0, 2]):
+            page = draw_points(PointSet.from_positions(positions[order]), View(Camera(0, 0)))
+            assert not any("(" in word and "height" not in word for word in words(page))
+            (ax,), seen = page.panels, pixels(page)
+            ink = [255.0 - at(seen, ax.place(positions[n, [0, 2]])).min() for n in range(3)]
+            assert ink[0] > ink[2] > ink[1] > 0
+
+    def test_points_at_one_place_are_the_nearest_one(self) -> None:
+        """The farther has another color, by its height, and is not seen."""
+        camera = Camera(0, 30)
+        positions = np.array([[0.0, 0, 0]]) + np.array([[0.0], [-40.0]]) * camera.rotation[2]
+        pages = [draw_points(PointSet.from_positions(positions[order]), View(camera)) for order in ([0, 1], [1, 0])]
+        seen = [at(pixels(page), page.panels[0].place(np.zeros(2))) for page in pages]
+        np.testing.assert_array_equal(seen[0], HEIGHT(1.0))
+        np.testing.assert_array_equal(seen[1], HEIGHT(1.0))
 
     def test_large_clouds_are_thinned(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(space, "MOST_POINTS", 100)
-        cloud = PointSet.from_positions(np.random.default_rng(0).normal(size=(250, 3)))
-        assert np.shape(draw_points(cloud).axes[0].collections[0].get_offsets()) == (84, 2)
+        cloud = np.random.default_rng(0).normal(size=(250, 3))
+        thinned = draw_points(PointSet.from_positions(cloud))
+        monkeypatch.setattr(space, "MOST_POINTS", 84)
+        assert "250 points, one in 3 drawn" in words(thinned)
+        third = draw_points(PointSet.from_positions(cloud[::3]))
+        np.testing.assert_array_equal(thinned.pixels, third.pixels)
 
     def test_one_point_and_flat_meshes_are_drawn(self) -> None:
         assert is_drawn(draw_points(PointSet.from_positions(np.ones((1, 3)))))
@@ -161,16 +220,24 @@ class TestSpace:
         assert is_drawn(draw_shaded(flat))
         assert is_drawn(draw_wireframe(flat))
 
+    @pytest.mark.parametrize("size", [1e-120, 1e-9, 1e9, 1e120])
+    def test_size_changes_nothing_but_the_scale(self, size: float, ball: TriMesh) -> None:
+        """A ball of any size is the same picture, but for its scale bar."""
+        one, other = (draw_shaded(TriMesh(each * ball.vertices, ball.faces)).pixels for each in (1.0, size))
+        upper = slice(0, int(0.8 * len(one)))
+        assert np.abs(one[upper].astype(int) - other[upper]).max() <= 30  # a corner may round to the next step
+        assert (one[upper] != other[upper]).mean() < 1e-3
+
     @pytest.mark.parametrize("size", [(1, 1.5, 40), (40, 1, 1.5), (1, 40, 1), (1, 1, 1), (20, 20, 0.1)])
     def test_marks_of_a_long_object_keep_apart(self, size: tuple[float, float, float]) -> None:
         cloud = np.random.default_rng(0).uniform(-1, 1, (200, 3)) * size
-        figure = draw_points(PointSet.from_positions(cloud))
-        figure.canvas.draw()
-        ax = figure.axes[0]
-        words = [text.get_window_extent() for text in ax.texts]
-        assert len(words) == 5  # the note, the length of the bar, three axes
-        assert not any(a.overlaps(b) for n, a in enumerate(words) for b in words[:n])
-        assert ax.get_window_extent().x0 < 0.1 * figure.bbox.width
+        page = draw_points(PointSet.from_positions(cloud))
+        boxes = [word.box for word in page.words]
+        assert {"The points P", "200 points", "L", "P", "S"} < {*words(page)}
+        assert not any(
+            a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3] for n, a in enumerate(boxes) for b in boxes[:n]
+        )
+        assert page.panels[0].box[0] < 0.1 * page.pixels.shape[1]
 
     @given(st.floats(1e-6, 1e9))
     def test_scale_bar_is_round_and_fits(self, size: float) -> None:
@@ -179,13 +246,21 @@ class TestSpace:
         assert f"{length:.6e}"[0] in "125"
 
 
+def on_slice(page: Page, panel: int, image: NDArray[np.generic], plane: Plane = PIXELS) -> NDArray[np.uint8]:
+    """Return the color in the middle of each pixel of a slice, (J, I, 3)."""
+    rows, columns = np.mgrid[: image.shape[0], : image.shape[1]]
+    places = page.panels[panel].place(plane.place(np.stack([columns, rows], axis=-1)))
+    i, j = np.moveaxis(np.floor(places).astype(int), -1, 0)
+    return np.asarray(page.pixels[j, i])
+
+
 class TestSlices:
     def test_window_blackens_the_rest(self, study: dict[str, NDArray[np.generic]]) -> None:
-        figure = draw_window(study["images"][1], study["mask"][1])
-        shown = np.asarray(figure.axes[1].images[0].get_array())
-        assert (shown[study["mask"][1]] == 220).all()
-        assert (shown[~study["mask"][1]] == study["images"].min()).all()
-        assert is_drawn(figure)
+        page = draw_window(study["images"][1], study["mask"][1])
+        shown = on_slice(page, 1, study["mask"][1])
+        assert (shown[study["mask"][1]] == 255).all()
+        assert (shown[~study["mask"][1]] == 0).all()
+        assert is_drawn(page)
 
     def test_colors_become_gray(self, study: dict[str, NDArray[np.generic]]) -> None:
         color = np.stack([study["images"][0]] * 3, axis=-1)
@@ -196,33 +271,30 @@ class TestSlices:
         plane = Plane((0.5, 2.0), upward)
         image = np.zeros((40, 48))
         image[7, 31] = 1.0
-        figure = draw_window(image, image > 0, plane)
-        seen = pixels(figure)[:, :, :3]
-        spot = figure.axes[0].transData.transform(plane.place(np.array([[31, 7]])))[0].astype(int)
-        assert (seen[len(seen) - 1 - spot[1], spot[0]] == 255).all()
-        assert (seen[len(seen) - 1 - spot[1], spot[0] - 40] == 0).all()
-        assert figure.axes[0].transData.transform([[0, 0], [0, 70]])[:, 1].argmax() == int(upward)
+        page = draw_window(image, image > 0, plane)
+        shown = on_slice(page, 0, image, plane)
+        np.testing.assert_array_equal(shown, np.repeat(255 * image[..., None], 3, axis=2))
+        assert page.panels[0].place(np.array([[0, 0], [0, 70]]))[:, 1].argmax() == int(not upward)
 
     def test_regions_keep_their_colors(self, study: dict[str, NDArray[np.generic]], networks: Networks) -> None:
         labels = study["labels"][0]
-        figure = draw_regions(study["images"][0], study["mask"][0], networks.codebooks[0], networks.lattice, labels)
-        shown = np.asarray(figure.axes[3].images[0].get_array())
+        page = draw_regions(study["images"][0], study["mask"][0], networks.codebooks[0], networks.lattice)
+        shown = on_slice(page, 3, labels)
         colors = np.array([shown[labels == label][0] for label in range(17)])
         assert all((shown[labels == label] == colors[label]).all() for label in range(17))
         assert len(np.unique(colors, axis=0)) == 17
         assert (colors[0] == 0).all()
-        assert is_drawn(figure)
+        assert is_drawn(page)
 
     @pytest.mark.parametrize(("slice_", "found"), [(1, "2 bridged gaps"), (0, "no bridged gap")])
     def test_contour_marks_the_bridged_gaps(
         self, study: dict[str, NDArray[np.generic]], networks: Networks, slice_: int, found: str
     ) -> None:
         ring, gaps = networks.codebooks[slice_], networks.bridged[slice_]
-        figure = draw_contour(study["mask"][1], ring, networks.lattice, bridged=gaps)
-        words = [text.get_text() for text in figure.axes[1].texts]
-        assert found in words
-        assert ("gap" in words) == gaps.any()
-        assert is_drawn(figure)
+        page = draw_contour(study["mask"][1], ring, networks.lattice, bridged=gaps)
+        assert found in words(page)
+        assert ("gap" in words(page)) == gaps.any()
+        assert is_drawn(page)
 
     @pytest.mark.parametrize("shape", [(40, 48), (300, 130), (1, 1), (2, 2), (5, 6, 3)])
     def test_relief_of_any_shape(self, shape: tuple[int, ...]) -> None:
@@ -236,34 +308,49 @@ class TestSlices:
 
 class TestTopologies:
     def test_ring_moves_one_neuron_more_than_chain(self) -> None:
-        figure = draw_update_regions()
-        words = [" ".join(text.get_text() for text in ax.texts) for ax in figure.axes]
-        assert "4 of 10 neurons move" in words[0]
-        assert "5 of 10 neurons move" in words[1]
-        assert is_drawn(figure)
+        page = draw_update_regions()
+        told = [word for word in words(page) if "neurons move" in word]
+        assert ["4 of 10" in told[0], "5 of 10" in told[1]] == [True, True]
+        assert is_drawn(page)
 
     @pytest.mark.parametrize("dimensions", [2, 3])
     def test_region_with_its_start(self, dimensions: int) -> None:
         region = np.random.default_rng(0).random((200, dimensions))
-        figure = draw_adapted(region, region[:12], lattice("grid", 12), start=region[12:24], title="Square")
-        assert len(figure.axes) == 2
-        assert is_drawn(figure)
+        page = draw_adapted(region, region[:12], lattice("grid", 12), start=region[12:24], title="Square")
+        assert len(page.panels) == 2
+        assert is_drawn(page)
 
 
 class TestFit:
     def test_log_axes_leave_zeros_out(self, trace: Trace) -> None:
-        figure = draw_fit(trace, tolerance=1e-2)
-        assert [ax.get_yscale() for ax in figure.axes] == ["log", "linear", "log", "linear"]
-        kinetic = np.asarray(figure.axes[2].lines[0].get_ydata())
-        assert np.isnan(kinetic[0])
-        assert (kinetic[1:] > 0).all()
-        assert is_drawn(figure)
+        page = draw_fit(trace, tolerance=1e-2)
+        assert {"1", "0.1", "0.01", "0.001", "tolerance"} < {*words(page)}
+        (ax, seen) = page.panels[2], pixels(page)
+        for step, kinetic in enumerate(trace.kinetic[1:], 2):  # that of the first step is 0
+            assert tuple(at(seen, ax.place(np.array([step, np.log10(kinetic)])))) == tuple(rgb(NETWORK).astype(int))
+        assert is_drawn(page)
 
     def test_rest_from_the_start(self) -> None:
         still, none = np.zeros(1), np.zeros(1, np.int64)
-        figure = draw_fit(Trace(still, still, still, still, still, none, none, True))
-        assert is_drawn(figure)
-        assert (figure.axes[3].get_yticks() % 1 == 0).all()
+        page = draw_fit(Trace(still, still, still, still, still, none, none, True))
+        assert is_drawn(page)
+        assert page.panels[3].limits[3] >= 1
+
+    @given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e6), st.integers(2, 9))
+    def test_ticks_are_round_few_and_within(self, low: float, size: float, most: int) -> None:
+        places = ticks(low, low + size, most)
+        assert 1 <= len(places) <= most
+        assert (places >= low - 1e-6 * size).all()
+        assert (places <= low + size * (1 + 1e-6)).all()
+        whole = ticks(low, low + size, most, whole=True)
+        assert (whole % 1 == 0).all()
+
+    @given(st.floats(-9, 9), st.floats(0.5, 12))
+    def test_ticks_of_a_logarithmic_axis_are_powers(self, low: float, size: float) -> None:
+        places = decades(10**low, 10 ** (low + size))
+        assert 1 <= len(places) <= 9
+        assert {f"{place:.6e}"[0] for place in places} <= {*"125"}
+        assert (np.diff(places) > 0).all()
 
 
 class TestGallery:
@@ -280,7 +367,6 @@ class TestGallery:
                 images=study["images"],
                 mask=study["mask"].astype(bool),
                 networks=networks,
-                labels=study["labels"],
                 points=PointSet.from_positions(ball.vertices),
                 cuberille=cube,
                 triangulated=cube.triangulated(),

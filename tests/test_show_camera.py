@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from test_show import box, round_mesh
-from tomomesh.show.camera import KEY_LIGHT, Camera, brightness, normals, painted
+from tomomesh.show.camera import KEY_LIGHT, Camera, brightness, normals
 
 BALL, CUBE = round_mesh(), box()
 cameras = st.builds(Camera, st.floats(-180, 180), st.floats(-89, 89))
@@ -43,35 +43,20 @@ class TestCamera:
         assert Camera(90, 0).project(np.array([1.0, 0, 0]))[2] == pytest.approx(1)
 
 
-class TestPainting:
-    @given(cameras)
-    def test_keeps_only_what_faces_the_viewer(self, camera: Camera) -> None:
-        mesh = trimesh.creation.icosphere(subdivisions=1)
-        order = painted(camera.project(np.asarray(mesh.triangles)))
-        toward = np.asarray(mesh.face_normals) @ camera.rotation[2]
-        assert set(order) >= set(np.flatnonzero(toward > 1e-9))
-        assert not set(order) & set(np.flatnonzero(toward < -1e-9))
-
-    @given(cameras)
-    def test_goes_from_back_to_front(self, camera: Camera) -> None:
-        seen = camera.project(np.asarray(trimesh.creation.torus(3, 1, 12, 8).triangles))
-        assert (np.diff(seen[painted(seen), :, 2].mean(axis=1)) >= 0).all()
-
-    def test_has_equal_fronts_and_backs(self) -> None:
-        seen = Camera().project(BALL.corners)
-        a, b = (seen[:, n, :2] - seen[:, 0, :2] for n in (1, 2))
-        signed = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-        front = painted(seen)
-        assert signed[front].sum() == pytest.approx(0.5 * np.abs(signed).sum())
-
+class TestLight:
     def test_normals_are_the_judges(self) -> None:
         judge = trimesh.Trimesh(BALL.vertices, BALL.faces, process=False)
-        np.testing.assert_allclose(normals(BALL.corners), judge.face_normals, atol=1e-12)
+        np.testing.assert_allclose(normals(BALL.vertices, BALL.faces), judge.face_normals, atol=1e-12)
         outward = CUBE.vertices[CUBE.quads].mean(axis=1) - 0.5
-        np.testing.assert_allclose(normals(CUBE.vertices[CUBE.quads]), 2 * outward)
+        np.testing.assert_allclose(normals(CUBE.vertices, CUBE.quads), 2 * outward)
 
-    def test_leaves_out_faces_without_area(self) -> None:
-        assert not len(painted(np.zeros((2, 3, 3))))
+    @pytest.mark.parametrize("size", [1e-150, 1e150])
+    def test_normals_of_any_size_are_those_of_size_one(self, size: float) -> None:
+        one, other = (normals(each * BALL.vertices, BALL.faces) for each in (1.0, size))
+        np.testing.assert_allclose(other, one, atol=1e-9)
+
+    def test_faces_without_area_have_no_normal(self) -> None:
+        np.testing.assert_array_equal(normals(np.zeros((3, 3)), np.array([[0, 1, 2]])), 0)
 
     def test_light_is_brightest_toward_the_lamp(self) -> None:
         light = brightness(BALL.vertex_normals)

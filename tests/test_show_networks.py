@@ -30,8 +30,9 @@ from tomomesh.som.snapshots import snapshots, thinned
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+    from tomomesh.show.drawing.page import Page
 
 EVERY = (*TOPOLOGIES, "graph")
 
@@ -44,9 +45,9 @@ def network_of(name: str, neurons: int = 20) -> Lattice:
     return lattice_of(np.stack([node, (node - 1) // 2], axis=1), neurons)
 
 
-def png(figure: Figure) -> bytes:
+def png(page: Page) -> bytes:
     file = io.BytesIO()
-    save(figure, file)
+    save(page, file)
     return file.getvalue()
 
 
@@ -56,9 +57,9 @@ def frames_of(gif: bytes) -> list[NDArray[np.uint8]]:
         return [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(picture)]
 
 
-def is_drawn(figure: Figure) -> bool:
+def is_drawn(page: Page) -> bool:
     """Whether ink is on paper, and none of it is cut off at the rim."""
-    with Image.open(io.BytesIO(png(figure))) as picture:
+    with Image.open(io.BytesIO(png(page))) as picture:
         seen = np.asarray(picture.convert("RGB"))
     rim = np.concatenate([seen[0], seen[-1], seen[:, 0], seen[:, -1]])
     return bool((rim == 255).all() and (seen < 200).any(axis=2).mean() > 0.002)
@@ -84,8 +85,8 @@ def networks_on(mask: NDArray[np.bool_], graph: Lattice) -> Networks:
     return Networks(graph, slices, books, gaps, False, count, 0 * count)
 
 
-def words_of(figure: Figure) -> list[str]:
-    return [text.get_text() for ax in figure.axes for text in ax.texts]
+def words_of(page: Page) -> list[str]:
+    return [word.text for word in page.words]
 
 
 class TestSnapshots:
@@ -172,11 +173,12 @@ class TestMaps:
         graph = network_of(name, 24)
         codebook = np.random.default_rng(0).random((len(graph), 2))
         labels = np.random.default_rng(1).integers(0, len(graph), len(inputs))
-        figure = draw_maps(codebook, graph, labels, unit="mm")
-        assert is_drawn(figure)
-        assert png(figure) == png(draw_maps(codebook, graph, labels, unit="mm"))
-        written = [int(text) for text in words_of(figure) if text.isdigit()]
-        assert sum(written) == len(inputs)
+        page = draw_maps(codebook, graph, labels, unit="mm")
+        assert is_drawn(page)
+        assert png(page) == png(draw_maps(codebook, graph, labels, unit="mm"))
+        held = page.panels[1].box
+        inside = [w.text for w in page.words if held[0] < w.x < held[2] and held[1] < w.y < held[3]]
+        assert sum(map(int, inside)) == len(inputs)
 
     @pytest.mark.parametrize("name", sorted({*EVERY} - {*SHEETS}))
     def test_are_refused_in_one_line(self, name: str) -> None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from matplotlib.collections import LineCollection
 from PIL import Image
 
 from tomomesh import Volume, reconstruct
@@ -20,22 +19,24 @@ from tomomesh.model.points import PointSet
 from tomomesh.settings import Settings
 from tomomesh.show import save
 from tomomesh.show.contact import scale_bar
+from tomomesh.show.drawing.page import canvas
+from tomomesh.show.drawing.style import INK, NETWORK, SIGNAL, rgb
 from tomomesh.show.maps import draw_maps
 from tomomesh.show.plane import PIXELS
 from tomomesh.show.space import MOST_LINED, draw_points, draw_surfaces
-from tomomesh.show.style import canvas
 from tomomesh.show.topologies import draw_adapted
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from tomomesh.show.drawing.page import Page
 
-def drawn(figure: Figure) -> NDArray[np.uint8]:
+
+def drawn(page: Page) -> NDArray[np.uint8]:
     file = io.BytesIO()
-    save(figure, file)
+    save(page, file)
     with Image.open(file) as picture:
         return np.asarray(picture.convert("RGB"))
 
@@ -52,19 +53,15 @@ def test_a_long_cloud_leaves_no_half_of_its_page_empty(axis: int) -> None:
 
 
 def test_the_scale_bar_lies_outside_of_the_slice() -> None:
-    figure, (ax,) = canvas(2.0, 2.4)
-    ax.imshow(np.ones((50, 50, 3)))
-    ax.set_axis_off()
+    page, (ax,) = canvas(2.0, 2.4)
     bounds = np.array([[0.0, 0.0], [50.0, 50.0]])
     PIXELS.crop(ax, bounds)
     scale_bar(ax, bounds, PIXELS)
-    figure.canvas.draw()
-    (bar,) = ax.lines
-    assert bar.get_window_extent().y0 > ax.get_window_extent().y1
-    shown = bar.get_transform().transform(bar.get_xydata())
-    left, right = ax.transData.transform([(0, 0), (10, 0)])[:, 0]
-    assert np.ptp(shown[:, 0]) == pytest.approx(right - left, abs=0.5)
-    assert "10 mm" in [text.get_text() for text in ax.texts]
+    rows, columns = np.nonzero((page.pixels == rgb(INK)).all(axis=2))
+    assert rows.max() < ax.box[1]
+    left, right = ax.place(np.array([[0, 0], [10, 0]]))[:, 0]
+    assert np.ptp(columns) + 1 == pytest.approx(right - left, abs=1)
+    assert "10 mm" in [word.text for word in page.words]
 
 
 def test_many_squares_are_drawn_without_lines() -> None:
@@ -90,24 +87,25 @@ def test_many_squares_are_drawn_without_lines() -> None:
 def test_panels_of_a_network_share_their_limits(dimensions: int) -> None:
     region = np.random.default_rng(0).random((200, dimensions))
     graph = lattice("grid", 12)
-    one, other = draw_adapted(region, region[:12], graph, start=3 * region[12:24]).axes
-    assert one.get_xlim() == other.get_xlim()
-    assert one.get_ylim() == other.get_ylim()
-    edges = one.collections[1]
-    assert isinstance(edges, LineCollection)
-    widths = np.asarray(edges.get_linewidth())
-    assert (np.ptp(widths) > 0) == (dimensions == 3)
+    page = draw_adapted(region, region[:12], graph, start=3 * region[12:24])
+    one, other = page.panels
+    np.testing.assert_array_equal(one.limits, other.limits)
+    shown = {tuple(color) for color in other.pixels.reshape(-1, 3)}
+    between = tuple(((rgb(SIGNAL) + rgb(NETWORK)) / 2).round())
+    near = [color for color in shown if np.abs(np.array(color) - between).max() < 12]
+    assert bool(near) == (dimensions == 3)
 
 
 def test_the_scale_of_a_u_matrix_begins_at_its_least_distance() -> None:
     graph = lattice("grid", 16)
-    figure = draw_maps(10 + graph.places + 0.1 * np.random.default_rng(0).random((16, 2)), graph, np.arange(16))
-    figure.canvas.draw()
-    distances, hits = (ax for ax in figure.axes if ax.get_label() == "<colorbar>")
-    assert distances.get_xlim()[0] > 0
-    assert hits.get_xlim()[0] == 0
-    first, second = (ax.get_window_extent() for ax in figure.axes[:2])
-    assert first.height == pytest.approx(second.height, rel=0.05)
+    page = draw_maps(10 + graph.places + 0.1 * np.random.default_rng(0).random((16, 2)), graph, np.arange(16))
+    first, second = page.panels
+    below = [word for word in page.words if word.y > first.box[3] and word.text[0].isdigit()]
+    distances, hits = ([float(w.text) for w in below if (w.x > second.box[0]) == of_hits] for of_hits in (False, True))
+    assert min(distances) > 0
+    assert min(hits) == 0
+    heights = [ax.box[3] - ax.box[1] for ax in (first, second)]
+    assert heights[0] == pytest.approx(heights[1], rel=0.05)
 
 
 def test_labels_by_themselves_are_drawn_as_chosen_others_and_background() -> None:
@@ -117,7 +115,9 @@ def test_labels_by_themselves_are_drawn_as_chosen_others_and_background() -> Non
     stage_one = found.segmentation
     assert stage_one is not None
     window = dict(pictures(stage_one, None, Settings().replace(select=(7,))))["04-window"]
-    assert set(np.unique(np.asarray(window.axes[0].images[0].get_array()))) == {0, 1, 2}
+    assert {*np.unique(window.panels[0].pixels)} == {0, 127, 128, 255} - {
+        127 if 128 in window.panels[0].pixels else 128
+    }
 
 
 def test_a_window_that_goes_on_is_told_of() -> None:

@@ -15,7 +15,6 @@ from .judgement import follow, require_one_wall
 from .measure.intersections import CrossingFaces
 from .measure.report import assess, compare
 from .measure.topology import check_promise
-from .printing.part import make_part
 from .remeshing.remesh import faces_under, remesh
 from .stage import Stage, folded, timed
 
@@ -167,6 +166,8 @@ def _print(made: Surface, settings: Settings, progress: Progress) -> Stage[Surfa
 
 @timed("print")
 def _make_part(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:
+    from .printing.part import make_part
+
     unit = "mm" if made.place is None else made.place.unit
     return Stage(replace(made, part=make_part(made.mesh, settings, unit=unit, progress=progress)))
 

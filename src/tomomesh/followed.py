@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from .kernels.threads import in_blocks
 from .measure.links import Links
@@ -161,7 +161,7 @@ def sides_of(mask: Mask) -> Floats:
     >>> sides_of(np.ones((1, 1, 1), bool)).tolist()
     [[0.0, 0.0, -0.5], [0.0, 0.0, 0.5], [0.0, -0.5, 0.0], [0.0, 0.5, 0.0], [-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]]
     """
-    found, box = [], (ndimage.find_objects(mask.view(np.uint8)) or [(slice(0, 0),) * 3])[0]
+    found, box = [], (scipy.ndimage.find_objects(mask.view(np.uint8)) or [(slice(0, 0),) * 3])[0]
     for axis in range(3):
         framed = np.pad(mask[box], [(int(n == axis),) * 2 for n in range(3)])
         places = np.argwhere(np.diff(framed, axis=axis)).astype(np.float64)

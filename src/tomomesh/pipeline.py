@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Any
 from .effect import without_effect
 from .finish import compare_with, finish
 from .model.points import PointSet
-from .printing.part import require_printing, turned
 from .progress import Progress, silent
 from .segmentation.study import select_study
 from .settings import Settings
 from .stage import Stage, folded
 from .ways import choose_way, way_of
 from .ways.choice import take_way
-from .ways.clouds.points import take_points
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -151,6 +149,9 @@ def reconstruct_points(
     >>> round(found.report["quality"]["volume_mm3"] / (4 / 3 * np.pi), 2)
     1.0
     """
+    from .printing.part import turned
+    from .ways.clouds.points import take_points
+
     settings = _settled(settings, changes)
     cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)
     taken = take_points(cloud, settings)
@@ -182,7 +183,10 @@ def _reconstructed(
 def _settled(settings: Settings | None, changes: dict[str, Any]) -> Settings:
     """Return the settings of a run; refuse those whose packages are not installed."""
     settings = (settings or Settings()).replace(**changes)
-    require_printing(settings)
+    if settings.printing.asked:
+        from .printing.part import require_printing
+
+        require_printing(settings)
     return settings
 
 

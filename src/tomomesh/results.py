@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from .model.columns import any_of
 from .model.mesh import QuadMesh
@@ -196,6 +196,6 @@ class Surface(Reported):
     @property
     def cap_faces(self) -> NDArray[np.bool_]:
         """Faces (m,) with a corner that is nearest to a cap: filled, not measured."""
-        _, nearest = cKDTree(self.points.positions).query(self.mesh.vertices)
+        _, nearest = scipy.spatial.cKDTree(self.points.positions).query(self.mesh.vertices)
         on_cap = self.points.kinds[nearest] == CAP
         return any_of(on_cap[self.mesh.faces])

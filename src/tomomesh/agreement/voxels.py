@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ..errors import GeometryError
 from ..measure.distance import spread_of
@@ -70,7 +70,7 @@ def distance_to_voxels(places: Floats, mask: Mask, volume: Volume, *, threads: i
     while len(left):
         near = np.zeros(sizes, np.uint8)
         near[tuple(blocks[left].T)] = 1
-        near = ndimage.maximum_filter(near, 2 * reach + 1, mode="constant")
+        near = scipy.ndimage.maximum_filter(near, 2 * reach + 1, mode="constant")
         for sides in sides_in_slabs(mask):
             part = sides.taking(near[tuple((sides.middles // BLOCK).clip(0).astype(np.int64).T)] > 0)
             off = np.maximum(sides.first - heights[left], heights[left] - sides.last)

@@ -16,21 +16,24 @@ if TYPE_CHECKING:
 FORMAT = "{desc} {bar:30} {n_fmt}/{total_fmt} {elapsed}"
 TICK = 1.0
 """Seconds from one look at the clock to the next: it counts in whole seconds."""
+EVERY = 10.0
+"""Seconds from one line of a stage to the next where there is no terminal: some hundred lines for a long run."""
 
 
 class Bars:
-    """Show one bar a stage on stderr where that is a terminal, and one line a finished stage where it is not."""
+    """Show one bar a stage on stderr where that is a terminal; else a line when it is done, and now and then before."""
 
     def __init__(self, *, quiet: bool = False) -> None:
         self._quiet = quiet
         self._drawn = sys.stderr.isatty()
         self._stage = ""
-        self._since = 0.0
+        self._since = self._said = 0.0
+        self._done = self._total = 0
         self._bar: tqdm[NoReturn] | None = None
         self._drawing, self._left = Lock(), Event()
 
     def __enter__(self) -> Bars:
-        if self._drawn and not self._quiet:
+        if not self._quiet:
             Thread(target=self._tick, daemon=True).start()
         return self
 
@@ -40,6 +43,7 @@ class Bars:
         self._left.set()
         with self._drawing:
             self._close()
+            self._total = self._done  # nothing more is said
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Report progress (see `tomomesh.progress`)."""
@@ -49,7 +53,7 @@ class Bars:
             self._show(stage, done, total)
 
     def _tick(self) -> None:
-        """Let the clock of the bar go on while a stage reports nothing.
+        """Let the clock go on while a stage reports nothing.
 
         Drawn without tqdm's own lock, which an interrupt in the midst of drawing would leave locked.
         """
@@ -57,17 +61,26 @@ class Bars:
             with self._drawing:
                 if self._bar is not None:
                     self._bar.refresh(nolock=True)
+                elif self._done < self._total and time.perf_counter() - self._said >= EVERY:
+                    self._say()
 
     def _show(self, stage: str, done: int, total: int) -> None:
         if stage != self._stage:
             self._close()
             self._stage, self._since = stage, time.perf_counter()
+            self._said = self._since
             self._bar = tqdm(total=total, desc=f"{stage:10s}", bar_format=FORMAT) if self._drawn else None
+        self._done, self._total = done, total
         if self._bar is not None:
             self._bar.total = total
             self._bar.update(done - self._bar.n)
         elif done == total:
-            print(f"{stage:10s} {total}/{total} {time.perf_counter() - self._since:.1f} s", file=sys.stderr)
+            self._say()
+
+    def _say(self) -> None:
+        self._said = time.perf_counter()
+        line = f"{self._stage:10s} {self._done}/{self._total} {self._said - self._since:.1f} s"
+        print(line, file=sys.stderr, flush=True)
 
     def _close(self) -> None:
         if self._bar is not None:

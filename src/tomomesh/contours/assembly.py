@@ -7,8 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from .endings import Ending, frustum, parabola
 
@@ -62,8 +61,8 @@ class Stack:
         ends = [(link.below + link.above)[:1] * len(link.below + link.above) for link in self.links]
         one = np.array([n for end in ends for n in end], np.int64)
         other = np.array([n for link in self.links for n in link.below + link.above], np.int64)
-        graph = coo_array((np.ones(len(one)), (one, other)), shape=(len(self.parts),) * 2)
-        return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+        graph = scipy.sparse.coo_array((np.ones(len(one)), (one, other)), shape=(len(self.parts),) * 2)
+        return np.asarray(scipy.sparse.csgraph.connected_components(graph, directed=False)[1], np.int64)
 
     @property
     def alone(self) -> list[Part]:

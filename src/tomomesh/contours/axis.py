@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ..measure.polygon import along, area, evenly
 from .direction import FEWEST, axes_across, some_of
@@ -93,12 +93,12 @@ def half_planes(positions: Floats) -> HalfPlanes | None:
     if not 6 * SLICES <= len(positions) <= MOST:
         return None
     middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
-    tree = cKDTree(positions - middle)
+    tree = scipy.spatial.cKDTree(positions - middle)
     drawn = some_of(tree.data)
     if len(drawn) < len(positions) and not _about_axis(drawn, tree)[1]:
         return None
     local = np.unique(tree.data, axis=0)
-    found, each = _about_axis(local, cKDTree(local))
+    found, each = _about_axis(local, scipy.spatial.cKDTree(local))
     if found is None:
         return None
     origin, axes, placed, spacing = found
@@ -111,7 +111,7 @@ def half_planes(positions: Floats) -> HalfPlanes | None:
 
 
 def _about_axis(
-    some: Floats, tree: cKDTree
+    some: Floats, tree: scipy.spatial.cKDTree
 ) -> tuple[tuple[Floats, Floats, Floats, float] | None, list[tuple[Floats, NDArray[np.int64], float]]]:
     """Return a place on the axis, directions across and along it, points by these, and their spacing; and the planes.
 
@@ -126,7 +126,7 @@ def _about_axis(
     return (*line, placed, spacing), [planes for planes in each if planes is not None]
 
 
-def _axis(some: Floats, tree: cKDTree) -> tuple[Floats, Floats] | None:
+def _axis(some: Floats, tree: scipy.spatial.cKDTree) -> tuple[Floats, Floats] | None:
     """Return a place on the line that the lines along most steps meet, and directions across and along it.
 
     None where they meet none, or one at infinity.

@@ -6,11 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
-from scipy.interpolate import CubicSpline
-from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
-from scipy.spatial import cKDTree
-from scipy.spatial.distance import pdist, squareform
+import scipy
 
 from ..measure.polygon import side_lengths
 
@@ -71,7 +67,7 @@ def redrawn(ring: Floats, distance: float) -> Floats:
     first = np.repeat(np.cumsum(pieces) - pieces, pieces)
     share = (np.arange(len(first)) - first) / np.repeat(pieces, pieces)
     place = np.repeat(knots[:-1], pieces) + share * np.repeat(np.diff(knots), pieces)
-    return np.asarray(CubicSpline(knots, closed, bc_type="periodic")(place))
+    return np.asarray(scipy.interpolate.CubicSpline(knots, closed, bc_type="periodic")(place))
 
 
 def fine_curve(ring: Floats, distance: float) -> Floats:
@@ -84,9 +80,10 @@ def fine_curve(ring: Floats, distance: float) -> Floats:
 
 def chord(curve: Floats) -> Floats:
     """Return points from one end of an open curve (p, 2) to the other, as far apart as its own."""
-    distance = np.asarray(cKDTree(curve).query(curve, k=[2])[0])
-    tree = minimum_spanning_tree(squareform(pdist(curve)))
-    ways = dijkstra(tree, directed=False)
+    distance = np.asarray(scipy.spatial.cKDTree(curve).query(curve, k=[2])[0])
+    between = scipy.spatial.distance.squareform(scipy.spatial.distance.pdist(curve))
+    tree = scipy.sparse.csgraph.minimum_spanning_tree(between)
+    ways = scipy.sparse.csgraph.dijkstra(tree, directed=False)
     first = int(np.argmax(ways[0]))
     last = int(np.argmax(ways[first]))
     way = curve[last] - curve[first]
@@ -201,7 +198,7 @@ def _distance(curves: Sequence[Floats], shape: tuple[int, ...]) -> Floats:
     column, row = np.rint(points).astype(np.int64).T
     holder = np.full(shape, -1, np.int64)
     holder[row[::-1], column[::-1]] = np.arange(len(points))[::-1]
-    y, x = ndimage.distance_transform_edt(holder < 0, return_distances=False, return_indices=True)
+    y, x = scipy.ndimage.distance_transform_edt(holder < 0, return_distances=False, return_indices=True)
     nearest = points[holder[y, x]]
     away = np.hypot(np.arange(shape[1]) - nearest[..., 0], np.arange(shape[0])[:, None] - nearest[..., 1])
     near = np.argwhere(away < NEAR)
@@ -211,7 +208,7 @@ def _distance(curves: Sequence[Floats], shape: tuple[int, ...]) -> Floats:
 
 def _to_sides(places: Floats, points: Floats, sides: Floats) -> Floats:
     """Measure how far places are from the two sides (2, p, 2) at the point that is nearest to each."""
-    _, nearest = cKDTree(points).query(places)
+    _, nearest = scipy.spatial.cKDTree(points).query(places)
     step, side = places - points[nearest], sides[:, nearest]
     share = (step * side).sum(axis=2) / np.maximum((side**2).sum(axis=2), 1e-300)
     on_side = np.clip(share, 0, 1)[..., None] * side

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,7 +41,7 @@ def rough_normal(local: Floats) -> tuple[Floats, float] | None:
     some = some_of(local)
     places = _places(some)
     wanted = min(max(PATCH * len(some) // len(local), 4), len(some))
-    radius = np.asarray(cKDTree(some).query(places, k=[wanted])[0])[:, 0]
+    radius = np.asarray(scipy.spatial.cKDTree(some).query(places, k=[wanted])[0])[:, 0]
     patches = [_around(local, place, r) for place, r in zip(places, radius, strict=True)]
     steps = np.concatenate([_steps(patch, INNER * r) for patch, r in zip(patches, radius, strict=True)])
     squared = (steps**2).sum(axis=1)
@@ -74,7 +74,7 @@ def _lots(local: Floats) -> Floats:
 def _places(some: Floats) -> Floats:
     """Return points all over a cloud: those nearest to places thrown into its box."""
     thrown = np.random.default_rng(0).uniform(-0.5, 0.5, (PATCHES, 3)) * np.array([np.ptp(column) for column in some.T])
-    return np.asarray(some[cKDTree(some).query(thrown)[1]])
+    return np.asarray(some[scipy.spatial.cKDTree(some).query(thrown)[1]])
 
 
 def _around(local: Floats, place: Floats, radius: float) -> Floats:
@@ -87,7 +87,7 @@ def _around(local: Floats, place: Floats, radius: float) -> Floats:
 def _steps(patch: Floats, radius: float) -> Floats:
     """Return the steps to the two neighbors of each point within a radius."""
     inner = patch[np.einsum("ij,ij->i", patch, patch) <= radius**2]
-    near = cKDTree(patch).query(inner, k=min(3, len(patch)))[1]
+    near = scipy.spatial.cKDTree(patch).query(inner, k=min(3, len(patch)))[1]
     return np.asarray((patch[near.reshape(len(inner), -1)[:, 1:]] - inner[:, None]).reshape(-1, 3))
 
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,8 +41,8 @@ def columns_of(low: Floats, high: Floats) -> NDArray[np.int64]:
         one.append(a + start)
         other.append(b)
     ends = np.concatenate(one), np.concatenate(other)
-    links = coo_array((np.ones(len(ends[0])), ends), shape=(len(low),) * 2)
-    count, found = connected_components(links, directed=False)
+    links = scipy.sparse.coo_array((np.ones(len(ends[0])), ends), shape=(len(low),) * 2)
+    count, found = scipy.sparse.csgraph.connected_components(links, directed=False)
     corner = np.full((count, 2), np.inf)
     np.minimum.at(corner, found, low)
     rank = np.empty(count, np.int64)

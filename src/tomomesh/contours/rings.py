@@ -15,9 +15,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import Delaunay, cKDTree
+import scipy
 
 from ..measure.polygon import area, inside
 
@@ -165,7 +163,7 @@ class _Web:
         frame = (low + high) / 2 + 3.0 * wide * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
         placed = np.concatenate([points, frame])
         stirred = np.random.default_rng(0).uniform(-STIRRED, STIRRED, points.shape) * (wide / len(points))
-        found = Delaunay(np.concatenate([points + stirred, frame]))
+        found = scipy.spatial.Delaunay(np.concatenate([points + stirred, frame]))
         corners = found.simplices.astype(np.int64)
         ends = np.stack([corners[:, [1, 2, 0]], corners[:, [2, 0, 1]]], axis=2)
         length = np.sqrt(((placed[ends[:, :, 0]] - placed[ends[:, :, 1]]) ** 2).sum(axis=2))
@@ -173,7 +171,7 @@ class _Web:
         outer = int(np.flatnonzero(framed)[0])
         beyond = np.where(found.neighbors < 0, outer, found.neighbors).astype(np.int64)
         longest = np.argmax(length, axis=1)[:, None] == np.arange(3)
-        local = np.asarray(cKDTree(placed).query(placed, k=[3])[0])[:, 0]
+        local = np.asarray(scipy.spatial.cKDTree(placed).query(placed, k=[3])[0])[:, 0]
         candidate = ~longest & ~_across(longest, ends, len(placed)) & (ends < len(points)).all(axis=2)
         return cls(len(points), ends, beyond, length, local[ends].min(axis=2), candidate, outer)
 
@@ -227,8 +225,8 @@ def _across(marked: NDArray[np.bool_], ends: NDArray[np.int64], count: int) -> N
 
 
 def _linked(one: NDArray[np.int64], other: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    links = sparse.coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
-    return np.asarray(connected_components(links, directed=False)[1], np.int64)
+    links = scipy.sparse.coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
+    return np.asarray(scipy.sparse.csgraph.connected_components(links, directed=False)[1], np.int64)
 
 
 def _chained(sides: NDArray[np.int64], part: NDArray[np.int64]) -> tuple[list[NDArray[np.int64]], list[int]]:

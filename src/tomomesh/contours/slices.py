@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy
 
 from .direction import FEWEST, axes_across, common_normal, rough_normal
 from .levels import columns_of, planes_within, typical_gap
@@ -146,7 +144,7 @@ def one_slice(positions: Floats, thickness: float) -> Slices | None:
     distinct = np.unique(local, axis=0)
     if np.ptp(height) > thickness or len(distinct) < FEWEST:
         return None
-    apart = float(np.median(cKDTree(distinct).query(distinct, k=[2])[0]))
+    apart = float(np.median(scipy.spatial.cKDTree(distinct).query(distinct, k=[2])[0]))
     alone = np.zeros(1, np.int64)
     return Slices(
         origin, axes_across(normal), np.array([height.mean()]), alone, np.zeros(len(positions), np.int64),
@@ -157,14 +155,14 @@ def one_slice(positions: Floats, thickness: float) -> Slices | None:
 def _joined(local: Floats, normal: Floats, spacing: float) -> tuple[NDArray[np.int64], float]:
     """Join points with near neighbors of their own height; return the contour of each, and the sampling distance."""
     height = local @ normal
-    away, near = map(np.asarray, cKDTree(local).query(local, k=min(NEIGHBORS + 1, len(local))))
+    away, near = map(np.asarray, scipy.spatial.cKDTree(local).query(local, k=min(NEIGHBORS + 1, len(local))))
     reach = away[:, 2]
     one = np.broadcast_to(np.arange(len(local))[:, None], near.shape)
     level = np.abs(height[near] - height[one]) <= PARTED * np.maximum(reach[near], reach[one]).clip(max=spacing)
     linked = level & (away <= LINKED * np.maximum(reach[near], reach[one]))
     ends = one[linked], near[linked]
-    links = coo_array((np.ones(len(ends[0])), ends), shape=(len(local),) * 2)
-    return connected_components(links, directed=False)[1].astype(np.int64), float(np.median(reach))
+    links = scipy.sparse.coo_array((np.ones(len(ends[0])), ends), shape=(len(local),) * 2)
+    return scipy.sparse.csgraph.connected_components(links, directed=False)[1].astype(np.int64), float(np.median(reach))
 
 
 def _planes(
@@ -203,13 +201,13 @@ def _are_stack(
 
 
 def _second_nearest(points: Floats) -> Floats:
-    return np.asarray(cKDTree(points).query(points, k=[3])[0])[:, 0]
+    return np.asarray(scipy.spatial.cKDTree(points).query(points, k=[3])[0])[:, 0]
 
 
 def _curves(planar: Sequence[Floats]) -> bool:
     """Tell whether points (n, 2) of some slices lie on curves rather than in areas."""
     around = [
-        cKDTree(points).query_ball_point(points, AROUND * _second_nearest(points), return_length=True)
+        scipy.spatial.cKDTree(points).query_ball_point(points, AROUND * _second_nearest(points), return_length=True)
         for points in planar
     ]
     return bool(np.mean(np.concatenate(around) > CROWD) < CROWDED)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ..errors import EmptyError, GeometryError
 from ..isosurface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
@@ -144,7 +144,7 @@ def contour_surface(
     rest = voxel_surface(edges, softer, threads=threads, progress=progress)
     centers = rest.mesh.corners.mean(axis=1)
     measured = _along(stack, slices) if slices.rings else points
-    away, _ = cKDTree(measured).query(centers, distance_upper_bound=MEASURED * stack.step)
+    away, _ = scipy.spatial.cKDTree(measured).query(centers, distance_upper_bound=MEASURED * stack.step)
     return ContourSurface(
         edges, rest, np.isinf(away), stack, slices_at(slices.heights, width_of(stack.parts)),
         sum(len(outlined.rings) for outlined in found),

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from ..measure.matching import SHARED, matched, similar
 from .endings import parabola, pole
@@ -72,7 +71,7 @@ def link_parts(
     list of Link
         Those below what begins, those between, those above what ends; by rising plane.
     """
-    near = _Neighbors(parts, _layers(parts, groups), pixel, complete, sparse)
+    near = _Neighbors(parts, _layers(parts, groups), pixel, complete, scipy.sparse)
     sought = _sought(near)
     pairs = [pair for key in sorted(sought) for pair in near.successors(*sought[key])]
     pairs += _branches(near, sought, pairs)
@@ -105,7 +104,7 @@ class _Neighbors:
     def __init__(
         self, parts: Sequence[Part], groups: list[list[list[int]]], pixel: float, complete: bool, sparse: bool
     ) -> None:
-        self.parts, self.groups, self.pixel, self.complete, self.sparse = parts, groups, pixel, complete, sparse
+        self.parts, self.groups, self.pixel, self.complete, self.sparse = parts, groups, pixel, complete, scipy.sparse
         self.place = {n: (g, k) for g, layers in enumerate(groups) for k, layer in enumerate(layers) for n in layer}
         self.on = {parts[layer[0]].plane: layer for layers in groups for layer in layers}
         self.known: dict[tuple[int, int], int] = {}
@@ -290,8 +289,8 @@ def _joined(pairs: Sequence[tuple[int, int]]) -> list[Link]:
     """Join pairs (below, above) of two planes to links."""
     names = sorted({n for pair in pairs for n in pair})
     one, other = np.searchsorted(names, np.array(pairs).T)
-    graph = sparse.coo_array((np.ones(len(pairs)), (one, other)), shape=(len(names),) * 2)
-    count, group = connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_array((np.ones(len(pairs)), (one, other)), shape=(len(names),) * 2)
+    count, group = scipy.sparse.csgraph.connected_components(graph, directed=False)
     below = {a for a, _ in pairs}
     sets = [[names[n] for n in np.flatnonzero(group == g)] for g in range(count)]
     return [Link(tuple(n for n in one if n in below), tuple(n for n in one if n not in below)) for one in sets]

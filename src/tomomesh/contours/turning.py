@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,7 +32,7 @@ def between_half_planes(found: HalfPlanes) -> Floats:
     """
     angles, curves = found.angles, found.curves
     turn = np.diff(angles, append=angles[0] + 2 * np.pi)
-    spline = CubicSpline(
+    spline = scipy.interpolate.CubicSpline(
         np.append(angles, angles[0] + 2 * np.pi), np.concatenate([curves, curves[:1]]), axis=0, bc_type="periodic"
     )
     wide = np.maximum(curves[..., 0], np.roll(curves[..., 0], -1, axis=0))
@@ -51,7 +51,7 @@ def _ranks(count: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count)
 
 
-def _at(spline: CubicSpline, angle: Floats, along: NDArray[np.int64]) -> Floats:
+def _at(spline: scipy.interpolate.CubicSpline, angle: Floats, along: NDArray[np.int64]) -> Floats:
     """Evaluate the polynomials of each angle (k,) at one place along the outlines each."""
     piece = np.clip(np.searchsorted(spline.x, angle, side="right") - 1, 0, len(spline.x) - 2)
     step = (angle - spline.x[piece])[:, None]

@@ -6,8 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
-from scipy.spatial import cKDTree
+import scipy
 
 from ..kernels.cuberille.cells import label_components
 from ..model.cubes import keys_of
@@ -67,7 +66,7 @@ def joint(shell: Shell, finer: int = 1) -> NDArray[np.int64] | None:
     buried = shell.buried(DEEP * finer)
     if len(buried) == 0:
         return None
-    beside = cKDTree(buried).query_ball_point(buried, BESIDE * finer, return_length=True)
+    beside = scipy.spatial.cKDTree(buried).query_ball_point(buried, BESIDE * finer, return_length=True)
     few = beside.max() < FEW * finer**2 and len(buried) < MANY * int(shell.blocks.count(shell.occupied).sum())
     return None if few else np.asarray(buried[beside.argmax()])
 
@@ -80,13 +79,13 @@ def neck(shell: Shell, places: NDArray[np.int64]) -> NDArray[np.int64] | None:
     """
     _, once = np.unique(places // EDGE, axis=0, return_index=True)
     solid = shell.blocks.cells(shell.solid)
-    tree = cKDTree(solid)
+    tree = scipy.spatial.cKDTree(solid)
     for place in places[once]:
         near = solid[tree.query_ball_point(place, EDGE, p=np.inf)] - place + EDGE
         window = np.zeros(3 * (2 * EDGE + 1,), np.bool_)
         window[tuple(near.T)] = True
-        eroded = ndimage.binary_erosion(window, iterations=DEEP, border_value=1)
-        if ndimage.label(eroded)[1] > ndimage.label(window)[1]:
+        eroded = scipy.ndimage.binary_erosion(window, iterations=DEEP, border_value=1)
+        if scipy.ndimage.label(eroded)[1] > scipy.ndimage.label(window)[1]:
             return np.asarray(place)
     return None
 
@@ -104,5 +103,5 @@ def _pieces(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     if len(large) < 2:
         return np.zeros(len(keys), np.int64)
     small = pieces < 0
-    pieces[small] = pieces[~small][cKDTree(cells[~small]).query(cells[small])[1]]
+    pieces[small] = pieces[~small][scipy.spatial.cKDTree(cells[~small]).query(cells[small])[1]]
     return pieces

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy
 
 from .low_pass import adjacency
 
@@ -41,7 +40,9 @@ def without_collapse(smoothed: TriMesh, fitted: TriMesh) -> tuple[TriMesh, int]:
     collapsed : int
         Components taken back to their smoothed shape.
     """
-    count, label = connected_components(adjacency(smoothed.edges, len(smoothed.vertices)), directed=False)
+    count, label = scipy.sparse.csgraph.connected_components(
+        adjacency(smoothed.edges, len(smoothed.vertices)), directed=False
+    )
     owner = label[smoothed.faces[:, 0]]
     before, after = (np.bincount(owner, mesh.face_volumes, count) for mesh in (smoothed, fitted))
     turned = before * after <= 0
@@ -49,7 +50,7 @@ def without_collapse(smoothed: TriMesh, fitted: TriMesh) -> tuple[TriMesh, int]:
     ends = smoothed.vertices[smoothed.edges]
     close = CLOSE * float(np.median(np.sqrt(((ends[:, 1] - ends[:, 0]) ** 2).sum(axis=1))))
     for _ in range(MOST):
-        meeting = np.unique(cKDTree(vertices).query_pairs(close, output_type="ndarray"))
+        meeting = np.unique(scipy.spatial.cKDTree(vertices).query_pairs(close, output_type="ndarray"))
         if len(meeting) == 0:
             break
         vertices[meeting] += BACK * (smoothed.vertices[meeting] - vertices[meeting])

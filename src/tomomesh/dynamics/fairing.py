@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from .low_pass import adjacency
 
@@ -62,7 +61,7 @@ def fair(mesh: TriMesh, length: float) -> Faired:
     """
     fixed = _on_borders(mesh)
     vertices = mesh.vertices + _moves(mesh, (length / np.pi) ** 2, ~fixed)
-    count, piece = connected_components(adjacency(mesh.edges, len(mesh.vertices)), directed=False)
+    count, piece = scipy.sparse.csgraph.connected_components(adjacency(mesh.edges, len(mesh.vertices)), directed=False)
     owner, closed = piece[mesh.faces[:, 0]], np.ones(count, bool)
     closed[piece[fixed]] = False
     wanted = np.bincount(owner, mesh.face_volumes, count)
@@ -106,7 +105,7 @@ def _not_zero(values: Complex) -> Complex:
     return np.where(values == 0, 1, values)
 
 
-def stiffness_of(mesh: TriMesh) -> sparse.csr_array[np.float64]:
+def stiffness_of(mesh: TriMesh) -> scipy.sparse.csr_array[np.float64]:
     """Return the stiffness (n, n) of linear elements: half the cotangents of the angles that face each edge."""
     corners, doubled = mesh.corners, 2 * np.maximum(mesh.face_areas, np.finfo(float).tiny)
     rows, columns, weights = [], [], []
@@ -117,9 +116,9 @@ def stiffness_of(mesh: TriMesh) -> sparse.csr_array[np.float64]:
         columns.append(mesh.faces[:, (n + 2) % 3])
     row, column, weight = (np.concatenate(part) for part in (rows, columns, weights))
     count = len(mesh.vertices)
-    half = sparse.coo_array((weight, (row, column)), shape=(count, count)).tocsr()
+    half = scipy.sparse.coo_array((weight, (row, column)), shape=(count, count)).tocsr()
     links = (half + half.T).tocsr()
-    stiff: sparse.csr_array[np.float64] = (sparse.diags_array(links.sum(axis=1)) - links).tocsr()
+    stiff: scipy.sparse.csr_array[np.float64] = (scipy.sparse.diags_array(links.sum(axis=1)) - links).tocsr()
     return stiff
 
 

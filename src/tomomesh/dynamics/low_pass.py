@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
+import scipy
 
 from ..kernels.dynamics.quads import quad_normals
 from ..kernels.dynamics.springs import average, list_neighbors
@@ -90,10 +90,10 @@ class OneRing:
         return normals
 
 
-def adjacency(edges: NDArray[np.int64], count: int) -> sparse.csr_array[np.float64]:
+def adjacency(edges: NDArray[np.int64], count: int) -> scipy.sparse.csr_array[np.float64]:
     """Return the symmetric (n, n) matrix with a 1 for every edge, its columns in rising order."""
     ends = np.concatenate([edges, edges[:, ::-1]])
-    matrix = sparse.coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count)).tocsr()
+    matrix = scipy.sparse.coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count)).tocsr()
     matrix.sort_indices()
     return matrix
 

@@ -9,9 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
+import scipy
 
 from .fairing import areas_of, stiffness_of
 from .low_pass import adjacency
@@ -44,7 +42,7 @@ def capped(mesh: TriMesh, free: NDArray[np.bool_]) -> NDArray[np.float64]:
     """
     links = adjacency(mesh.edges, len(free)).astype(np.float64)
     moving = _bordered(links, free)
-    system = sparse.csr_array(sparse.diags_array(links.sum(axis=1)) - links)
+    system = scipy.sparse.csr_array(scipy.sparse.diags_array(links.sum(axis=1)) - links)
     return _at_rest(system, mesh.vertices, moving)
 
 
@@ -67,26 +65,28 @@ def carried_on(mesh: TriMesh, free: NDArray[np.bool_]) -> NDArray[np.float64]:
     moving = _bordered(adjacency(mesh.edges, len(free)), free)
     for _ in range(PASSES if moving.any() else 0):
         stiff, areas = stiffness_of(mesh), np.maximum(areas_of(mesh), np.finfo(float).tiny)
-        plate = sparse.csr_array(stiff @ sparse.diags_array(1 / areas) @ stiff)
+        plate = scipy.sparse.csr_array(stiff @ scipy.sparse.diags_array(1 / areas) @ stiff)
         mesh = mesh.moved(_at_rest(plate, mesh.vertices, moving))
     return mesh.vertices
 
 
-def _bordered(links: sparse.csr_array[np.float64], free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _bordered(links: scipy.sparse.csr_array[np.float64], free: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Tell which free vertices (n,) lie in a piece that has others."""
-    _, piece = connected_components(links, directed=False)
+    _, piece = scipy.sparse.csgraph.connected_components(links, directed=False)
     held = np.bincount(piece, ~free) > 0
     return np.asarray(free & held[piece])
 
 
 def _at_rest(
-    system: sparse.csr_array[np.float64], vertices: NDArray[np.float64], moving: NDArray[np.bool_]
+    system: scipy.sparse.csr_array[np.float64], vertices: NDArray[np.float64], moving: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Return vertices (n, 3) of which the moving ones lie where a symmetric system (n, n) vanishes."""
     if not moving.any():
         return vertices
     free, fixed, rows = np.flatnonzero(moving), np.flatnonzero(~moving), system[moving]
     found = vertices.copy()
-    factors = splu(sparse.csc_array(rows[:, free]), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    factors = scipy.sparse.linalg.splu(
+        scipy.sparse.csc_array(rows[:, free]), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+    )
     found[free] = factors.solve(np.asarray(-(rows[:, fixed] @ vertices[fixed])))
     return found

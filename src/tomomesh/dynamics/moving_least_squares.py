@@ -202,8 +202,9 @@ class _ProjectionSteps:
         if last and lost.any():
             state.projections[lost, 1:] = self.ring.normals(state.places)[lost]
             state.anchors[lost] = np.inf
-        stale = EXACT if last else STALE
-        self.projector.renew(state.places, stale * self.edge, state.projections, state.anchors)
+        through = last and self.projector.exact
+        stale = 0.0 if through else EXACT if last else STALE
+        self.projector.renew(state.places, stale * self.edge, state.projections, state.anchors, through=through)
 
     def _motion(self, sums: Floats) -> Motion:
         speed, acceleration = sums[:, :2].max(axis=0) / self.edge
@@ -219,6 +220,7 @@ class _Projector:
     samples: Floats
     index: Index
     nearest: NDArray[np.int32]
+    exact: bool
     threads: int
 
     @classmethod
@@ -236,7 +238,7 @@ class _Projector:
             index = Index.of(rows[:, :3], index.frame[3])
             rows = np.ascontiguousarray(rows[index.order])
         near = np.empty(len(vertices), np.int32)
-        projector = cls(rows, index, near, threads)
+        projector = cls(rows, index, near, samples.exact > 0, threads)
         projector.run(lambda a, b: nearest_places(vertices, rows, *index.cells, near, a, b))
         return projector
 
@@ -246,10 +248,10 @@ class _Projector:
         self.run(lambda a, b: first_projections(places, normals, self.nearest, *seen, found, anchors, a, b))
         return found, anchors
 
-    def renew(self, places: Floats, stale: float, projections: Floats, anchors: Floats) -> None:
+    def renew(self, places: Floats, stale: float, projections: Floats, anchors: Floats, *, through: bool) -> None:
         """Project those vertices anew that have moved some way from where they last were projected."""
-        seen = self.samples, *self.index.cells
-        self.run(lambda a, b: renew_projections(places, self.nearest, *seen, stale, projections, anchors, a, b))
+        how = *self.index.cells, stale, through
+        self.run(lambda a, b: renew_projections(places, self.nearest, self.samples, *how, projections, anchors, a, b))
 
     def run(self, work: Callable[[int, int], None]) -> None:
         """Do something with all vertices, range by range."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import find_objects
+import scipy
 
 from ..kernels.isosurface.columns import distances_in_slices, shares_inside
 from ..kernels.threads import in_blocks
@@ -46,7 +46,7 @@ def averages_of(mask: Mask, threads: int = 0) -> Values:
 
 def _around(mask: Mask) -> tuple[slice, ...]:
     """Return the box of what is inside, and `MARGIN` voxels around it."""
-    box = (find_objects(mask.view(np.uint8)) or [(slice(0, 0),) * 3])[0]
+    box = (scipy.ndimage.find_objects(mask.view(np.uint8)) or [(slice(0, 0),) * 3])[0]
     return tuple(slice(max(side.start - MARGIN, 0), side.stop + MARGIN) for side in box)
 
 

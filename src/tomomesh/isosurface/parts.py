@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+import scipy
 
 from ..kernels.isosurface.columns import move_within_columns, ranges_around
 from ..kernels.threads import in_blocks
@@ -99,6 +99,6 @@ def _weights(times: int) -> Values:
     """Return how much of each of the slices around a voxel is in each of its parts, (n, 2 BESIDE + 1)."""
     slices = 2 * BESIDE + 1
     sums = np.concatenate([np.zeros((1, slices)), np.tril(np.ones((slices, slices)))])
-    spline = make_interp_spline(np.arange(slices + 1), sums)
+    spline = scipy.interpolate.make_interp_spline(np.arange(slices + 1), sums)
     weights = times * np.diff(spline(BESIDE + np.arange(times + 1) / times), axis=0)
     return np.asarray((weights + weights[::-1, ::-1]) / 2, np.float32)

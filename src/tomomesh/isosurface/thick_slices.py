@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from .averages import beside_border
 from .content import content_of
@@ -171,11 +171,11 @@ def _mixed(mask: Mask, content: Content, times: int) -> Mask:
     mixed = content.mixed(times)
     if not mixed.any():
         return mixed
-    mixed &= ~ndimage.binary_opening(mixed, AROUND)
+    mixed &= ~scipy.ndimage.binary_opening(mixed, AROUND)
     left_out = content.bounds.kept(content.whole) & ~mask
     if left_out.any():
-        mixed &= ~ndimage.binary_dilation(left_out, AROUND)
-    pieces, count = ndimage.label(mask | mixed, AROUND)
+        mixed &= ~scipy.ndimage.binary_dilation(left_out, AROUND)
+    pieces, count = scipy.ndimage.label(mask | mixed, AROUND)
     kept = np.zeros(count + 1, np.bool_)
     kept[pieces[mask]] = True
     return np.asarray(mixed & kept[pieces])

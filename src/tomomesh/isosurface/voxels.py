@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ..kernels.cuberille.cells import label_components
 from ..model.mesh import QuadMesh
@@ -137,7 +137,7 @@ def boundary(
 
 def _framed(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
     """Return the box of a mask with one layer of background around it, and its lowest voxel (x, y, z)."""
-    box = ndimage.find_objects(mask.view(np.uint8))[0]
+    box = scipy.ndimage.find_objects(mask.view(np.uint8))[0]
     return np.pad(mask[box], 1), np.array([side.start - 1 for side in box[::-1]], np.int32)
 
 

@@ -1,56 +1,51 @@
-"""The one place that names Numba's options, and that keeps its cache in order."""
+"""Kernels: functions that run as machine code from their first call on."""
 
 from __future__ import annotations
 
-import shutil
-import warnings
+import os
 from collections.abc import Callable
-from hashlib import sha256
-from pathlib import Path
-from typing import Any, TypeVar
+from functools import update_wrapper
+from typing import Any, TypeVar, cast
 
-import numba
-import platformdirs
-from numba.core import config
+Function = TypeVar("Function", bound=Callable[..., Any])
 
-Kernel = TypeVar("Kernel", bound=Callable[..., Any])
-
-SOURCES = sha256(b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py")))).hexdigest()[:12]
-"""What the kernels are: Numba looks at a kernel's own file only, not at the kernels that it calls."""
-CACHE = Path(platformdirs.user_cache_dir("tomomesh")) / f"kernels-numba-{numba.__version__}-{SOURCES}"
+COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
+"""Whether kernels run as machine code; else they are plain Python."""
 
 
-def kernel(signature: str) -> Callable[[Kernel], Kernel]:
-    """Compile a function for one signature, without the interpreter's lock and from a private cache.
+class Kernel:
+    """A function of one signature that is brought into the process as machine code when it is first called.
 
-    A broken cache is deleted and written anew; where none can be written the kernel is compiled every time.
+    Its arguments are checked: arrays of the very type and order, or a TypeError is raised.
     """
 
-    def compile_once(function: Kernel) -> Kernel:
-        try:
-            return _cached(signature, function)
-        except Exception:  # numba and pickle let anything through when a cache file is broken or unwritable
-            shutil.rmtree(CACHE, ignore_errors=True)
-        try:
-            return _cached(signature, function)
-        except Exception:  # still no usable cache: a real fault in the function is raised below
-            return _compiled(signature, function, cache=False)
+    def __init__(self, signature: str, function: Callable[..., Any]) -> None:
+        update_wrapper(self, function)
+        self.function, self.signature = function, signature
+        self.call: Callable[..., Any] = self._first_call
 
-    return compile_once
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the machine code."""
+        return self.call(*arguments)
+
+    def _first_call(self, *arguments: Any) -> Any:
+        from .native.load import loaded
+
+        self.call = loaded(self)
+        return self.call(*arguments)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What Numba asks of a global that it does not know, when it compiles a kernel that calls this one."""
+        from .native.compiler import inner
+
+        return inner(self)._numba_type_
 
 
-def _cached(signature: str, function: Kernel) -> Kernel:
-    """Compile with our own cache directory, and give the caller's setting back afterwards."""
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(CACHE)
-    try:
-        return _compiled(signature, function, cache=True)
-    finally:
-        config.CACHE_DIR = before
+def kernel(signature: str) -> Callable[[Function], Function]:
+    """Say that a function is a kernel: compiled for one signature, called without the interpreter's lock."""
 
+    def declare(function: Function) -> Function:
+        return cast("Function", Kernel(signature, function)) if COMPILED else function
 
-def _compiled(signature: str, function: Kernel, *, cache: bool) -> Kernel:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", numba.NumbaWarning)
-        compiled: Kernel = numba.njit(signature, cache=cache, nogil=True, error_model="numpy")(function)
-    return compiled
+    return declare

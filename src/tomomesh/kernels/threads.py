@@ -74,6 +74,11 @@ def _in_pool(
             if failure is not None:
                 raise failure
             done(min(finished * block, total))
+    except KeyboardInterrupt:
+        from .native.workers import stop_waiting
+
+        stop_waiting()
+        raise
     finally:
         waiting.clear()
         wait(at_work)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from .polygon import area, side_lengths
 
@@ -104,7 +104,7 @@ def _crossing(start: Floats, stop: Floats) -> NDArray[np.int64]:
     Segments cross only where their middles are at most as far apart as the longest is long.
     """
     longest = float(np.sqrt(((stop - start) ** 2).sum(axis=1)).max(initial=0.0))
-    pairs = cKDTree((start + stop) / 2).query_pairs(longest, output_type="ndarray").astype(np.int64)
+    pairs = scipy.spatial.cKDTree((start + stop) / 2).query_pairs(longest, output_type="ndarray").astype(np.int64)
     a, b, c, d = start[pairs[:, 0]], stop[pairs[:, 0]], start[pairs[:, 1]], stop[pairs[:, 1]]
     parted = _turn(a, b, c) * _turn(a, b, d) < 0
     parted &= _turn(c, d, a) * _turn(c, d, b) < 0

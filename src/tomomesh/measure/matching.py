@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,5 +45,5 @@ def matched(cost: NDArray[np.float64], allowed: NDArray[np.bool_], alone: float 
         By rows.
     """
     alone = 1.0 + float(cost[allowed].sum()) if alone is None else alone
-    pairs = zip(*linear_sum_assignment(np.where(allowed, cost, alone)), strict=True)
+    pairs = zip(*scipy.optimize.linear_sum_assignment(np.where(allowed, cost, alone)), strict=True)
     return [(int(a), int(b)) for a, b in pairs if allowed[a, b]]

@@ -10,9 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy
 
 from ..kernels.pointcloud.linear_algebra import tangents
 from ..kernels.pointcloud.sheet import DIRECTIONS, find_depths, find_disks, flatten
@@ -170,9 +168,11 @@ def _ways(rows: Floats, beyond: NDArray[np.int64]) -> tuple[NDArray[np.int64], F
 
 def _sorted_out(found: Borders, at: NDArray[np.int64], rough: Floats) -> Borders:
     """Tell the borders apart, and leave out those of a few samples or of rough ones; at (d,) is each disk's sample."""
-    pairs = cKDTree(found.middles).query_pairs(LINK * float(np.median(found.radii)), output_type="ndarray")
-    links = sparse.coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(at), len(at)))
-    count, label = connected_components(links, directed=False)
+    pairs = scipy.spatial.cKDTree(found.middles).query_pairs(
+        LINK * float(np.median(found.radii)), output_type="ndarray"
+    )
+    links = scipy.sparse.coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(at), len(at)))
+    count, label = scipy.sparse.csgraph.connected_components(links, directed=False)
     own, first = np.unique(at, return_index=True)
     label = label.astype(np.int64)
     many = np.bincount(label[first], minlength=count) >= LEAST
@@ -185,6 +185,6 @@ def _levelled(samples: Samples, found: Borders, normals: Floats) -> Samples:
     """Give the samples near a border other normals, (p, 3)."""
     if not found.count:
         return samples
-    away = np.asarray(cKDTree(found.middles).query(samples.positions)[0])
+    away = np.asarray(scipy.spatial.cKDTree(found.middles).query(samples.positions)[0])
     near = away < NEAR * float(np.median(found.radii))
     return replace(samples, normals=np.where(near[:, None], normals, samples.normals))

@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy
 
 from ..dynamics.low_pass import OneRing
 from ..pointcloud.search import Index
@@ -97,7 +95,7 @@ def one_side(
         None where the two sides of a sheet are one piece.
     """
     count = len(samples.positions)
-    near = np.asarray(cKDTree(np.concatenate([samples.positions, apron])).query(vertices)[1])
+    near = np.asarray(scipy.spatial.cKDTree(np.concatenate([samples.positions, apron])).query(vertices)[1])
     cut = np.append(np.zeros(count, bool), tips)[near]
     quads = np.asarray(~cut[ring.quads].any(axis=1))
     pieces = _pieces(ring.quads[quads], len(vertices))
@@ -122,8 +120,8 @@ def _side(ring: OneRing, quads: Marks, vertices: Marks) -> Side:
 def _pieces(quads: NDArray[np.int32], count: int) -> Integers:
     """Return the connected piece of each vertex, (n,), the largest first; -1 for crumbs."""
     pairs = quads[:, [0, 1, 1, 2, 2, 3]].reshape(-1, 2)
-    links = sparse.coo_array((np.ones(len(pairs), bool), pairs.T), shape=(count, count))
-    total, label = connected_components(links, directed=False)
+    links = scipy.sparse.coo_array((np.ones(len(pairs), bool), pairs.T), shape=(count, count))
+    total, label = scipy.sparse.csgraph.connected_components(links, directed=False)
     size = np.bincount(label[quads[:, 0]], minlength=total)
     rank = np.empty(total, np.int64)
     rank[np.argsort(-size, kind="stable")] = np.arange(total)
@@ -152,7 +150,9 @@ def _kept(pieces: Integers, plots: Integers, facing: Marks, outer: Marks) -> lis
     """
     shape = (len(outer), int(plots.max()) + 1)
     behind, before = (
-        sparse.coo_array((np.ones(int(way.sum()), np.int64), (pieces[way], plots[way])), shape=shape).tocsr().sign()
+        scipy.sparse.coo_array((np.ones(int(way.sum()), np.int64), (pieces[way], plots[way])), shape=shape)
+        .tocsr()
+        .sign()
         for way in (~facing, facing)
     )
     over = (behind + before).sign()

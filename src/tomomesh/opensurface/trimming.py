@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from ..model.mesh import TriMesh
 
@@ -121,7 +120,7 @@ def _pinched(faces: Integers, count: int) -> NDArray[np.bool_]:
 def _large(faces: Integers, count: int) -> NDArray[np.bool_]:
     """Tell which faces (m,) belong to no crumb."""
     pairs = faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    links = sparse.coo_array((np.ones(len(pairs), bool), pairs.T), shape=(count, count))
-    _, label = connected_components(links, directed=False)
+    links = scipy.sparse.coo_array((np.ones(len(pairs), bool), pairs.T), shape=(count, count))
+    _, label = scipy.sparse.csgraph.connected_components(links, directed=False)
     piece = label[faces[:, 0]]
     return np.asarray(np.bincount(piece)[piece] >= LEAST_SCRAP * len(faces))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ..model.points import COLORS
 
@@ -45,7 +45,7 @@ def carry(points: PointSet, vertices: NDArray[np.float64]) -> dict[str, NDArray[
         return {}
     # in lexicographic order: neither the tree nor a sum can depend on the order of the points
     positions, owner = np.unique(points.positions + 0.0, axis=0, return_inverse=True)
-    found = cKDTree(positions).query(vertices, k=list(range(1, min(NEAREST, len(positions)) + 1)))
+    found = scipy.spatial.cKDTree(positions).query(vertices, k=list(range(1, min(NEAREST, len(positions)) + 1)))
     distance, near = (np.asarray(one) for one in found)
     weights = np.divide(distance[:, :1], distance, out=np.ones_like(distance), where=distance > 0)
     carried: dict[str, NDArray[Any]] = {}

@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy
 
 from ..cuberille.closing import shell_around
 from ..cuberille.faces import exposed_faces
@@ -100,14 +98,14 @@ def fill_inside(
     shell = shell_around(found.inside, cells, threads=threads)
     faces = exposed_faces(shell)
     test = LeakTest(shell, faces, faces.least_two_sided)
-    away = cKDTree(found.lowest + edge * (faces.cells + 0.5)).query(samples.positions)[0]
+    away = scipy.spatial.cKDTree(found.lowest + edge * (faces.cells + 0.5)).query(samples.positions)[0]
     met = float((away <= 2 * edge + samples.spacing).mean())
     return Filling(edge, found.lowest, test, len(cells), met, samples.positions[found.doubtful])
 
 
 def made_up(places: Floats, samples: Samples, edge: float, reach: float = REACH) -> NDArray[np.bool_]:
     """Tell which places (n, 3) of a surface lie where there are no samples, for cubes of an edge."""
-    away, near = cKDTree(samples.positions).query(places)
+    away, near = scipy.spatial.cKDTree(samples.positions).query(places)
     return np.asarray(away > reach * np.maximum(samples.spacing[near], edge))
 
 
@@ -115,8 +113,8 @@ def holes(mesh: TriMesh, samples: Samples, edge: float) -> NDArray[np.bool_]:
     """Tell which vertices (n,) lie in a hole that is made up, out to its border."""
     beside = made_up(mesh.vertices, samples, edge, BORDER)
     a, b = mesh.edges[beside[mesh.edges].all(axis=1)].T
-    links = sparse.coo_array((np.ones(len(a), bool), (a, b)), shape=(len(beside), len(beside)))
-    count, piece = connected_components(links, directed=False)
+    links = scipy.sparse.coo_array((np.ones(len(a), bool), (a, b)), shape=(len(beside), len(beside)))
+    count, piece = scipy.sparse.csgraph.connected_components(links, directed=False)
     wide = np.bincount(piece, made_up(mesh.vertices, samples, edge), count) > 0
     return np.asarray(beside & wide[piece])
 
@@ -126,5 +124,5 @@ def _of_shell(samples: Samples, leaky: LeakTest, lowest: Floats, edges: Floats) 
     faces = leaky.faces
     corners = (lowest + faces.corners * edges)[faces.quads]
     ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    near = cKDTree(corners.mean(axis=1)).query(samples.positions, k=list(range(1, NEIGHBORS + 1)))[1]
+    near = scipy.spatial.cKDTree(corners.mean(axis=1)).query(samples.positions, k=list(range(1, NEIGHBORS + 1)))[1]
     return np.asarray(ways[near].sum(axis=1))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import fft
+import scipy
 
 from ..progress import Progress, silent
 
@@ -120,7 +120,7 @@ class _Lattice:
     @classmethod
     def over(cls, positions: Floats, cell: float, threads: int) -> _Lattice:
         low, extent = positions.min(axis=0), np.ptp(positions, axis=0)
-        x, y, z = (fft.next_fast_len(int(np.ceil(side / cell)) + 2 * MARGIN, real=True) for side in extent)
+        x, y, z = (scipy.fft.next_fast_len(int(np.ceil(side / cell)) + 2 * MARGIN, real=True) for side in extent)
         shape = (x, y, z)
         lowest = low + 0.5 * (extent - np.array(shape) * cell)
         place = (positions - lowest) / cell - 0.5
@@ -129,8 +129,8 @@ class _Lattice:
         weights = np.stack([np.where(corner, share, 1 - share).prod(axis=1) for corner in CORNERS], axis=1)
         steps = np.array([y * z, z, 1])
         nodes = (cube @ steps)[:, None] + CORNERS @ steps
-        first, second = (2 * np.pi * fft.fftfreq(count, cell) for count in (x, y))
-        third = 2 * np.pi * fft.rfftfreq(z, cell)
+        first, second = (2 * np.pi * scipy.fft.fftfreq(count, cell) for count in (x, y))
+        third = 2 * np.pi * scipy.fft.rfftfreq(z, cell)
         waves = first[:, None, None], second[:, None], third
         return cls(lowest, shape, cell, nodes, weights, waves, threads)
 
@@ -148,7 +148,7 @@ class _Lattice:
 
     def values(self, transform: NDArray[np.complex128]) -> Floats:
         """Return the values in the middles of all cubes."""
-        return np.asarray(fft.irfftn(transform, self.shape, workers=self._workers))
+        return np.asarray(scipy.fft.irfftn(transform, self.shape, workers=self._workers))
 
     def at(self, values: Floats) -> Floats:
         """Interpolate values at the samples, (p,)."""
@@ -156,7 +156,7 @@ class _Lattice:
 
     def _transformed(self, column: Floats) -> NDArray[np.complex128]:
         shares = np.bincount(self.nodes.ravel(), (self.weights * column[:, None]).ravel(), int(np.prod(self.shape)))
-        return np.asarray(fft.rfftn(shares.reshape(self.shape) / self.cell**3, workers=self._workers))
+        return np.asarray(scipy.fft.rfftn(shares.reshape(self.shape) / self.cell**3, workers=self._workers))
 
     @property
     def _workers(self) -> int:

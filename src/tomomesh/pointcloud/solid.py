@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
-from scipy.spatial import cKDTree
+import scipy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,7 +37,7 @@ def fills_solid(positions: Floats) -> bool:
     if count < FEWEST:
         return False
     some = positions[np.lexsort(positions.T)][:: max(len(positions) // LOOKED_AT, 1)]
-    around = positions[np.asarray(cKDTree(positions).query(some, k=count)[1])]
+    around = positions[np.asarray(scipy.spatial.cKDTree(positions).query(some, k=count)[1])]
     centered = around - around.mean(axis=1, keepdims=True)
     spread = np.linalg.eigvalsh(np.einsum("aij,aik->ajk", centered, centered))
     total = spread.sum(axis=1)
@@ -47,7 +46,7 @@ def fills_solid(positions: Floats) -> bool:
 
 def distance_within(positions: Floats) -> float:
     """Return how far apart points in a solid are: each owns the cube of that, and k of them fill the ball around k."""
-    away = np.asarray(cKDTree(positions).query(positions, k=[NEIGHBORS + 1])[0])
+    away = np.asarray(scipy.spatial.cKDTree(positions).query(positions, k=[NEIGHBORS + 1])[0])
     return float(np.median(away) * np.cbrt(4 / 3 * np.pi / NEIGHBORS))
 
 
@@ -78,6 +77,6 @@ def depths(positions: Floats, apart: float, edge: float) -> tuple[NDArray[np.flo
     shape = tuple((voxel.max(axis=0) + margin + 1)[::-1].tolist())
     there = np.ones(shape, np.bool_)
     there[voxel[:, 2], voxel[:, 1], voxel[:, 0]] = False
-    closed = distance_transform_edt(there, sampling=edge) < CLOSED * apart
-    deep = distance_transform_edt(closed, sampling=edge) - edge / 2
+    closed = scipy.ndimage.distance_transform_edt(there, sampling=edge) < CLOSED * apart
+    deep = scipy.ndimage.distance_transform_edt(closed, sampling=edge) - edge / 2
     return (deep - (CLOSED - 0.5) * apart).astype(np.float32), low

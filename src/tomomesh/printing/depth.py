@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ..errors import ResourceError
 from ..isosurface.voxels import boundary, voxel_surface
@@ -107,10 +107,10 @@ def deep_inside(depth: Depth, mesh: TriMesh, wall: float, least: float) -> NDArr
     Two neighbors, both farther from the surface than half of their distance, lie on the same side of it. So one node
     tells for all that hang together, by how often the mesh goes around it.
     """
-    pieces, count = ndimage.label(depth.values > wall)
+    pieces, count = scipy.ndimage.label(depth.values > wall)
     sizes = np.bincount(pieces.ravel(), minlength=count + 1)
     taken = np.zeros(count + 1, np.bool_)
-    boxes = ndimage.find_objects(pieces)
+    boxes = scipy.ndimage.find_objects(pieces)
     for piece in np.flatnonzero(sizes[1:] * depth.step**3 >= least) + 1:
         where = boxes[piece - 1]
         own = np.where(pieces[where] == piece, depth.values[where], -1)

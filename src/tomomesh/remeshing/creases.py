@@ -5,9 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy
 
 from ..kernels.remeshing.links import CREASE, FIXED, FREE, KEPT
 from ..kernels.remeshing.surface import find_sharp
@@ -74,7 +72,7 @@ def _doubled(mesh: TriMesh, starts: NDArray[np.int64], ends: NDArray[np.int64], 
     ways = mesh.vertices[ends] - mesh.vertices[starts]
     ways /= np.maximum(np.sqrt((ways**2).sum(axis=1)), 1e-300)[:, None]
     middles = 0.5 * (mesh.vertices[ends] + mesh.vertices[starts])
-    one, other = cKDTree(middles).query_pairs(near, output_type="ndarray").T
+    one, other = scipy.spatial.cKDTree(middles).query_pairs(near, output_type="ndarray").T
     apart = middles[other] - middles[one]
     along = np.abs(np.einsum("ij,ij->i", apart, ways[one]))
     beside = along < 0.5 * np.sqrt((apart**2).sum(axis=1))
@@ -87,8 +85,8 @@ def _doubled(mesh: TriMesh, starts: NDArray[np.int64], ends: NDArray[np.int64], 
 def _lengths(mesh: TriMesh, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the length of the crease that each sharp edge (e,) belongs to."""
     one, other, _ = _passed(mesh, starts, ends)
-    joined = coo_array((np.ones(len(one), np.int8), (one, other)), shape=(len(starts), len(starts)))
-    count, crease = connected_components(joined, directed=False)
+    joined = scipy.sparse.coo_array((np.ones(len(one), np.int8), (one, other)), shape=(len(starts), len(starts)))
+    count, crease = scipy.sparse.csgraph.connected_components(joined, directed=False)
     steps = mesh.vertices[ends] - mesh.vertices[starts]
     lengths = np.sqrt((steps**2).sum(axis=1))
     return np.asarray(np.bincount(crease, lengths, count)[crease])

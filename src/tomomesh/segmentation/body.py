@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ..isosurface.runs import Runs
 from .window import PRESETS_HU
@@ -99,7 +99,7 @@ def _holders(volume: Volume, body: NDArray[np.bool_]) -> NDArray[np.bool_]:
     runs.fill(foreign, runs.sizes * np.prod(spacing) <= 4 / 3 * np.pi * THICK**3, False)
     if foreign.any():
         reach = max(float(spacing.min()), min(RIM, RIM_VOXELS * min(volume.spacing_mm)))
-        foreign = ndimage.distance_transform_edt(~foreign, spacing) <= reach
+        foreign = scipy.ndimage.distance_transform_edt(~foreign, spacing) <= reach
     return _fine(foreign, every, volume.shape)
 
 
@@ -148,7 +148,7 @@ def without_specks(mask: NDArray[np.bool_]) -> Cleaned:
     mask : (K, J, I) bool array
         One voxel at least.
     """
-    box = ndimage.find_objects(mask.view(np.uint8))[0]
+    box = scipy.ndimage.find_objects(mask.view(np.uint8))[0]
     pieces, holes = Runs.of(mask[box], corners=True), Runs.of(mask[box], value=False)
     sizes, room = pieces.sizes, holes.sizes
     limit = min(float(SPECK), SMALL * float(sizes.max()))
@@ -179,15 +179,15 @@ def solid(body: NDArray[np.bool_], volume: Volume) -> NDArray[np.bool_]:
     coarse = body[tuple(slice(None, None, step) for step in every)]
     if not coarse.any():
         return body
-    radius = _radius(ndimage.distance_transform_edt(coarse, spacing))
+    radius = _radius(scipy.ndimage.distance_transform_edt(coarse, spacing))
     pads = [(int(2 * radius / edge) + 2,) * 2 for edge in spacing]
     along = int(np.argmax(np.abs(volume.affine[2, 2::-1])))
     pads[along] = (0, 0)
     air = np.pad(~coarse, pads, constant_values=True)
-    wide, _ = ndimage.label(ndimage.distance_transform_edt(air, spacing) > radius)
-    apart = ndimage.distance_transform_edt(wide != wide[0, 0, 0], spacing)
+    wide, _ = scipy.ndimage.label(scipy.ndimage.distance_transform_edt(air, spacing) > radius)
+    apart = scipy.ndimage.distance_transform_edt(wide != wide[0, 0, 0], spacing)
     apart = apart[tuple(slice(low, size - high) for (low, high), size in zip(pads, apart.shape, strict=True))]
-    open_, count = ndimage.label(_fine(apart <= (1 + DEEP) * radius, every, volume.shape) & ~body)
+    open_, count = scipy.ndimage.label(_fine(apart <= (1 + DEEP) * radius, every, volume.shape) & ~body)
     reached = np.zeros(count + 1, np.bool_)
     reached[open_[_fine(apart <= radius, every, volume.shape)]] = True
     reached[0] = False
@@ -234,9 +234,9 @@ def _opened(mask: NDArray[np.bool_], spacing: NDArray[np.float64]) -> NDArray[np
     """Take away what no ball fits into; what lies beyond the border counts as more of the same."""
     if mask.all():
         return mask
-    depth = ndimage.distance_transform_edt(mask, spacing)
+    depth = scipy.ndimage.distance_transform_edt(mask, spacing)
     radius = _radius(depth)
-    return np.asarray(ndimage.distance_transform_edt(depth <= radius, spacing) <= radius)
+    return np.asarray(scipy.ndimage.distance_transform_edt(depth <= radius, spacing) <= radius)
 
 
 def _radius(depth: NDArray[np.float64]) -> float:

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from .signal import SOLID
 
@@ -159,8 +158,8 @@ class _Runs:
     def joined(self, *pairs: tuple[Ints, Ints]) -> Ints:
         """Return the number of the part that each run belongs to."""
         one, other = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
-        graph = coo_array((np.ones(len(one), np.int8), (one, other)), shape=(len(self.row),) * 2)
-        return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+        graph = scipy.sparse.coo_array((np.ones(len(one), np.int8), (one, other)), shape=(len(self.row),) * 2)
+        return np.asarray(scipy.sparse.csgraph.connected_components(graph, directed=False)[1], np.int64)
 
 
 def outlines_of(mask: NDArray[np.bool_], pixel_mm: tuple[float, float] = (1.0, 1.0)) -> Outlines:

@@ -8,8 +8,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import cKDTree
-from scipy.spatial.distance import cdist
+import scipy
 
 from ..measure.polygon import area, distance, inside_lattice, lattice_over, side_lengths
 from ..model.points import BRIDGE, CAP, NEURON, RING, SIDE, TRACK, PointSet
@@ -196,7 +195,7 @@ def _to_nearest(points: PointSet) -> float:
     """Return the widest distance of a point to the one nearest to it; 0 where each lies on another, or is alone."""
     if len(points) < 2:
         return 0.0
-    distance = np.asarray(cKDTree(points.positions).query(points.positions, k=[2])[0])
+    distance = np.asarray(scipy.spatial.cKDTree(points.positions).query(points.positions, k=[2])[0])
     return float(distance.max())
 
 
@@ -221,7 +220,7 @@ def _across(points: PointSet, fill: PointSet, limit: float) -> float:
 
 def _to_nearest_of(own: NDArray[np.float64], *others: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the distance of each point to the nearest of some others."""
-    return np.asarray(cdist(own, np.concatenate(others)).min(axis=1))
+    return np.asarray(scipy.spatial.distance.cdist(own, np.concatenate(others)).min(axis=1))
 
 
 def _caps(networks: Networks, volume: Volume, spacing: float) -> PointSet:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ..som.starts import moments
 
@@ -70,7 +70,7 @@ def outline(plane: NDArray[np.bool_]) -> NDArray[np.float64]:
     plane : (J, I) bool array
     """
     filled, _, margin = closed(plane)
-    border = ndimage.binary_dilation(filled) & ~ndimage.binary_erosion(filled)
+    border = scipy.ndimage.binary_dilation(filled) & ~scipy.ndimage.binary_erosion(filled)
     return pixels_of(border) - margin
 
 
@@ -149,7 +149,7 @@ def closed(plane: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool
     reach = round(NARROW / 2 * float(np.sqrt(np.count_nonzero(plane))))
     framed = np.pad(plane, reach + 1)
     open_ = ~_grown(framed, reach)
-    background, _ = ndimage.label(open_)
+    background, _ = scipy.ndimage.label(open_)
     outside = background == background[0, 0]
     return framed | ~_grown(outside, reach), open_ & ~outside, reach + 1
 
@@ -157,5 +157,5 @@ def closed(plane: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool
 def _grown(mask: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
     """Dilate by an octagon: crosses and squares in turn."""
     for step in range(steps):
-        mask = ndimage.binary_dilation(mask, ndimage.generate_binary_structure(2, 1 + step % 2))
+        mask = scipy.ndimage.binary_dilation(mask, scipy.ndimage.generate_binary_structure(2, 1 + step % 2))
     return mask

@@ -6,8 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
-from scipy.spatial import cKDTree
+import scipy
 
 from ..dynamics.low_pass import OneRing
 from ..dynamics.untangle import untangle
@@ -54,7 +53,7 @@ def sees_boundary(mask: NDArray[np.bool_], asked: NetworkSettings) -> bool:
 
 def pieces_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], int]:
     """Leave out the small pieces of a window (K, J, I); return also how many pieces it then has."""
-    labels, _ = ndimage.label(mask, np.ones((3, 3, 3), bool))
+    labels, _ = scipy.ndimage.label(mask, np.ones((3, 3, 3), bool))
     sizes = np.bincount(labels.ravel())
     sizes[0] = 0
     kept = sizes >= PIECE * sizes.max()
@@ -106,7 +105,7 @@ def regions_in_space(
 ) -> NDArray[np.uint16]:
     """Give every voxel of a window (K, J, I) its winner's number plus 1; `places` (n, 3) are the voxels in mm."""
     labels = np.zeros(mask.shape, np.uint16)
-    _, winners = cKDTree(network.codebook).query(places, workers=threads or -1)
+    _, winners = scipy.spatial.cKDTree(network.codebook).query(places, workers=threads or -1)
     labels[mask] = winners + 1
     return labels
 

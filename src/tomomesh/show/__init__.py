@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
+from .drawing.page import save
 from .gallery import draw_all
-from .style import save
 
 __all__ = ["draw_all", "save"]

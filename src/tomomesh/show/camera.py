@@ -1,4 +1,4 @@
-"""An orthographic camera in the patient frame: projection, culling, order and light."""
+"""An orthographic camera in the patient frame: projection, normals and light."""
 
 from __future__ import annotations
 
@@ -46,18 +46,20 @@ class Camera:
         return np.asarray(np.asarray(points) @ self.rotation.T)
 
 
-def normals(polygons: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the unit normals of (m, 3 or 4, 3) polygons, zero where there is no area, (m, 3)."""
-    across = np.cross(polygons[:, 2] - polygons[:, 0], polygons[:, -1] - polygons[:, 1])
-    length = np.sqrt((across**2).sum(axis=1, keepdims=True))
-    return np.asarray(across / np.where(length > 0, length, 1.0))
+def normals(corners: NDArray[np.float64], polygons: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the unit normals of (m, 3 or 4) polygons, zero where there is no area, (m, 3)."""
+    first, second = corners[polygons[:, 2]], corners[polygons[:, -1]]
+    first -= corners[polygons[:, 0]]
+    second -= corners[polygons[:, 1]]
+    return unit(np.cross(first, second))
 
 
-def painted(polygons: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the numbers of the projected polygons that face the viewer, the farthest first."""
-    front = np.flatnonzero(normals(polygons)[:, 2] > 0)
-    depth = polygons[front, :, 2].mean(axis=1)
-    return np.asarray(front[np.argsort(depth, kind="stable")])
+def unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (n, 3) vectors of length 1, zero where they have none."""
+    size = np.abs(vectors).max(axis=1, keepdims=True, initial=0)  # squares of huge and of tiny ones have no number
+    scaled = vectors / np.where(size > 0, size, 1.0)
+    length = np.sqrt((scaled**2).sum(axis=1, keepdims=True))
+    return np.asarray(scaled / np.where(length > 0, length, 1.0))
 
 
 def brightness(directions: NDArray[np.float64]) -> NDArray[np.float64]:

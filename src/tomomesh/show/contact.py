@@ -4,26 +4,25 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.transforms import ScaledTranslation
 
 from ..measure.rings import assess_contours
 from ..model.networks import Networks
-from .marks import lines
-from .plane import PIXELS, Plane
+from .drawing.marks import lines
+from .drawing.page import canvas
+from .drawing.style import ACCENT, INK, MUTED, NETWORK, TRACKS
+from .plane import PIXELS, Plane, on_paper
 from .render import nice_length
-from .style import ACCENT, INK, MUTED, NETWORK, TRACKS, canvas, styled
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from ..model.contours import Contour, Contours
+    from .drawing.page import Page, Panel
 
     Floats = NDArray[np.float64]
 
@@ -31,9 +30,11 @@ COLUMNS, ROWS = 6, 5
 """Slices of a page."""
 BAR = 13
 """Points between the first slice and the scale bar above it."""
+LETTERS = 6.8
+"""Points of the letters beside slices."""
 MOST_LINES = 3
 """Contours of a slice whose measures are written."""
-PALE, PAPER = (217, 224, 230), (255, 255, 255)
+PALE = (217, 224, 230)
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Net:
     words: str
 
 
-def draw_slices(mask: NDArray[np.bool_], found: Networks | Contours, plane: Plane = PIXELS) -> Iterator[Figure]:
+def draw_slices(mask: NDArray[np.bool_], found: Networks | Contours, plane: Plane = PIXELS) -> Iterator[Page]:
     """Draw all slices with their networks, page by page.
 
     Chains and rings are told by their perimeter, their area and their longest edge over the median one; other
@@ -65,7 +66,7 @@ def draw_slices(mask: NDArray[np.bool_], found: Networks | Contours, plane: Plan
 
     Yields
     ------
-    Figure
+    Page
         `COLUMNS` x `ROWS` slices at most.
     """
     inside = np.flatnonzero(mask.any(axis=(1, 2)))
@@ -135,7 +136,6 @@ def _of_sheets(found: Networks, plane: Plane) -> Mapping[int, list[Net]]:
     return nets
 
 
-@styled
 def _page(
     mask: NDArray[np.bool_],
     part: NDArray[np.intp],
@@ -144,69 +144,71 @@ def _page(
     bounds: Floats,
     which: str,
     note: str,
-) -> Figure:
-    width, height = bounds[1] - bounds[0]
-    rows, columns = -(-len(part) // COLUMNS), min(len(part), COLUMNS)
+) -> Page:
     words = max((min(len(nets.get(int(k), ())), MOST_LINES + 1) for k in part), default=1)
-    panel = 1.75 * float(np.clip(height / width, 0.4, 1.8)) + 0.22 + 0.12 * max(words, 1)
-    figure, axes = canvas(1.75 * COLUMNS, rows * panel + 0.7, rows, columns, gap=0.01)
-    for ax, k in zip(axes, part, strict=False):
-        plane.draw(ax, np.where(mask[k][:, :, None], PALE, PAPER).astype(np.uint8))
-        plane.crop(ax, bounds)
+    page, axes = contact_sheet(len(part), bounds, plane, which, f"{note}; dashed: bridged gaps", 0.12 * max(words, 1))
+    for ax, k in zip(axes, part, strict=True):
+        plane.draw(ax, on_paper(mask[k], PALE))
         _draw_nets(ax, nets.get(int(k), []), f"{k + 1}", empty=not mask[k].any())
+    return page
+
+
+def contact_sheet(
+    count: int, bounds: Floats, plane: Plane, which: str, note: str, below: float = 0.0
+) -> tuple[Page, list[Panel]]:
+    """Open a page of panels for slices, of one scale, with a title, a note and a scale bar, and inches for words."""
+    width, height = bounds[1] - bounds[0]
+    rows, columns = -(-count // COLUMNS), min(count, COLUMNS)
+    panel = 1.7 * float(np.clip(height / width, 0.4, 1.8)) + 0.2 + below
+    wide = 1.75 * COLUMNS
+    page, axes = canvas(
+        wide, rows * panel + 0.7, rows, columns, gap=0.05, top=0.5, head=0.17, below=0.03 + below,
+        right=(wide - 0.18) * (1 - columns / COLUMNS),
+    )  # fmt: skip
+    del axes[count:]
     for ax in axes:
-        ax.set_axis_off()
+        plane.crop(ax, bounds)
+    high = 0.12 * page.dpi
+    page.write(which, (high, high), size=10, up=1, strong=True)
+    page.write(note, (page.pixels.shape[1] - high, high), align=1, up=1, color=MUTED, size=8)
     scale_bar(axes[0], bounds, plane)
-    figure.suptitle(which, x=0.01, ha="left", fontsize=10, fontweight="bold")
-    figure.text(
-        0.99,
-        1 - 0.12 / figure.get_figheight(),
-        f"{note}; dashed: bridged gaps",
-        ha="right",
-        va="top",
-        color=MUTED,
-        fontsize=8,
-    )
-    return figure
+    return page, axes
 
 
-def _draw_nets(ax: Axes, nets: list[Net], number: str, *, empty: bool) -> None:
+def _draw_nets(ax: Panel, nets: list[Net], number: str, *, empty: bool) -> None:
     """Draw the networks of a slice, and write under it what they measure."""
     for one in nets:
         lines(ax, one.edges[~one.bridged], color=one.color, width=0.9)
-        lines(ax, one.edges[one.bridged], color=ACCENT, width=0.9, style="--")
+        lines(ax, one.edges[one.bridged], color=ACCENT, width=0.9, dashed=True)
     gaps = sum(one.gaps for one in nets)
-    write_beside(ax, number, 0, 1.0, color=INK, weight="bold")
+    write_beside(ax, number, 0, above=True, color=INK, strong=True)
     if gaps:
-        write_beside(ax, f"{gaps} gap{'' if gaps == 1 else 's'}", 1, 1.0, color=ACCENT)
+        write_beside(ax, f"{gaps} gap{'' if gaps == 1 else 's'}", 1, above=True, color=ACCENT)
     words = [(one.words, one.color) for one in nets[:MOST_LINES]]
     if len(nets) > MOST_LINES:
         words.append((f"and {len(nets) - MOST_LINES} more", MUTED))
     if not nets:
         words = [("no pixels" if empty else "no network", MUTED)]
     for n, (text, color) in enumerate(words):
-        write_beside(ax, text, 0, -0.02, lines_down=n, color=color)
+        write_beside(ax, text, 0, line=n, color=color)
 
 
 def write_beside(
-    ax: Axes, text: str, x: float, y: float, *, lines_down: int = 0, color: str, weight: str = "normal"
+    ax: Panel, text: str, end: int, *, above: bool = False, line: int = 0, color: str, strong: bool = False
 ) -> None:
-    """Write above or under a slice, at its left or right end."""
-    above = y > 0.5
-    ax.annotate(
-        text, (x, y), xycoords="axes fraction", xytext=(0, 1 if above else -8.5 * lines_down),
-        textcoords="offset points", ha="right" if x else "left", va="bottom" if above else "top",
-        color=color, fontsize=6.8, fontweight=weight,
+    """Write above a slice, or in a line under it, at its left (0) or right end (1)."""
+    page = ax.page
+    y = ax.box[1] - page.points(2) if above else ax.box[3] + page.points(3 + 8.5 * line)
+    page.write(
+        text, (float(ax.box[2 * end]), float(y)), size=LETTERS, color=color, align=end, up=0 if above else 1,
+        strong=strong,
     )  # fmt: skip
 
 
-def scale_bar(ax: Axes, bounds: Floats, plane: Plane) -> None:
+def scale_bar(ax: Panel, bounds: Floats, plane: Plane) -> None:
     """Put the length that all slices share above the first, where it hides none of it."""
-    left, right = float(bounds[0, 0]), float(bounds[1, 0])
-    length = nice_length(right - left)
-    share, figure = length / (right - left), ax.get_figure(root=True)
-    assert figure is not None
-    look: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "color": INK}
-    above = ax.transAxes + ScaledTranslation(0, BAR / 72, figure.dpi_scale_trans)
-    ax.plot([0, share], [1, 1], color=INK, linewidth=1.6, transform=above, clip_on=False, solid_capstyle="butt")
-    ax.annotate(f"{length:g} {plane.unit}".strip(), (share, 1), (4, BAR), va="center", fontsize=6.8, **look)
+    length, page = nice_length(float(bounds[1, 0] - bounds[0, 0])), ax.page
+    left, line = float(ax.box[0]), float(ax.box[1]) - page.points(BAR)
+    ax.rule(np.array([[left, line], [left + length * ax.scale, line]]), 1.6, INK)
+    place = (left + length * ax.scale + page.points(4), line)
+    page.write(f"{length:g} {plane.unit}".strip(), place, size=LETTERS, up=0.5)

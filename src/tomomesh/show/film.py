@@ -6,23 +6,23 @@ import io
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from PIL import Image
 
 from .camera import Camera
-from .marks import dots
-from .plane import PIXELS, Plane
-from .style import NETWORK, canvas, heading, styled
-from .topologies import flat, frame
+from .drawing.axes import around
+from .drawing.marks import dots, lines
+from .drawing.page import canvas
+from .drawing.style import NETWORK, WHITE
+from .plane import PIXELS, Plane, on_paper
+from .topologies import flat
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from ..model.lattice import Lattice
+    from .drawing.page import Page, Panel
 
     Floats = NDArray[np.float64]
 
@@ -35,10 +35,9 @@ SIDE = 4.0
 DPI = 100
 COLORS = 32
 FRONT = Camera()
-PALE = (0.80, 0.84, 0.87)
+PALE = (204, 214, 222)
 
 
-@styled
 def film(
     region: Floats,
     codebooks: Floats | Sequence[Floats],
@@ -70,18 +69,17 @@ def film(
     bytes
         An animated GIF, which goes on for ever; the same input gives the same bytes.
     """
-    figure, (ax,) = canvas(SIDE, SIDE + 0.25)
+    page, (ax,) = canvas(SIDE, SIDE + 0.25, dpi=DPI)
     seen, places = flat(region, camera), np.stack([flat(one, camera) for one in codebooks])
-    dots(ax, seen, size=_dot_size(*np.shape(region)), color=PALE)
-    frame(ax)
     ends = np.concatenate([seen, places.reshape(-1, 2)])
     low, high = ends.min(axis=0), ends.max(axis=0)
     margin = 0.04 * float((high - low).max()) or 1.0
-    ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
-    return _encoded(list(_frames(figure, ax, places, network, notes, title)))
+    ax.limit(*(low - margin), *(high + margin))
+    dots(ax, seen, size=_dot_size(*np.shape(region)), color=PALE)
+    around(ax)
+    return _encoded(list(_frames(page, ax, places, network, notes, title)))
 
 
-@styled
 def film_slice(
     mask: NDArray[np.bool_],
     codebooks: Floats | Sequence[Floats],
@@ -114,39 +112,31 @@ def film_slice(
     places = np.stack([plane.place(one) for one in codebooks])
     bounds = plane.bounds(mask, places.reshape(-1, 2))
     ratio = float(np.clip((bounds[1] - bounds[0])[1] / (bounds[1] - bounds[0])[0], 0.4, 1.8))
-    figure, (ax,) = canvas(SIDE, SIDE * ratio + 0.35)
-    plane.draw(ax, np.where(np.asarray(mask, bool)[:, :, None], PALE, 1.0))
+    page, (ax,) = canvas(SIDE, SIDE * ratio + 0.35, left=0.5, below=0.42, dpi=DPI)
     plane.crop(ax, bounds)
+    plane.draw(ax, on_paper(np.asarray(mask, bool), PALE))
     plane.rule([ax])
-    return _encoded(list(_frames(figure, ax, places, network, notes, title)))
+    return _encoded(list(_frames(page, ax, places, network, notes, title)))
 
 
 def _dot_size(count: int, dimensions: int) -> float:
     """Let the dots of a filled plane region overlap, which also is shorter to store; keep those in space apart."""
-    return float(np.clip(1.5e5 / count, 2.0, 36.0) if dimensions == 2 else np.clip(1.5e4 / count, 1.0, 9.0))
+    area = np.clip(1.5e5 / count, 2.0, 36.0) if dimensions == 2 else np.clip(1.5e4 / count, 1.0, 9.0)
+    return float(np.sqrt(area))
 
 
 def _frames(
-    figure: Figure, ax: Axes, places: Floats, network: Lattice, notes: Sequence[str] | None, title: str
+    page: Page, ax: Panel, places: Floats, network: Lattice, notes: Sequence[str] | None, title: str
 ) -> Iterator[Image.Image]:
     """Move one network over one background, so that nothing but it changes."""
     chosen = np.unique(np.linspace(0, len(places) - 1, min(len(places), MOST_FRAMES)).round().astype(int))
-    edges = LineCollection(list(places[0][network.edges]), colors=NETWORK, linewidths=1.1, zorder=3)
-    ax.add_collection(edges)
-    neurons = ax.scatter(
-        places[0][:, 0], places[0][:, 1], s=14, facecolors=NETWORK, edgecolors="white", linewidths=0.4, zorder=4
-    )
-    heading(ax, title, " ")
-    note = ax.texts[-1]
-    figure.set_dpi(DPI)
-    figure.canvas.draw()
-    figure.set_layout_engine("none")
+    background, words = page.pixels.copy(), [*page.words]
     for n in chosen:
-        edges.set_segments(list(places[n][network.edges]))
-        neurons.set_offsets(places[n])
-        note.set_text(notes[n] if notes is not None else f"{n} of {len(places) - 1}")
-        figure.canvas.draw()
-        yield Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[:, :, :3].copy())  # type: ignore[attr-defined]
+        page.pixels[:], page.words = background, [*words]
+        lines(ax, places[n][network.edges], color=NETWORK, width=1.1)
+        dots(ax, places[n], size=3.7, color=NETWORK, rim=WHITE, width=0.4)
+        ax.heading(title, notes[n] if notes is not None else f"{n} of {len(places) - 1}")
+        yield page.image()
 
 
 def _encoded(frames: list[Image.Image]) -> bytes:

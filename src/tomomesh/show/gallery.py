@@ -20,13 +20,13 @@ from .space import draw_points, draw_shaded, draw_surfaces, draw_wireframe
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from ..model.contours import Contours
     from ..model.mesh import QuadMesh, TriMesh
     from ..model.points import PointSet
     from ..model.trace import Trace
+    from .drawing.page import Page
 
 
 def draw_all(
@@ -34,7 +34,6 @@ def draw_all(
     images: NDArray[Any] | None = None,
     mask: NDArray[np.bool_] | None = None,
     networks: Networks | Contours | None = None,
-    labels: NDArray[Any] | None = None,
     points: PointSet | None = None,
     cuberille: QuadMesh | None = None,
     triangulated: TriMesh | None = None,
@@ -45,7 +44,7 @@ def draw_all(
     plane: Plane = Plane(),  # noqa: B008
     view: View = View(),  # noqa: B008
     tolerance: float | None = None,
-) -> Iterator[tuple[str, Figure]]:
+) -> Iterator[tuple[str, Page]]:
     """Draw every picture whose stages are given, numbered as the paper's figures.
 
     Parameters
@@ -56,8 +55,6 @@ def draw_all(
         The window.
     networks : Networks or Contours
         The trained networks, one a slice or several.
-    labels : (K, J, I) int array
-        0 outside, else neuron plus one.
     points, cuberille, triangulated, smoothed, mesh, trace
         The later stages.
     on_slices : TriMesh
@@ -73,10 +70,10 @@ def draw_all(
     ------
     name : str
         As ``"03-relief"``, the name for a file.
-    figure : Figure
+    page : Page
     """
     if images is not None and mask is not None:
-        yield from _of_slice(images, mask, networks, labels, plane)
+        yield from _of_slice(images, mask, networks, plane)
     if mask is not None and networks is not None and len(networks.slices):
         pages = draw_slices(mask, networks, plane)
         yield from ((f"06-slices-{number}", page) for number, page in enumerate(pages, 1))
@@ -126,9 +123,8 @@ def _of_slice(
     images: NDArray[Any],
     mask: NDArray[np.bool_],
     networks: Networks | Contours | None,
-    labels: NDArray[Any] | None,
     plane: Plane,
-) -> Iterator[tuple[str, Figure]]:
+) -> Iterator[tuple[str, Page]]:
     k = median_slice(mask, None if networks is None else networks.slices)
     note = f"slice {k + 1} of {len(images)}"
     yield "03-relief", draw_relief(images[k], plane)
@@ -136,8 +132,7 @@ def _of_slice(
     if networks is None or k not in networks.slices:
         return
     drawn = _on_slice(networks, k)
-    if labels is not None:
-        yield "05-regions", draw_regions(images[k], mask[k], drawn.codebook, drawn, labels[k], plane)
+    yield "05-regions", draw_regions(images[k], mask[k], drawn.codebook, drawn, plane)
     yield "06-network", draw_contour(mask[k], drawn.codebook, drawn, plane, bridged=drawn.bridged)
 
 

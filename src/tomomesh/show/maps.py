@@ -5,20 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import Normalize
-from matplotlib.ticker import MaxNLocator
 
 from ..errors import UsageError
-from .style import INK, TINT, canvas, heading, styled
+from .drawing.axes import color_bar
+from .drawing.marks import fill, small_print
+from .drawing.page import canvas
+from .drawing.style import INK, TINT, WHITE
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from ..model.lattice import Lattice
+    from .drawing.page import Page, Panel
 
     Floats = NDArray[np.float64]
 
@@ -28,8 +26,7 @@ MOST_NUMBERS = 200
 """Neurons up to which hits are written into their cells."""
 
 
-@styled
-def draw_maps(codebook: Floats, network: Lattice, labels: NDArray[np.integer], *, unit: str = "") -> Figure:
+def draw_maps(codebook: Floats, network: Lattice, labels: NDArray[np.integer], *, unit: str = "") -> Page:
     """Draw the U-matrix (Ultsch & Siemon 1990) and the hit map of a sheet of neurons.
 
     The U-matrix has a cell for each neuron and one between each two neighbors, which tells their distance; a
@@ -57,20 +54,19 @@ def draw_maps(codebook: Floats, network: Lattice, labels: NDArray[np.integer], *
     corners = _hexagon() if network.name == "hexagonal" else _SQUARE
     places = laid_flat(network)
     size = np.ptp(places, axis=0) + 1
-    figure, axes = canvas(8.6, float(np.clip(3.4 * size[1] / size[0], 1.6, 6.0)) + 1.1, 1, 2)
+    page, axes = canvas(8.6, float(np.clip(3.4 * size[1] / size[0], 1.6, 6.0)) + 1.2, 1, 2, below=0.6)
     centers, far = u_matrix(codebook, network)
+    for ax, middles, reach in ((axes[0], centers, 0.35), (axes[1], places, 0.6)):
+        ax.limit(*(middles.min(axis=0) - reach), *(middles.max(axis=0) + reach))
     of = f"distance of neighbors{f' ({unit})' if unit else ''}"
     _draw_cells(axes[0], centers, corners / 2, far, of, lowest=float(far.min()))
-    heading(axes[0], "a  U-matrix", f"{network.name} of {network.shape[0]} x {network.shape[1]} neurons")
+    axes[0].heading("a  U-matrix", f"{network.name} of {network.shape[0]} x {network.shape[1]} neurons")
     _draw_cells(axes[1], places, corners, hits, "inputs won")
     dead = int((hits == 0).sum())
-    heading(axes[1], "b  Hits", f"{len(labels):,} inputs, {dead or 'no'} dead neuron{'' if dead == 1 else 's'}")
+    axes[1].heading("b  Hits", f"{len(labels):,} inputs, {dead or 'no'} dead neuron{'' if dead == 1 else 's'}")
     if len(hits) <= MOST_NUMBERS:
         _number(axes[1], places, hits)
-    for ax, middles, reach in ((axes[0], centers, 0.35), (axes[1], places, 0.6)):
-        low, high = middles.min(axis=0) - reach, middles.max(axis=0) + reach
-        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    return figure
+    return page
 
 
 def laid_flat(network: Lattice) -> Floats:
@@ -134,27 +130,20 @@ def _hexagon() -> Floats:
 
 
 def _draw_cells(
-    ax: Axes, centers: Floats, corners: Floats, values: NDArray[np.generic], name: str, *, lowest: float = 0.0
+    ax: Panel, centers: Floats, corners: Floats, values: NDArray[np.generic], name: str, *, lowest: float = 0.0
 ) -> None:
     """Fill a cell around each center, and put a scale beside them, from the lowest value on."""
     highest = float(values.max())
-    scale = ScalarMappable(Normalize(lowest if lowest < highest else 0.0, highest or 1.0), TINT)
-    cells = PolyCollection(list(centers[:, None] + corners), facecolors=scale.to_rgba(values), edgecolors="face")
-    cells.set_linewidth(0.3)
-    ax.add_collection(cells)
-    figure = ax.get_figure(root=True)
-    assert figure is not None
-    bar = figure.colorbar(scale, ax=ax, location="bottom", shrink=0.75, aspect=30, pad=0.02)
-    bar.outline.set_visible(False)
-    bar.set_label(name)
-    bar.ax.xaxis.set_major_locator(MaxNLocator(nbins=6, integer=np.issubdtype(values.dtype, np.integer)))
-    ax.set_aspect("equal")
-    ax.set_axis_off()
+    low, high = lowest if lowest < highest else 0.0, highest or 1.0
+    fill(ax, centers[:, None] + corners, color=TINT((np.asarray(values, np.float64) - low) / (high - low)))
+    inch, (left, _, right, bottom) = ax.page.dpi, ax.box
+    half, middle = 0.375 * (right - left), (left + right) / 2
+    bar = np.array([middle - half, bottom + 0.12 * inch, middle + half, bottom + 0.21 * inch])
+    color_bar(ax.page, bar, low, high, TINT, name, whole=np.issubdtype(values.dtype, np.integer))
 
 
-def _number(ax: Axes, places: Floats, hits: NDArray[np.integer]) -> None:
+def _number(ax: Panel, places: Floats, hits: NDArray[np.integer]) -> None:
     """Write the hits into their cells, dark on light and light on dark."""
     size = float(np.clip(90 / max(np.ptp(places[:, 0]) + 1, 1), 4.0, 8.0))
-    for (x, y), count in zip(places, hits, strict=True):
-        color = "white" if count > 0.45 * hits.max() else INK
-        ax.text(x, y, str(count), ha="center", va="center", fontsize=size, color=color)
+    for place, count in zip(places, hits, strict=True):
+        small_print(ax, str(count), place, color=WHITE if count > 0.45 * hits.max() else INK, size=size)

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..measure.section import section
-from .contact import COLUMNS, pages, scale_bar, write_beside
-from .marks import lines
+from .contact import contact_sheet, pages, write_beside
+from .drawing.marks import lines
+from .drawing.style import INK
 from .plane import PIXELS, Plane, contrast, gray
-from .style import INK, MUTED, canvas, styled
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from ..model.mesh import TriMesh
+    from .drawing.page import Page
 
     Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ INSIDE = 0.5
 """Slices by which a cut keeps from the ends of the mesh: in the plane of a cap there is no outline to see."""
 
 
-def draw_outlines(images: NDArray[Any], mesh: TriMesh, plane: Plane = PIXELS) -> Iterator[Figure]:
+def draw_outlines(images: NDArray[Any], mesh: TriMesh, plane: Plane = PIXELS) -> Iterator[Page]:
     """Draw all slices that a mesh cuts with its outline, page by page, at one scale and one contrast.
 
     Parameters
@@ -41,7 +41,7 @@ def draw_outlines(images: NDArray[Any], mesh: TriMesh, plane: Plane = PIXELS) ->
 
     Yields
     ------
-    Figure
+    Page
     """
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     every = np.arange(max(0, int(np.ceil(low[2]))), min(len(images), int(np.floor(high[2])) + 1))
@@ -58,24 +58,14 @@ def draw_outlines(images: NDArray[Any], mesh: TriMesh, plane: Plane = PIXELS) ->
         yield _page([gray(images[k]) for k in part], cuts, part, plane, ends + margin, span, which)
 
 
-@styled
 def _page(
     images: list[Floats], cuts: list[Floats], part: NDArray[np.intp], plane: Plane, bounds: Floats,
     span: tuple[float, float], which: str,
-) -> Figure:  # fmt: skip
-    width, height = bounds[1] - bounds[0]
-    rows, columns = -(-len(part) // COLUMNS), min(len(part), COLUMNS)
-    panel = 1.75 * float(np.clip(height / width, 0.4, 1.8)) + 0.2
-    figure, axes = canvas(1.75 * COLUMNS, rows * panel + 0.7, rows, columns, gap=0.01)
-    for ax, image, cut, k in zip(axes, images, cuts, part, strict=False):
+) -> Page:  # fmt: skip
+    note = "the mesh where the plane of each slice cuts it, at its ends half a slice inside"
+    page, axes = contact_sheet(len(part), bounds, plane, which, note)
+    for ax, image, cut, k in zip(axes, images, cuts, part, strict=True):
         plane.draw(ax, image, span)
         lines(ax, cut, color=OUTLINE, width=0.8)
-        plane.crop(ax, bounds)
-        write_beside(ax, f"{k + 1}", 0, 1.0, color=INK, weight="bold")
-    for ax in axes:
-        ax.set_axis_off()
-    scale_bar(axes[0], bounds, plane)
-    figure.suptitle(which, x=0.01, ha="left", fontsize=10, fontweight="bold")
-    note = "the mesh where the plane of each slice cuts it, at its ends half a slice inside"
-    figure.text(0.99, 1 - 0.12 / figure.get_figheight(), note, ha="right", va="top", color=MUTED, fontsize=8)
-    return figure
+        write_beside(ax, f"{k + 1}", 0, above=True, color=INK, strong=True)
+    return page

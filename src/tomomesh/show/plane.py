@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .style import INK, canvas
+from .drawing.axes import rule
+from .drawing.marks import show
+from .drawing.page import canvas
+from .drawing.style import INK
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+    from .drawing.page import Page, Panel
 
     Pixels = NDArray[Any]
     Floats = NDArray[np.float64]
@@ -40,20 +43,19 @@ class Plane:
         """Carry (n, 2) pixel indices (column, row) to millimeters."""
         return np.asarray(indices * np.array(self.spacing_mm))
 
-    def draw(self, ax: Axes, image: Pixels, span: tuple[float, float] = (0, 1)) -> None:
-        """Show (J, I) levels in gray, black and white at the ends of the span, or (J, I, 3) colors."""
+    def draw(self, ax: Panel, image: Pixels, span: tuple[float, float] = (0, 1)) -> None:
+        """Show (J, I) levels in gray, black and white at the ends of the span, or (J, I, 3) uint8 colors."""
         (dx, dy), (rows, columns) = self.spacing_mm, image.shape[:2]
-        first, last = -0.5 * dy, (rows - 0.5) * dy
-        bottom, top = (first, last) if self.upward else (last, first)
-        ax.imshow(
-            image,
-            extent=(-0.5 * dx, (columns - 0.5) * dx, bottom, top),
-            origin="lower" if self.upward else "upper",
-            interpolation="nearest",
-            cmap="gray",
-            vmin=span[0],
-            vmax=span[1],
-        )
+        top, bottom = -0.5 * dy, (rows - 0.5) * dy
+        if image.ndim == 2:
+            low, high = span
+            image = np.round(np.clip((image - low) * (255.0 / ((high - low) or 1.0)), 0, 255)).astype(np.uint8)
+        show(ax, image, -0.5 * dx, bottom, (columns - 0.5) * dx, top, upward=self.upward)
+
+    def fit(self, ax: Panel, image: Pixels) -> None:
+        """Limit a panel to a whole slice."""
+        (dx, dy), (rows, columns) = self.spacing_mm, image.shape[:2]
+        self.crop(ax, np.array([[-0.5 * dx, -0.5 * dy], [(columns - 0.5) * dx, (rows - 0.5) * dy]]))
 
     def bounds(self, mask: Pixels, places: Floats) -> Floats:
         """Return the lowest and highest (x, y) of the window and the places, with a margin, (2, 2)."""
@@ -63,20 +65,16 @@ class Plane:
         margin = 0.09 * float((high - low).max()) + max(self.spacing_mm)
         return np.stack([low - margin, high + margin])
 
-    def crop(self, ax: Axes, bounds: Floats) -> None:
+    def crop(self, ax: Panel, bounds: Floats) -> None:
         """Limit a panel."""
         (left, low), (right, high) = bounds
-        ax.set_aspect("equal")
-        ax.set(xlim=(left, right), ylim=(low, high) if self.upward else (high, low))
+        ax.limit(left, low if self.upward else high, right, high if self.upward else low)
 
-    def rule(self, axes: list[Axes]) -> None:
+    def rule(self, axes: list[Panel]) -> None:
         """Name the axes of a row of panels."""
-        for ax in axes:
-            ax.set_xlabel(f"along a row ({self.unit})")
-            ax.locator_params(nbins=6)
-            for spine in ax.spines.values():
-                spine.set_edgecolor(INK)
-        axes[0].set_ylabel(f"along a column ({self.unit})")
+        for n, ax in enumerate(axes):
+            up = "" if n else f"along a column ({self.unit})"
+            rule(ax, along=f"along a row ({self.unit})", up=up, color=INK)
 
 
 FAR = 2.0
@@ -84,6 +82,11 @@ FAR = 2.0
 measured, as -9999: it is drawn black or white. Background of 0 around a head is nearer. Only pictures depend on it."""
 PIXELS = Plane()
 """A slice whose pixels are squares of 1 mm."""
+
+
+def on_paper(mask: Pixels, color: tuple[int, int, int]) -> NDArray[np.uint8]:
+    """Return a window in a color on white, (J, I, 3)."""
+    return np.array([(255, 255, 255), color], np.uint8)[np.asarray(mask, np.uint8)]
 
 
 def gray(image: Pixels) -> Floats:
@@ -107,7 +110,7 @@ def _span(levels: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def panels(width: float, count: int, size: Floats, more: float, gap: float = 0.02) -> tuple[Figure, list[Axes]]:
+def panels(width: float, count: int, size: Floats, more: float, **room: float) -> tuple[Page, list[Panel]]:
     """Open a row of panels as high as their content (x, y) needs, and `more` inches for what is written."""
     ratio = float(np.clip(size[1] / size[0], 0.4, 1.8))
-    return canvas(width, width / count * ratio + more, 1, count, gap=gap)
+    return canvas(width, width / count * ratio + more, 1, count, **room)

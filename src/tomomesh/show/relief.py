@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .camera import Camera, brightness, normals, painted
-from .marks import fill, lines, small_print
+from .camera import Camera, brightness, normals
+from .drawing.marks import fill, lines, small_print
+from .drawing.page import canvas
+from .drawing.style import MUTED, RELIEF
 from .plane import PIXELS, Plane, gray
-from .style import MUTED, RELIEF, canvas, heading, styled
+from .render import draw_colored
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+    from .drawing.page import Page, Panel
 
 SIDE = 128
 """Most facets along a side; larger images are averaged down to it."""
@@ -23,20 +26,20 @@ HEIGHT = 0.34
 TABLE = Camera(azimuth=24.0, elevation=38.0)
 
 
-@styled
-def draw_relief(image: NDArray[Any], plane: Plane = PIXELS, camera: Camera = TABLE) -> Figure:
+def draw_relief(image: NDArray[Any], plane: Plane = PIXELS, camera: Camera = TABLE) -> Page:
     """Draw the gray levels of a slice as a landscape (Fig. 3)."""
     levels = gray(image)
     block = -(-max(levels.shape) // SIDE)
     coarse = _averaged(levels, block)
     low, high = float(coarse.min()), float(coarse.max())
     grid = _grid(coarse, low, high, (plane.spacing_mm[0] * block, plane.spacing_mm[1] * block), plane.upward)
-    figure, (ax,) = canvas(8.2, 5.2)
+    page, (ax,) = canvas(8.2, 5.2)
+    box = np.array([*product(*zip(grid.min(axis=(0, 1)), grid.max(axis=(0, 1)), strict=True))])
+    _limit(ax, camera.project(box)[:, :2])
     _draw_box(ax, grid, camera, (low, high))
     _draw_landscape(ax, grid, camera)
-    note = f"{levels.shape[1]} x {levels.shape[0]} pixels, height and color by gray level k"
-    heading(ax, "A slice as a matrix", note)
-    return figure
+    ax.heading("A slice as a matrix", f"{levels.shape[1]} x {levels.shape[0]} pixels, height and color by gray level k")
+    return page
 
 
 def _averaged(levels: NDArray[np.float64], block: int) -> NDArray[np.float64]:
@@ -58,22 +61,31 @@ def _grid(
     return np.stack(np.broadcast_arrays(x[None, :], y[:, None], z), axis=-1)
 
 
-def _draw_landscape(ax: Axes, grid: NDArray[np.float64], camera: Camera) -> None:
-    corners = [grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]]
-    facets = np.stack(corners, axis=2).reshape(-1, 4, 3)
-    upright = facets if normals(facets)[:, 2].sum() > 0 else facets[:, ::-1]
-    seen = camera.project(upright)
-    order = painted(seen)
-    low, high = grid.min(axis=(0, 1)), grid.max(axis=(0, 1))
-    table = [[low[0], low[1], 0], [high[0], low[1], 0], [high[0], high[1], 0], [low[0], high[1], 0]]
-    fill(ax, camera.project(np.array([table]))[:, :, :2], color=RELIEF(0.0))
-    level = upright[order, :, 2].mean(axis=1) / (grid[..., 2].max() or 1.0)
-    colors = RELIEF(level)
-    colors[:, :3] *= (0.45 + 0.55 * brightness(normals(seen[order])))[:, None]
-    fill(ax, seen[order, :, :2], color=colors)
+def _limit(ax: Panel, seen: NDArray[np.float64]) -> None:
+    """Fit a panel to places, with room for the words beside them."""
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    margin = 0.06 * float((high - low).max() or 1.0)
+    ax.limit(*(low - margin), *(high + margin))
 
 
-def _draw_box(ax: Axes, grid: NDArray[np.float64], camera: Camera, levels: tuple[float, float]) -> None:
+def _draw_landscape(ax: Panel, grid: NDArray[np.float64], camera: Camera) -> None:
+    vertices = grid.reshape(-1, 3)
+    number = np.arange(len(vertices)).reshape(grid.shape[:2])
+    corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
+    facets = np.stack(corners, axis=2).reshape(-1, 4)
+    if normals(vertices, facets)[:, 2].sum() < 0:
+        facets = facets[:, ::-1]
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    table = np.array([[low[0], low[1], 0], [high[0], low[1], 0], [high[0], high[1], 0], [low[0], high[1], 0]])
+    fill(ax, camera.project(table)[None, :, :2], color=RELIEF(0.0))
+    seen = camera.project(vertices)
+    level = vertices[facets, 2].mean(axis=1) / (grid[..., 2].max() or 1.0)
+    toward = normals(seen, facets)
+    light = np.stack([brightness(toward), brightness(-toward)])[:, :, None]
+    draw_colored(ax, seen, facets, np.round(RELIEF(level) * (0.45 + 0.55 * light)).astype(np.uint8))
+
+
+def _draw_box(ax: Panel, grid: NDArray[np.float64], camera: Camera, levels: tuple[float, float]) -> None:
     low, high = grid.min(axis=(0, 1)), grid.max(axis=(0, 1))
     near, left, far = [low[0], low[1], 0.0], [low[0], high[1], 0.0], [high[0], low[1], 0.0]
     top = [low[0], high[1], high[2]]
@@ -82,8 +94,4 @@ def _draw_box(ax: Axes, grid: NDArray[np.float64], camera: Camera, levels: tuple
     for name, ends, shift in zip(("row j", "column i"), axes[:2], ((-22, 6), (0, -13)), strict=True):
         small_print(ax, name, ends.mean(axis=0), shift)
     for level, place in zip(levels, axes[2], strict=True):
-        small_print(ax, f"k = {level:.0f}", place, (-6, 0), align="right")
-    ax.set_axis_off()
-    ax.set_aspect("equal")
-    ax.autoscale_view()
-    ax.margins(0.06)
+        small_print(ax, f"k = {level:.0f}", place, (-6, 0), align=1)

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ..errors import UsageError
 from .products import WIDE
@@ -119,7 +119,7 @@ def area_of_each(inputs: NDArray[np.float64], lattice: Lattice, weights: NDArray
     if len(places) <= NEIGHBORS:
         return 0.0
     some = places[:: -(-len(places) // LOOKED_AT)]
-    apart, _ = cKDTree(places).query(some, k=NEIGHBORS + 1)
+    apart, _ = scipy.spatial.cKDTree(places).query(some, k=NEIGHBORS + 1)
     reach = float(np.median(np.asarray(apart)[:, -1]))
     covered = len(places) * np.pi * reach**2 / (NEIGHBORS + 0.5)
     mean_radius = float(np.sqrt(places.var(axis=0).sum()))

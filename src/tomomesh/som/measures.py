@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.distance import cdist
+import scipy
 
 from ..errors import UsageError
 from ..kernels.som.neighborhoods import GAUSSIAN, weigh
@@ -120,7 +120,7 @@ def topographic_product(codebook: Floats, lattice: Lattice) -> float:
     u = len(lattice)
     if u < 2:
         return 0.0
-    apart = np.maximum(cdist(codebook, codebook), LEAST)
+    apart = np.maximum(scipy.spatial.distance.cdist(codebook, codebook), LEAST)
     k = np.arange(1, u)
     total = 0.0
     for j, (distance, hops) in enumerate(zip(apart, lattice.hops, strict=True)):
@@ -157,7 +157,7 @@ def neighborhood_preservation(
     k = neighbors if neighbors is not None else max(min(round(2 * len(lattice.edges) / u), (u - 1) // 2), 1)
     if not 1 <= k < max(u / 2, 2):
         raise UsageError("so many neighbors cannot be compared", found=f"{k}", expected=f"1 to under {u / 2:g}")
-    apart = cdist(codebook, codebook)
+    apart = scipy.spatial.distance.cdist(codebook, codebook)
     lost = np.zeros(2)
     for j, (distance, hops) in enumerate(zip(apart, lattice.hops, strict=True)):
         orders = _ranked(hops, distance, j), _ranked(distance, hops, j)
@@ -184,4 +184,4 @@ def _squared(inputs: Floats, codebook: Floats) -> Iterator[Floats]:
     """Yield the squared distances of inputs to neurons, block by block."""
     step = max(BLOCK // len(codebook), 1)
     for n in range(0, len(inputs), step):
-        yield cdist(inputs[n : n + step], codebook, "sqeuclidean")
+        yield scipy.spatial.distance.cdist(inputs[n : n + step], codebook, "sqeuclidean")

@@ -96,8 +96,8 @@ def sampling_found(sampling: Sampling) -> Stage[None]:
 
 
 def networks_on_slices(found: Segmentation[Any]) -> dict[str, Any]:
-    """Give the networks of slices and their regions to the pictures."""
-    return {"networks": found.source, "labels": found.labels}
+    """Give the networks of slices to the pictures."""
+    return {"networks": found.source}
 
 
 def hollow(leak_test: LeakTest, taken: NDArray[np.bool_], cubes: int, cell: NDArray[np.float64]) -> Enclosed:

@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ..cuberille.partition import partition
 from ..dynamics.low_pass import OneRing
@@ -252,7 +252,7 @@ def _drawn_to_points(
     grid = partition(places, np.full(3, edge))
     cube_of = np.empty(len(places), np.int64)
     cube_of[grid.order] = np.repeat(np.arange(len(grid.keys)), np.diff(grid.start))
-    cubes = cube_of[cKDTree(places).query(rough.vertices)[1]]
+    cubes = cube_of[scipy.spatial.cKDTree(places).query(rough.vertices)[1]]
     springs = rough.edges if settings.fit.springs == "quads" else start.edges
     rest = fit(
         rough.vertices, springs, cubes, places, grid, settings.fit, threads=settings.run.threads, progress=progress

@@ -20,11 +20,11 @@ from ...ways import way_of
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from ...results import Segmentation, Surface
     from ...settings import Settings
+    from ...show.drawing.page import Page
     from ...som.region import TrainedNetwork
 
 FRAMES = 40
@@ -33,7 +33,7 @@ FRAMES = 40
 
 def pictures(
     stage_one: Segmentation[Any] | None, surface: Surface | None, settings: Settings
-) -> Iterator[tuple[str, Figure]]:
+) -> Iterator[tuple[str, Page]]:
     """Yield every picture that the stages allow, with its name."""
     stages: dict[str, Any] = {"tolerance": settings.fit.tolerance}
     if surface is not None:
@@ -60,7 +60,7 @@ def pictures(
     return draw_all(**stages)
 
 
-def pictures_of_network(trained: TrainedNetwork, title: str, axes: slice) -> Iterator[tuple[str, Figure]]:
+def pictures_of_network(trained: TrainedNetwork, title: str, axes: slice) -> Iterator[tuple[str, Page]]:
     """Yield the pictures of a network on a region, with their names; `axes` are those that are places."""
     inputs, codebook, graph = trained.inputs, trained.codebook, trained.lattice
     start = trained.start[:, axes]

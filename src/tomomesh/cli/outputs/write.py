@@ -17,12 +17,12 @@ from .parts import frame_of_part
 if TYPE_CHECKING:
     from argparse import Namespace
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from ...model.points import PointSet
     from ...results import Place, Segmentation, Surface
     from ...settings import Settings
+    from ...show.drawing.page import Page
     from ...som.region import TrainedNetwork
     from ..bars import Bars
 
@@ -161,9 +161,9 @@ def draw(
     where = Path(folder)
     make_folder(where)
     done, expected = 0, 10 if surface else 6
-    for done, (name, figure) in enumerate(pictures(stage_one, surface, settings), 1):
+    for done, (name, page) in enumerate(pictures(stage_one, surface, settings), 1):
         progress("pictures", done - 1, max(expected, done))
-        write_picture(figure, where / f"{name}.png")
+        write_picture(page, where / f"{name}.png")
     progress("pictures", done, done)
 
 
@@ -177,16 +177,16 @@ def draw_network(
     given = chosen.region in SHAPES
     title = f"A network over a {chosen.region if given else 'picture'}"
     axes = slice(None if given else 2)  # a neuron's place in a picture is its column and row
-    for name, figure in pictures_of_network(trained, title, axes):
-        write_picture(figure, folder / f"{name}.png")
+    for name, page in pictures_of_network(trained, title, axes):
+        write_picture(page, folder / f"{name}.png")
     if chosen.film:
         with io.replacing(folder / "02-film.gif") as file:
             file.write(film_of_network(trained, settings, pixel_area, title, axes))
 
 
-def write_picture(figure: Figure, path: Path) -> None:
+def write_picture(page: Page, path: Path) -> None:
     """Write a picture, whole or not at all."""
     from ...show import save
 
     with io.replacing(path) as file:
-        save(figure, file)
+        save(page, file)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import bz2
-import gzip
 import io
 import zlib
 from contextlib import contextmanager
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ...errors import FormatError, ResourceError, UnreadableError
@@ -35,25 +35,66 @@ BYTES_AT_ONCE = 2**24
 """Bytes that are asked for together."""
 
 
-class _Zlib(io.RawIOBase):
-    """A zlib stream as a file; the standard library has that for gzip and bzip2 only."""
+CHUNK_BYTES = 2**17
+"""Packed bytes taken, and bytes unpacked, at once: they stay in the processor's cache. Half or twice of it takes as
+long."""
 
-    def __init__(self, file: Any) -> None:
-        self._file, self._unpacker = file, zlib.decompressobj()
+WINDOW_BITS = {GZIP: 31, ZLIB: 15}
+"""How zlib is told what wraps a stream."""
+
+
+class _Inflated(io.RawIOBase):
+    """A zlib stream, or gzip streams one behind the other, as a file.
+
+    The standard library has none for zlib, and one for gzip that takes 8 KiB at once.
+    """
+
+    def __init__(self, file: Any, packing: str) -> None:
+        self._file, self._packing = file, packing
+        self._begin(b"")
+
+    def _begin(self, packed: bytes) -> None:
+        self._unpacker, self._packed = inflater().decompressobj(WINDOW_BITS[self._packing]), packed
 
     def readable(self) -> bool:
         return True
 
     def readinto(self, buffer: Any) -> int:
-        while not self._unpacker.eof:
-            packed = self._unpacker.unconsumed_tail or self._file.read(2**16)
-            data = self._unpacker.decompress(packed, len(buffer))
+        """Fill a buffer; return fewer bytes than it has at the end alone."""
+        done = 0
+        while done < len(buffer) and (data := self._some(min(len(buffer) - done, CHUNK_BYTES))):
+            buffer[done : done + len(data)] = data
+            done += len(data)
+        return done
+
+    def _some(self, most: int) -> bytes:
+        while not self._unpacker.eof or self._goes_on():
+            packed = self._packed or self._file.read(CHUNK_BYTES)
+            data: bytes = self._unpacker.decompress(packed, most)
+            self._packed = self._unpacker.unconsumed_tail
             if data:
-                buffer[: len(data)] = data
-                return len(data)
+                return data
             if not packed:
                 raise EOFError
-        return 0
+        return b""
+
+    def _goes_on(self) -> bool:
+        """Begin with the gzip stream that follows; zeros between streams are padding (as the standard library says)."""
+        packed = self._unpacker.unused_data.lstrip(b"\0")
+        while self._packing == GZIP and not packed and (more := self._file.read(CHUNK_BYTES)):
+            packed = more.lstrip(b"\0")
+        if self._packing == GZIP and packed:
+            self._begin(packed)
+            return True
+        return False
+
+
+def inflater() -> Any:
+    """Return zlib-ng, which ITK unpacks with too, where it is installed, else zlib; their names are the same."""
+    try:
+        return import_module("zlib_ng.zlib_ng")
+    except ImportError:
+        return zlib
 
 
 def packing_of(path: Path) -> str:
@@ -94,7 +135,7 @@ def unpacked(path: Path, packing: str, *, file: str, start: int = 0) -> Iterator
             plain.seek(start)
             with _opened(plain, packing) as stream:
                 yield stream
-    except (EOFError, zlib.error, OSError) as fault:
+    except (EOFError, inflater().error, OSError) as fault:
         # what unpacks raises an OSError without a number for bad data
         if isinstance(fault, OSError) and fault.errno is not None:
             raise UnreadableError("the file cannot be read", file=file, found=fault.strerror or "") from None
@@ -108,11 +149,9 @@ def unpacked(path: Path, packing: str, *, file: str, start: int = 0) -> Iterator
 
 
 def _opened(plain: Any, packing: str) -> Any:
-    if packing == GZIP:
-        return gzip.GzipFile(fileobj=plain, mode="rb")
     if packing == BZIP2:
         return bz2.BZ2File(plain)
-    return _Zlib(plain) if packing == ZLIB else plain
+    return _Inflated(plain, packing) if packing in WINDOW_BITS else plain
 
 
 def check_promise(promised: int, packed: int, packing: str, *, file: str) -> None:
@@ -129,6 +168,12 @@ def check_promise(promised: int, packed: int, packing: str, *, file: str) -> Non
     require_bytes(promised, max(packed, 0) * RATIOS[packing], file=file)
 
 
+def pass_over(stream: Any, count: int) -> None:
+    """Read bytes that are not wanted, or all that there are where they are fewer."""
+    while count > 0 and (chunk := stream.read(min(count, 2**20))):
+        count -= len(chunk)
+
+
 def fill(data: NDArray[Any], stream: Any, *, file: str) -> None:
     """Read as many bytes as an array of bytes (n,) has, and the rest of a packed stream for its check sum.
 
@@ -143,7 +188,7 @@ def fill(data: NDArray[Any], stream: Any, *, file: str) -> None:
     while done < len(data) and (count := stream.readinto(data.data[done : done + BYTES_AT_ONCE])):
         done += count
     require_bytes(len(data), done, file=file)
-    if isinstance(stream, (gzip.GzipFile, bz2.BZ2File, _Zlib)):
+    if isinstance(stream, (bz2.BZ2File, _Inflated)):
         _drain(stream, file)
 
 

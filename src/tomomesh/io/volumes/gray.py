@@ -20,7 +20,7 @@ ONE_BIT = "pixels of one bit: a mask of 0 and 1"
 
 
 def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
-    """Return real numbers in the machine's own byte order; truth values are 0 and 1.
+    """Return real numbers in the machine's own byte order, turned in place; truth values are 0 and 1.
 
     Raises
     ------
@@ -36,7 +36,9 @@ def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
             found=f"data type = {voxels.dtype}",
             expected="integers or real numbers of at most 64 bits",
         )
-    return voxels.astype(voxels.dtype.newbyteorder("="), copy=False)
+    kind = voxels.dtype.newbyteorder("=")
+    turned = kind != voxels.dtype and voxels.flags.writeable
+    return voxels.byteswap(inplace=True).view(kind) if turned else voxels.astype(kind, copy=False)
 
 
 def bright_is_high(voxels: NDArray[Any], bits: int) -> tuple[NDArray[Any], tuple[str, ...]]:
@@ -89,8 +91,10 @@ def scaled(stored: NDArray[Any], slope: float, intercept: float, dtype: DTypeLik
     """Return ``slope * stored + intercept``, computed and kept in `dtype`."""
     if slope == 1 and intercept == 0:
         return stored.astype(dtype, copy=False)
-    kind: Any = np.dtype(dtype).type
-    return np.asarray(stored.astype(dtype) * kind(slope) + kind(intercept))
+    levels = stored.astype(dtype)
+    levels *= levels.dtype.type(slope)
+    levels += levels.dtype.type(intercept)
+    return levels
 
 
 def scaled_dtype(dtype: DTypeLike, scales: list[tuple[float, float]], bits: int = 64) -> np.dtype[Any]:
@@ -128,8 +132,7 @@ def without_holes(voxels: NDArray[Any], *, file: str) -> tuple[NDArray[Any], tup
     """
     if voxels.dtype.kind != "f":
         return voxels, ()
-    holes = ~np.isfinite(voxels)
-    count = int(holes.sum())
+    count = voxels.size - sum(np.count_nonzero(np.isfinite(part)) for part in voxels)  # by slices: no mask of all
     if 2 * count > voxels.size:
         raise GeometryError(
             "more than half of the voxels are no numbers",
@@ -138,6 +141,7 @@ def without_holes(voxels: NDArray[Any], *, file: str) -> tuple[NDArray[Any], tup
         )
     if count == 0:
         return voxels, ()
+    holes = ~np.isfinite(voxels)
     return np.where(holes, voxels.min(where=~holes, initial=np.inf), voxels), (
         f"NaN or infinite voxels set to the background: {count}",
     )

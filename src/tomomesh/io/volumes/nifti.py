@@ -11,7 +11,7 @@ from ...errors import FormatError
 from ...model.volume import Volume
 from ..files.detached import beside
 from ..files.source import existing_file, suffix_of
-from ..files.unpack import check_promise, fill, packing_of, unpacked
+from ..files.unpack import check_promise, fill, packing_of, pass_over, unpacked
 from .gray import native, scaled, scaled_dtype, without_holes
 from .nifti_frame import frame_of
 from .nifti_header import NIFTI_HEADERS, NiftiLayout, layout_of, unpack_header
@@ -59,7 +59,7 @@ def read_nifti(path: Path, settings: ReadSettings) -> Volume:
     check_promise(layout.offset + layout.promised, back.stat().st_size, packing_of(back), file=name)
     data = np.empty(layout.promised, np.uint8)
     with unpacked(back, packing_of(back), file=name) as stream:
-        stream.seek(layout.offset)
+        pass_over(stream, layout.offset)
         fill(data, stream, file=name)
     stored, more = _gray(data, layout, name)
     return replace(Volume.from_stored(stored, affine, notes=notes + layout.notes + more), other_frame=other)

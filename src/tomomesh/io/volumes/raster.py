@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import FormatError
 from ..files.limits import require_bytes, require_memory, require_rows
 from ..files.source import existing_file, first_bytes, third_party, whole
-from ..files.unpack import check_promise, fill, unpacked
+from ..files.unpack import check_promise, fill, pass_over, unpacked
 from .gray import native, without_holes
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def read_raster(raster: Raster, *, file: str) -> NDArray[Any]:
     data = np.empty((len(raster.parts), raster.part_bytes), np.uint8)
     for row, part, start in zip(data, raster.parts, starts, strict=True):
         with unpacked(part, raster.packing, file=file, start=start) as stream:
-            _pass_over(stream, raster.skip)
+            pass_over(stream, raster.skip)
             fill(row, stream, file=file)
     return native(data.reshape(-1).view(raster.dtype).reshape(raster.shape), file=file)
 
@@ -149,11 +149,6 @@ def _start(raster: Raster, part: Path, file: str) -> int:
     start = size - raster.part_bytes if raster.start < 0 else raster.start
     check_promise(raster.skip + raster.part_bytes, size - max(start, 0), raster.packing, file=file)
     return start
-
-
-def _pass_over(stream: Any, count: int) -> None:
-    while count > 0 and (chunk := stream.read(min(count, 2**20))):
-        count -= len(chunk)
 
 
 def _words(raster: Raster, part: Path, file: str) -> NDArray[Any]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..compile import kernel
 from ..pointcloud.samples import MOST, SIGHT, gather
+from .interpolation import FEWEST, NEAREST, height_between, nearest_alike
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -188,7 +189,7 @@ def first_projections(
             projections[v] = 0.0
 
 
-@kernel("void(f8[:,::1], i4[::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8, f8[:,::1], f8[:,::1], i8, i8)")
+@kernel("void(f8[:,::1], i4[::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8, b1, f8[:,::1], f8[:,::1], i8, i8)")
 def renew_projections(
     places: Floats,
     nearest: NDArray[np.int32],
@@ -197,6 +198,7 @@ def renew_projections(
     start: NDArray[np.int32],
     frame: Floats,
     stale: float,
+    through: bool,
     projections: Floats,
     anchors: Floats,
     begin: int,
@@ -212,24 +214,34 @@ def renew_projections(
     samples, blocks, start, frame : arrays
     stale : float
         The way.
+    through : bool
+        Whether the surface goes through the samples, where enough of them face alike.
     projections, anchors : (n, 4) and (n, 3) float arrays
         Changed in place; a place without a projection gets none.
     begin, end : int
         Places to work on.
     """
     found, weights, projection = np.empty(MOST, np.int64), np.empty(MOST), np.empty(4)
+    near = np.empty((NEAREST, 4))
     for v in range(begin, end):
         moved = drawn = away = 0.0
         for axis in range(3):
             moved += (places[v, axis] - anchors[v, axis]) ** 2
             drawn += projections[v, 1 + axis] ** 2
-        if moved <= stale * stale or drawn == 0.0 or nearest[v] < 0:
+        if moved < stale * stale or drawn == 0.0 or nearest[v] < 0:
             continue
         for axis in range(3):
             away += (places[v, axis] - samples[nearest[v], axis]) ** 2
         reach = SIGHT * samples[nearest[v], 6]
         # a hundredth more than the way to the nearest sample, or rounding would leave it out
         reach = min(max(1.01 * np.sqrt(away), reach), LONGER * reach)
+        if through:
+            seen = samples, blocks, start, frame
+            alike = nearest_alike(*seen, places[v], projections[v, 1:], reach, found, near)
+            height = height_between(near, alike) if alike >= FEWEST else np.nan
+            if abs(height) < reach:
+                projections[v, 0], anchors[v] = -height, places[v]
+                continue
         if project(samples, blocks, start, frame, places[v], projections[v, 1:], reach, projection, found, weights):
             projections[v], anchors[v] = projection, places[v]
         else:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ...kernels.contours.between import blend, carry_along
 from ...kernels.threads import in_blocks
@@ -197,7 +197,7 @@ def _without_specks(levels: Depths, after: Depths) -> None:
     """Turn over what lies between two slices alone: `levels` are those from one on, `after` is the next."""
     inside = np.concatenate([levels, after[None]]) > 0
     for part, touching in ((inside, TOUCHING), (~inside, None)):
-        labels, count = ndimage.label(part, touching)
+        labels, count = scipy.ndimage.label(part, touching)
         known = np.zeros(count + 1, bool)
         known[labels[0]] = known[labels[-1]] = known[0] = True
         np.negative(levels, out=levels, where=~known[labels[:-1]])

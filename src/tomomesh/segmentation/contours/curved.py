@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from ...measure.polygon import along, evenly
 from ...som.even_spacing import even_arcs
@@ -38,7 +38,7 @@ def finely(ring: Floats) -> Floats:
     step = np.sqrt(np.maximum(chord, 1e-6 * max(float(chord.max()), 1e-300)))
     knots = np.concatenate([[0.0], np.cumsum(step)])
     place = knots[:-1, None] + np.arange(FINE) / FINE * step[:, None]
-    return np.asarray(CubicSpline(knots, closed, bc_type="periodic")(place))
+    return np.asarray(scipy.interpolate.CubicSpline(knots, closed, bc_type="periodic")(place))
 
 
 def unshrunk(

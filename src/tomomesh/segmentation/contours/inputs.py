@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ...kernels.threads import in_blocks
 from ...model.contours import HOLE, OUTER
@@ -86,7 +86,7 @@ class Inputs:
         summed along the line without its stairs.
         """
         assert self.line is not None
-        smooth = ndimage.gaussian_filter1d(self.line, min(STAIRS, len(self.line) / 8), axis=0, mode="wrap")
+        smooth = scipy.ndimage.gaussian_filter1d(self.line, min(STAIRS, len(self.line) / 8), axis=0, mode="wrap")
         side = np.roll(smooth, -1, axis=0) - smooth
         length, way = np.hypot(*side.T), np.arctan2(side[:, 1], side[:, 0])
         turn = np.abs((way - np.roll(way, 1) + np.pi) % (2 * np.pi) - np.pi)
@@ -166,9 +166,9 @@ def components_of(plane: NDArray[np.bool_], bodies: NDArray[np.int32]) -> tuple[
     dropped : int
         Components whose outer border has fewer than `SHORTEST` pixel sides.
     """
-    labels, _ = ndimage.label(plane, TOUCHING)
+    labels, _ = scipy.ndimage.label(plane, TOUCHING)
     found = []
-    boxes = ndimage.find_objects(labels)
+    boxes = scipy.ndimage.find_objects(labels)
     for number, (rows, columns) in enumerate(boxes, 1):
         if 2 * (rows.stop - rows.start + columns.stop - columns.start) >= SHORTEST:
             pixels = labels[rows, columns] == number
@@ -220,7 +220,7 @@ def share_of_holes(mask: NDArray[np.bool_], threads: int = 0) -> float:
     def work(start: int, stop: int) -> None:
         for k in range(start, stop):
             coarse = _coarse(mask[k])
-            areas[k] = ndimage.binary_fill_holes(coarse).sum(), coarse.sum()
+            areas[k] = scipy.ndimage.binary_fill_holes(coarse).sum(), coarse.sum()
 
     in_blocks(work, len(mask), block=8, threads=threads)
     filled, own = areas.sum(axis=0)
@@ -235,10 +235,10 @@ def _coarse(plane: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _side_by_side(plane: NDArray[np.bool_]) -> bool:
-    labels, count = ndimage.label(_coarse(plane), TOUCHING)
+    labels, count = scipy.ndimage.label(_coarse(plane), TOUCHING)
     if count < 2:
         return False
-    boxes = np.array([[(one.start, one.stop) for one in box] for box in ndimage.find_objects(labels)])
+    boxes = np.array([[(one.start, one.stop) for one in box] for box in scipy.ndimage.find_objects(labels)])
     sizes = (boxes[:, :, 1] - boxes[:, :, 0]).prod(axis=1)
     large = boxes[sizes >= BESIDE * sizes.max()]
     within = ((large[:, None, :, 0] >= large[None, :, :, 0]) & (large[:, None, :, 1] <= large[None, :, :, 1])).all(

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ...contours.slices import Slices
 from ...contours.stack import solid_between
@@ -148,7 +148,7 @@ def _as_drawn(depths: NDArray[np.float32], drawn: Mask) -> NDArray[np.float32]:
     Those away from all that was drawn on their slice may be of a body that was drawn on others.
     """
     alone = np.where(drawn, np.float32(0.5), np.float32(-0.5))
-    beside = ndimage.binary_dilation(drawn, np.ones((1, 3, 3), np.bool_), iterations=BESIDE)
+    beside = scipy.ndimage.binary_dilation(drawn, np.ones((1, 3, 3), np.bool_), iterations=BESIDE)
     return np.where(beside & (drawn != (depths > 0)), alone, depths)
 
 
@@ -190,7 +190,7 @@ def _resampled(
     """Return depths at the middles of other pixels of the same layers, linear between their own."""
     scale, first = np.array([1.0, *pixel]), np.array([0.0, *low[::-1]])
     scale[1:] /= edge
-    depths = ndimage.affine_transform(
+    depths = scipy.ndimage.affine_transform(
         levels, scale, -first / edge, shape, output=np.float32, order=1, mode="constant", cval=-WIDEST
     )  # fmt: skip
     return np.asarray(np.clip(depths, -WIDEST, WIDEST, out=depths))

@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ...errors import EmptyError
 from ...kernels.threads import in_blocks
@@ -168,7 +168,7 @@ def _placed(pixels: NDArray[np.int64], k: int) -> NDArray[np.int32]:
 
 def _inputs_of_components(mask: NDArray[np.bool_], signal: str, threads: int) -> tuple[list[list[Inputs]], int]:
     """Show each component its outline or its pixels, as the whole body asks for that it is part of."""
-    bodies, _ = ndimage.label(mask, np.ones((3, 3, 3), bool))
+    bodies, _ = scipy.ndimage.label(mask, np.ones((3, 3, 3), bool))
     found, dropped = _in_slices(len(mask), lambda k: components_of(mask[k], bodies[k]), threads)
     every = [one for row in found for one in row]
     solid = solids(every) if signal == "auto" else {one.body for one in every if signal == "boundary"}

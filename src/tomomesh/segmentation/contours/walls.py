@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ...measure.polygon import area, distance, inside
 from ...model.contours import WALL_INNER, WALL_OUTER
@@ -50,7 +50,7 @@ def inputs_of_walls(
         Parts of the window whose outer border has fewer than `SHORTEST` pixel sides.
     """
     filled, hollow, margin = closed(plane)
-    parts, count = ndimage.label(filled, TOUCHING)
+    parts, count = scipy.ndimage.label(filled, TOUCHING)
     framed = np.pad(plane, margin)
     inputs: list[Inputs] = []
     dropped = 0

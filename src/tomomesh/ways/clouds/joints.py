@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ...cuberille.faces import TIGHT
 from ...cuberille.leak_test import HOPELESS, SURE, close_leaks
@@ -119,7 +119,7 @@ def _handles(shell: Shell) -> int:
 def _disagreement(shell: Shell, other: Shell, origin: Floats) -> str:
     """Say how many handles two shells have, and where they are farthest from one another."""
     middles, others = (one.middles(one.leak_test.faces.cells) for one in (shell, other))
-    farthest = middles[np.argmax(cKDTree(others).query(middles)[0])] + origin
+    farthest = middles[np.argmax(scipy.spatial.cKDTree(others).query(middles)[0])] + origin
     counts = f"{_handles(shell)} with those of {shell.cell.min():.3g}, {_handles(other)} with {other.cell.min():.3g}"
     return f"cubes of two sizes disagree about the handles, {counts}, most around {place_in_words(farthest)}"
 
@@ -178,7 +178,7 @@ def _share_around(places: Floats, shell: Shell, reach: float) -> Floats:
     """Return the share of the occupied cubes within reach of each place that tell of an inside."""
     test = shell.leak_test.shell
     told, there = (
-        cKDTree(_places(shell, one)).query_ball_point(places, reach, return_length=True)
+        scipy.spatial.cKDTree(_places(shell, one)).query_ball_point(places, reach, return_length=True)
         for one in (test.witnesses, test.occupied)
     )
     return np.asarray(told / np.maximum(there, 1))
@@ -226,7 +226,7 @@ def passed_by(mesh: TriMesh, samples: Samples, tree: Tree | None = None, *, thre
     passed = samples.positions[off[across < TURNED]]
     if len(passed) < PASSED:
         return None
-    beside = cKDTree(passed).query_ball_point(passed, BESIDE * spacing, return_length=True)
+    beside = scipy.spatial.cKDTree(passed).query_ball_point(passed, BESIDE * spacing, return_length=True)
     return np.asarray(passed[beside.argmax()]) if beside.max() >= PASSED else None
 
 

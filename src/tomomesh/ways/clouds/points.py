@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from ...contours.axis import half_planes
 from ...contours.known import known_slices
@@ -134,5 +134,5 @@ def interpolated(mesh: TriMesh, points: Points) -> NDArray[np.bool_]:
     """Tell which faces (m,) are nearer to what was interpolated between the points than to these."""
     if len(points.between) == 0:
         return np.zeros(len(mesh.faces), np.bool_)
-    nearest = np.asarray(cKDTree(points.places).query(mesh.corners.mean(axis=1))[1])
+    nearest = np.asarray(scipy.spatial.cKDTree(points.places).query(mesh.corners.mean(axis=1))[1])
     return nearest >= len(points.cloud)

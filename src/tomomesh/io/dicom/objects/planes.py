@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from ....contours.direction import axes_across
 from ....contours.levels import columns_of, planes_within, slices_at, typical_gap
@@ -115,7 +114,7 @@ def directions(contours: Sequence[Floats]) -> int:
     areas = np.array([vector_area(contour) for contour in contours])
     normals = areas / np.linalg.norm(areas, axis=1)[:, None]
     near = np.abs(normals @ normals.T) > np.cos(TURNED)
-    count, direction = connected_components(csr_array(near), directed=False)
+    count, direction = scipy.sparse.csgraph.connected_components(scipy.sparse.csr_array(near), directed=False)
     return int(count) if count > 1 and np.bincount(direction).min() > 1 else 0
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,7 +65,7 @@ def _joined(polygon: Floats) -> Floats:
     sides = _sides(polygon)
     near = SLIT * float(np.median(sides[sides > 0])) if (sides > 0).any() else 0.0
     joined = polygon.copy()
-    for one, other in sorted(cKDTree(polygon).query_pairs(near)):
+    for one, other in sorted(scipy.spatial.cKDTree(polygon).query_pairs(near)):
         joined[other] = joined[one]
     return joined
 

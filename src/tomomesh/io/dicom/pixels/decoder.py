@@ -17,6 +17,7 @@ from .encapsulated import LARGEST_FRAME_BYTES, SYNTAXES, read_encapsulated
 from .layout import PixelLayout, layout_of
 from .levels import levels
 from .native import NATIVE, check_native, read_native
+from .rle import is_gray_rle, read_rle
 from .tables import check_tables
 
 if TYPE_CHECKING:
@@ -75,7 +76,8 @@ class Decoder:
         """Start the child process where frames like this one need it: while it starts, headers can be read."""
         with suppress(TomomeshError), third_party("pydicom", frame.path.name):  # what is wrong is said when it is read
             layout = layout_of(frame, "PixelData")
-            if layout.syntax in SYNTAXES and layout.frame_bytes <= LARGEST_FRAME_BYTES:
+            alone = layout.syntax not in SYNTAXES or is_gray_rle(layout)
+            if not alone and layout.frame_bytes <= LARGEST_FRAME_BYTES:
                 self._child.ready(layout.frame_bytes)
 
     def _read(self, frame: ImageFrame) -> NDArray[Any]:
@@ -87,6 +89,8 @@ class Decoder:
             return levels(pixels, photometric, self._opened.layout, frame.header)
 
     def _pixels(self, opened: _Opened, number: int) -> tuple[NDArray[Any], str]:
+        if opened.codes and is_gray_rle(opened.layout):
+            return read_rle(opened.codes[number], opened.layout), opened.layout.photometric
         if opened.codes:
             return self._child.decode(opened.codes[number], opened.layout)
         return read_native(opened.file, opened.element, opened.layout, number)

@@ -1,4 +1,4 @@
-"""Compressed frames, cut out of their file whole and decoded by the child process."""
+"""Compressed frames, cut out of their file whole."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, BinaryIO
 from ....errors import FormatError, ResourceError
 from ...files.limits import require_bytes
 from .codestream import check_stream
+from .rle import RLE
 
 if TYPE_CHECKING:
     from ..headers.element import PixelElement
@@ -18,8 +19,6 @@ ITEM, DELIMITER = 0xFFFEE000, 0xFFFEE0DD
 
 LARGEST_FRAME_BYTES = 2**30
 """No slice of a study is larger, 32,768 squared bytes; what promises more in few compressed bytes is a bomb."""
-
-RLE = "1.2.840.10008.1.2.5"
 
 SYNTAXES = {
     RLE,

@@ -1,0 +1,1 @@
+"""Triangles, lines and dots on a grid of pixels."""
