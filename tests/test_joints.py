@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -10,12 +10,14 @@ from hypothesis import given
 from scipy.spatial import Delaunay
 
 from conftest import law, seeds
-from test_clouds import assert_sound, on_box, on_sphere
+from test_clouds import assert_sound, on_box, on_sphere, on_torus
 from tomomesh import reconstruct_points
 from tomomesh.kernels.pointcloud.stars import beside, fill_triangle, spread_out
+from tomomesh.model.cubes import cells_of
 from tomomesh.pointcloud.bridges import bridges
-from tomomesh.pointcloud.samples import settle_points
-from tomomesh.pointcloud.stars import cells_between
+from tomomesh.pointcloud.facing import ACROSS, facing_pairs
+from tomomesh.pointcloud.samples import Samples, settle_points
+from tomomesh.pointcloud.stars import keys_between
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -130,7 +132,56 @@ class TestBridges:
         assert ((np.hypot(places[:, 0], places[:, 1]) < 0.5) & (places[:, 2] > 0)).any()
 
 
+class TestFacing:
+    @given(seeds)
+    @law(30)
+    def test_are_all_pairs_whose_step_runs_along_both_normals(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        places, reach = rng.uniform(0, 5, (150, 3)), 1.5
+        normals = rng.normal(size=places.shape)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        level = np.ones(len(places))
+        samples = Samples(places, normals, level, 0 * level, level, 0, 1.0)
+        steps = places[:, None] - places
+        away = np.linalg.norm(steps, axis=2)
+        along = np.abs(np.einsum("ijk,ik->ij", steps, normals)) > ACROSS * away
+        facing = along & along.T & (away <= reach) & (away > 0)
+        found = facing_pairs(samples, reach)
+        assert {frozenset(pair) for pair in found.tolist()} == {
+            frozenset(pair) for pair in np.argwhere(facing).tolist()
+        }
+        assert 2 * len(found) == facing.sum()
+
+    def test_room_is_made_for_more(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        samples = settle_points(beside_another(on_box(3_000), spacing_of(24, 3_000)))
+        plenty = facing_pairs(samples, 1.5 * float(np.median(samples.spacing)))
+        monkeypatch.setattr("tomomesh.pointcloud.facing.ROOM", 1)
+        assert len(plenty) > 1
+        assert (facing_pairs(samples, 1.5 * float(np.median(samples.spacing))) == plenty).all()
+
+    def test_nothing_is_looked_at_again_where_none_do(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """A ring has a handle, and no part of it lies near another; two rings that touch do."""
+        looked_at: list[int] = []
+
+        def counted(*args: Any, **options: Any) -> NDArray[np.int64]:
+            looked_at.append(1)
+            return keys_between(*args, **options)
+
+        monkeypatch.setattr("tomomesh.ways.clouds.joints.keys_between", counted)
+        reconstruct_points(on_torus(5_000))
+        assert not looked_at
+        reconstruct_points(beside_another(on_torus(5_000), 0.0))
+        assert looked_at
+
+
 class TestStars:
+    @pytest.mark.parametrize("name", ["ROOM", "CUBES"])
+    def test_room_is_made_for_more(self, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        samples, cell = settle_points(on_sphere(500)), np.full(3, 0.2)
+        plenty = keys_between(samples, np.full(3, -11.0), cell)
+        monkeypatch.setattr(f"tomomesh.pointcloud.stars.{name}", 8)
+        assert (keys_between(samples, np.full(3, -11.0), cell) == plenty).all()
+
     @given(seeds)
     @law(60)
     def test_are_the_triangles_of_delaunay(self, seed: int) -> None:
@@ -174,7 +225,7 @@ class TestStars:
     def test_cubes_of_a_plane_are_all_of_them(self) -> None:
         rng = np.random.default_rng(0)
         flat = np.column_stack([rng.uniform(0, 40, (1_600, 2)), np.full(1_600, 0.5)])
-        cells = cells_between(settle_points(flat), np.zeros(3), np.full(3, 0.5))
+        cells = cells_of(keys_between(settle_points(flat), np.zeros(3), np.full(3, 0.5)))
         inner = cells[((cells[:, :2] >= 6) & (cells[:, :2] < 74)).all(axis=1)]
         assert set(cells[:, 2]) <= {0, 1}  # the plane is where they meet
         assert len(np.unique(inner[:, :2], axis=0)) >= 0.999 * 68 * 68  # but for corners that are grazed

@@ -139,6 +139,17 @@ class TestDistance:
         np.testing.assert_allclose(brute[np.arange(15), face], brute.min(axis=1), rtol=1e-12)
         assert distance_to_surface(points, mesh).tobytes() == distance.tobytes()
 
+    @law(30)
+    @given(seed=seeds, enough=st.floats(0, 0.5))
+    def test_what_is_near_enough_is_not_bettered(self, seed: int, enough: float) -> None:
+        """Distances over what is enough are exact, and no other is."""
+        rng = np.random.default_rng(seed)
+        points, asked = rng.random((40, 3)), rng.random((30, 3))
+        exact, found = (Tree.of_points(points).nearest(asked, enough=one)[0] for one in (0.0, enough))
+        np.testing.assert_array_equal(found[exact > enough], exact[exact > enough])
+        assert (found[exact <= enough] <= enough).all()
+        assert (found >= exact).all()
+
     @law(40)
     @given(seed=seeds, count=st.integers(1, 60), whole=st.booleans())
     def test_of_points_is_scipy_s(self, seed: int, count: int, whole: bool) -> None:

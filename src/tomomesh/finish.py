@@ -106,7 +106,8 @@ def _remesh(made: Surface, settings: Settings, progress: Progress) -> Stage[Surf
     _check(even)
     if made.filled is None:
         return Stage(even, stats, found.warnings)
-    filled = made.filled[faces_under(mesh, made.mesh, run.threads)]
+    some = made.filled.any()
+    filled = made.filled[faces_under(mesh, made.mesh, run.threads)] if some else np.zeros(len(mesh.faces), np.bool_)
     return Stage(replace(even, filled=filled), stats | {"fit": {"filled_faces": int(filled.sum())}}, found.warnings)
 
 

@@ -95,23 +95,35 @@ def half_planes(positions: Floats) -> HalfPlanes | None:
     middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
     tree = scipy.spatial.cKDTree(positions - middle)
     drawn = np.unique(some_of(tree.data), axis=0)  # each repeat would be asked for all of the others
-    if len(drawn) < len(positions) and _axis(drawn, tree) is None:
+    if len(drawn) < len(positions) and not _about_axis(drawn, tree)[1]:
         return None
     local = np.unique(tree.data, axis=0)
-    tree = scipy.spatial.cKDTree(local)
-    found = _axis(local, tree)
+    found, each = _about_axis(local, scipy.spatial.cKDTree(local))
     if found is None:
         return None
-    spacing = float(np.median(tree.query(local, k=[3])[0]))
-    origin, axes = found
-    placed = (local - origin) @ axes.T
-    each = (_planes(placed, spacing, far) for far in FARTHER)
-    outlines = (_outlines(placed, *planes, spacing) for planes in each if planes is not None)
+    origin, axes, placed, spacing = found
+    outlines = (_outlines(placed, *planes, spacing) for planes in each)
     made = next((one for one in outlines if one is not None), None)
     if made is None:
         return None
     angles, curves = made
     return HalfPlanes(origin + middle, axes, angles, curves, spacing)
+
+
+def _about_axis(
+    some: Floats, tree: scipy.spatial.cKDTree
+) -> tuple[tuple[Floats, Floats, Floats, float] | None, list[tuple[Floats, NDArray[np.int64], float]]]:
+    """Return a place on the axis, directions across and along it, points by these, and their spacing; and the planes.
+
+    None where there is no axis, and no planes where some points of a cloud lie in none.
+    """
+    line = _axis(some, tree)
+    if line is None:
+        return None, []
+    spacing = float(np.median(tree.query(some, k=[3])[0]))
+    placed = (some - line[0]) @ line[1].T
+    each = (_planes(placed, spacing, far) for far in FARTHER)
+    return (*line, placed, spacing), [planes for planes in each if planes is not None]
 
 
 def _axis(some: Floats, tree: scipy.spatial.cKDTree) -> tuple[Floats, Floats] | None:

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import EmptyError, ResourceError
 from ..kernels.pointcloud.sweep import neighbor_distances
 from ..kernels.threads import in_blocks
-from ..model.columns import box, cells_at
+from ..model.columns import box, cells_at, parts_of
 from ..model.cubes import MARGIN, SIDE, CubeGrid, keys_of
 
 if TYPE_CHECKING:
@@ -82,7 +82,10 @@ def cubes_over(
             hint="a larger --cell-mm",
         )
     origin = low - 0.5 * cell_mm
-    return origin, keys_of(cells_at(positions, origin, cell_mm))
+    keys = np.empty(len(positions), np.int64)
+    for part in parts_of(len(positions)):
+        keys[part] = keys_of(cells_at(positions[part], origin, cell_mm))
+    return origin, keys
 
 
 def is_flat(positions: NDArray[np.float64], length: float) -> bool:

@@ -64,7 +64,8 @@ class CrossingFaces:
 
     def __init__(self, threads: int = 0, *, single: bool = False) -> None:
         self._threads, self._single = threads, single
-        self._tree: Tree | None = None
+        self.tree: Tree | None = None
+        """Of the mesh that was last looked at."""
 
     def __call__(self, mesh: TriMesh, moved: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
         """Mark the faces (m,) of a mesh.
@@ -79,11 +80,11 @@ class CrossingFaces:
             return np.zeros(0, np.bool_)
         if self._single:
             mesh = mesh.moved(mesh.vertices.astype(np.float32).astype(np.float64))
-        if self._tree is None or moved is None:
-            self._tree = Tree.of_faces(mesh, threads=self._threads)
-            return marked_in(self._tree, threads=self._threads)
-        self._tree = self._tree.moved(mesh.vertices, threads=self._threads)
-        return marked_in(self._tree, any_of(moved[mesh.faces]), threads=self._threads)
+        if self.tree is None or moved is None:
+            self.tree = Tree.of_faces(mesh, threads=self._threads)
+            return marked_in(self.tree, threads=self._threads)
+        self.tree = self.tree.moved(mesh.vertices, threads=self._threads)
+        return marked_in(self.tree, any_of(moved[mesh.faces]), threads=self._threads)
 
 
 def crossing_of(mesh: TriMesh, some: NDArray[np.bool_], *, threads: int = 0) -> NDArray[np.bool_]:

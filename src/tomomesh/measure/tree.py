@@ -90,7 +90,13 @@ class Tree:
         return len(self.boxes) // 4
 
     def nearest(
-        self, points: Floats, *, order: Ints | None = None, threads: int = 0, progress: Progress = silent
+        self,
+        points: Floats,
+        *,
+        order: Ints | None = None,
+        enough: float = 0.0,
+        threads: int = 0,
+        progress: Progress = silent,
     ) -> tuple[Floats, Ints]:
         """Find the simplex that is nearest to each point.
 
@@ -99,6 +105,8 @@ class Tree:
         points : (p, 3) float array
         order : (p,) int32 array, optional
             An order in which they are near each other, as that of a tree of them.
+        enough : float
+            Distance at which a nearer one is no longer sought.
         threads : int
             0 is one a core.
         progress : callable
@@ -107,7 +115,7 @@ class Tree:
         Returns
         -------
         (p,) float array
-            Exact distances.
+            Exact distances, where they are larger than `enough`.
         (p,) int32 array
             Numbers of the simplices.
         """
@@ -120,7 +128,7 @@ class Tree:
         along, squared, nearest = points.take(order, axis=0), distance.copy(), number.copy()
         in_blocks(
             lambda start, stop: nearest_simplices(
-                along, self.vertices, self.simplices, self.boxes, squared, nearest, start, stop
+                along, self.vertices, self.simplices, self.boxes, enough * enough, squared, nearest, start, stop
             ),
             len(points),
             block=BLOCK // 5,

@@ -114,11 +114,13 @@ def settle_points(
     the points are clean and in all where they are noisy, with 40 in none.
     """
     points, whole = distinct(positions), Whole() if whole is None else whole
+    del positions
     apart = whole.get("sampling distance", lambda: sampling_distance(points, threads=threads))
     if whole.get("points 0", lambda: len(points)) < LEAST_POINTS:
         level = np.full(len(points), apart)
         return Samples(points, np.zeros_like(points), level, 0 * level, level, 0, 1.0, whole)
     cloud = Cloud.of(np.column_stack([points, np.ones(len(points))]), apart, 0, whole, threads, progress)
+    points = cloud.points  # as many: the others are let go of
     spacing, stray = cloud.spacing()
     planes, noise, width = cloud.planes(spacing)
     while cloud.is_slab(noise, spacing):

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import ResourceError
 from ..kernels.measure.bvh import order_keys
 from ..kernels.pointcloud.samples import BITS
-from ..model.columns import box, cells_at
+from ..model.columns import box, cells_at, parts_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,9 +71,9 @@ class Index:
                 expected=f"at most {most * edge:g}",
                 hint="leaving far points out",
             )
-        x, y, z = cells_at(positions, origin, edge).T
-        local = ((z % EDGE) * EDGE + y % EDGE) * EDGE + x % EDGE
-        keys = ((((z // EDGE << BITS) | y // EDGE) << BITS) | x // EDGE) * EDGE**3 + local
+        keys = np.empty(len(positions), np.int64)
+        for part in parts_of(len(positions)):
+            keys[part] = _keys_of(cells_at(positions[part], origin, edge))
         order = np.empty(len(keys), np.int32)
         order_keys(keys, order)
         keys = keys[order]
@@ -89,6 +89,13 @@ class Index:
     def cells(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
         """What kernels take: blocks, start and frame."""
         return self.blocks, self.start, self.frame
+
+
+def _keys_of(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return a key for each cube (p, 3) that rises block by block, and within each by z, y and x."""
+    x, y, z = cells.T
+    local = ((z % EDGE) * EDGE + y % EDGE) * EDGE + x % EDGE
+    return np.asarray(((((z // EDGE << BITS) | y // EDGE) << BITS) | x // EDGE) * EDGE**3 + local)
 
 
 def _numbered(rising: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

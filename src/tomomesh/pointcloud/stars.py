@@ -14,8 +14,7 @@ import numpy as np
 from ..cuberille.neighbors import once_each
 from ..kernels.pointcloud.stars import lay_stars
 from ..kernels.threads import in_blocks
-from ..model.columns import cells_at
-from ..model.cubes import cells_of, keys_of
+from ..model.cubes import keys_of
 from ..progress import Progress, silent
 from .search import Index
 
@@ -32,11 +31,12 @@ SIGHT = 2.5
 """How far a sample looks for neighbors, times its spacing."""
 DENSE = 0.5
 """Distance of the places on a triangle, cube edges."""
-ROOM = 128
-"""Places a sample for which there is room at first. Where it does not suffice, room is made."""
+ROOM, CUBES = 256, 1 << 15
+"""Places on a triangle, and cubes of a call, for which there is room at first. Where it does not suffice, room is made.
+"""
 
 
-def cells_between(
+def keys_between(
     samples: Samples, lowest: Floats, cell: Floats, *, threads: int = 0, progress: Progress = silent
 ) -> NDArray[np.int64]:
     """List the cubes that the triangles between samples and their neighbors pass through.
@@ -51,19 +51,23 @@ def cells_between(
 
     Returns
     -------
-    (c, 3) int64 array
-        Each once, in the order of their keys.
+    (c,) int64 array
+        Their keys (see `tomomesh.model.cubes.keys_of`), rising.
     """
     index = Index.of(samples.positions, SIGHT * float(np.median(samples.spacing)))
     rows = np.column_stack([samples.positions, samples.normals, samples.spacing])[index.order]
+    first = keys_of(np.zeros((1, 3), np.int64))
+    steps = np.append(keys_of(np.eye(3, dtype=np.int64)) - first, first)
+    seen = (*index.cells, SIGHT, lowest, cell, DENSE * float(cell.min()), steps)
     found: dict[int, NDArray[np.int64]] = {}
 
     def lay(start: int, stop: int) -> None:
-        places, room = np.empty((ROOM * (stop - start), 3)), 0
-        while (room := lay_stars(rows, *index.cells, SIGHT, DENSE * cell.min(), places, start, stop)) > len(places):
-            places = np.empty((room, 3))
-        found[start] = once_each(keys_of(cells_at(places[:room], lowest, cell)))
+        places, taken = np.empty((ROOM, 3)), np.full(CUBES, -1)
+        while short := lay_stars(rows, *seen, places, taken, start, stop):
+            taken = np.full(2 * len(taken) if short == 1 else len(taken), -1)
+            places = np.empty((2 * len(places) if short == 2 else len(places), 3))
+        found[start] = np.sort(taken[taken >= 0])
 
     count = len(rows)
     in_blocks(lay, count, block=BLOCK, threads=threads, done=lambda n: progress("bridges", n, count))
-    return cells_of(once_each(np.concatenate([found[start] for start in sorted(found)])))
+    return once_each(np.concatenate([found[start] for start in sorted(found)]))

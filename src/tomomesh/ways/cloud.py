@@ -64,10 +64,8 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     rough = measured("smooth", _smoothed, shell.value, settings)
     kept, smoothed, ring = rough.value.faces, rough.value.mesh, rough.value.ring
     rest = measured("fit", _fitted, shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
-    apart = measured(
-        "untangle", untangle, rest.value.mesh, smoothed.vertices, ring, CrossingFaces(settings.run.threads),
-        rough.value.lattice,
-    )  # fmt: skip
+    tangled = CrossingFaces(settings.run.threads)
+    apart = measured("untangle", untangle, rest.value.mesh, smoothed.vertices, ring, tangled, rough.value.lattice)
     mesh, taken_back, crossing = apart.value
     cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64))
     trace = None if rest.value.fitted is None else rest.value.fitted.trace
@@ -80,7 +78,7 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
         encloses=enclosed if walls.value == 1 else None,
     )  # fmt: skip
     fitted = fit_found(trace, len(smoothed.vertices), taken_back=taken_back, filled=filled)
-    followed = follows(shell.value, mesh, samples, origin, threads=settings.run.threads)
+    followed = follows(shell.value, mesh, samples, origin, tangled.tree, threads=settings.run.threads)
     return folded(surface, settled, shell, walls, rough, rest, apart, fitted, followed, place_found(points))
 
 

@@ -91,12 +91,13 @@ def squared_to_box_of(
     return squared
 
 
-@kernel("void(f8[:,::1], f8[:,::1], i4[:,::1], f8[:,::1], f8[::1], i4[::1], i8, i8)")
+@kernel("void(f8[:,::1], f8[:,::1], i4[:,::1], f8[:,::1], f8, f8[::1], i4[::1], i8, i8)")
 def nearest_simplices(
     points: NDArray[np.float64],
     vertices: NDArray[np.float64],
     simplices: NDArray[np.int32],
     boxes: NDArray[np.float64],
+    enough: float,
     squared: NDArray[np.float64],
     nearest: NDArray[np.int32],
     start: int,
@@ -113,6 +114,8 @@ def nearest_simplices(
         Triangles (k = 3) or vertices (k = 1), in the order of the tree.
     boxes : (4 P, 3) float array
         The tree. See `tomomesh.kernels.measure.bvh`.
+    enough : float
+        Squared distance at which a nearer one is no longer sought.
     squared : (p,) float array
     nearest : (p,) int32 array
         Results.
@@ -126,7 +129,7 @@ def nearest_simplices(
     for p in range(start, stop):
         best, climbing = np.inf, home
         stack[0], gaps[0], waiting = home, 0.0, 1
-        while waiting > 0 or climbing > 1:
+        while (waiting > 0 or climbing > 1) and best > enough:
             if waiting == 0:
                 stack[0], gaps[0], waiting = climbing ^ 1, squared_to_box(points, p, boxes, climbing ^ 1), 1
                 climbing >>= 1

@@ -56,6 +56,12 @@ def block_number(blocks: Integers, wanted: int) -> int:
     return low if low < len(blocks) and blocks[low] == wanted else -1
 
 
+@kernel("i8(f8, f8, f8)")
+def cell_at(place: float, low: float, edge: float) -> int:
+    """Return the number of the cell along an axis that holds a place; 0 where it lies below all."""
+    return int(np.floor(max((place - low) / edge, 0.0)))
+
+
 @kernel("i8(f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], f8, i8[::1])")
 def gather(
     points: Floats,
@@ -72,26 +78,24 @@ def gather(
     -----
     Cubes that follow each other along x within a block are one range of points.
     """
-    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
-    for axis in range(3):
-        low[axis] = np.int64(np.floor(max((place[axis] - radius - frame[axis]) / frame[3], 0.0)))
-        high[axis] = np.int64(np.floor((place[axis] + radius - frame[axis]) / frame[3]))
-    count = 0
-    for bz in range(low[2] >> 3, (high[2] >> 3) + 1):
-        for by in range(low[1] >> 3, (high[1] >> 3) + 1):
-            for bx in range(low[0] >> 3, (high[0] >> 3) + 1):
+    x, y, z, edge, squares = place[0], place[1], place[2], frame[3], radius * radius
+    x0, x1 = cell_at(x - radius, frame[0], edge), cell_at(x + radius, frame[0], edge)
+    y0, y1 = cell_at(y - radius, frame[1], edge), cell_at(y + radius, frame[1], edge)
+    z0, z1 = cell_at(z - radius, frame[2], edge), cell_at(z + radius, frame[2], edge)
+    count, room = 0, len(found)
+    for bz in range(z0 >> 3, (z1 >> 3) + 1):
+        for by in range(y0 >> 3, (y1 >> 3) + 1):
+            for bx in range(x0 >> 3, (x1 >> 3) + 1):
                 block = block_number(blocks, (((bz << BITS) | by) << BITS) | bx)
                 if block < 0:
                     continue
-                first, last = max(low[0] - 8 * bx, 0), min(high[0] - 8 * bx, 7)
-                for z in range(max(low[2] - 8 * bz, 0), min(high[2] - 8 * bz, 7) + 1):
-                    for y in range(max(low[1] - 8 * by, 0), min(high[1] - 8 * by, 7) + 1):
-                        row = 512 * block + 64 * z + 8 * y
+                first, last = max(x0 - 8 * bx, 0), min(x1 - 8 * bx, 7)
+                for cz in range(max(z0, 8 * bz), min(z1, 8 * bz + 7) + 1):
+                    for cy in range(max(y0, 8 * by), min(y1, 8 * by + 7) + 1):
+                        row = 512 * block + 64 * (cz - 8 * bz) + 8 * (cy - 8 * by)
                         for p in range(start[row + first], start[row + last + 1]):
-                            squared = 0.0
-                            for axis in range(3):
-                                squared += (points[p, axis] - place[axis]) ** 2
-                            if squared <= radius * radius and count < len(found):
+                            squared = (points[p, 0] - x) ** 2 + (points[p, 1] - y) ** 2 + (points[p, 2] - z) ** 2
+                            if squared <= squares and count < room:
                                 found[count] = p
                                 count += 1
     return count
@@ -158,6 +162,35 @@ def fit_planes(
         planes[p, 4] = np.sqrt(max(spread[0, 0], 0.0) / total)
 
 
+@kernel("f8(f8[:,::1], i8, f8[:,::1], f8[::1])")
+def add_terms(rows: Floats, used: int, matrix: Floats, right: Floats) -> float:
+    """Add up the normal equations of a quadratic 1, u, v, u^2, u v, v^2 over rows of u, v, height and weight.
+
+    Only the lower half of the (6, 6) matrix is written. Returns the sum of the weights. One number a moment: they stay
+    in registers.
+    """
+    total = wu = wv = wuu = wuv = wvv = wuuu = wuuv = wuvv = wvvv = 0.0
+    wuuuu = wuuuv = wuuvv = wuvvv = wvvvv = wh = wuh = wvh = wuuh = wuvh = wvvh = 0.0
+    for n in range(used):
+        u, v, h, w = rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3]
+        uu, uv, vv = u * u, u * v, v * v
+        a, b, c, d, e = w * u, w * v, w * uu, w * uv, w * vv
+        total, wu, wv, wuu, wuv, wvv = total + w, wu + a, wv + b, wuu + c, wuv + d, wvv + e
+        wuuu, wuuv, wuvv, wvvv = wuuu + c * u, wuuv + c * v, wuvv + e * u, wvvv + e * v
+        wuuuu, wuuuv, wuuvv = wuuuu + c * uu, wuuuv + c * uv, wuuvv + c * vv
+        wuvvv, wvvvv = wuvvv + e * uv, wvvvv + e * vv
+        wh, wuh, wvh = wh + w * h, wuh + a * h, wvh + b * h
+        wuuh, wuvh, wvvh = wuuh + c * h, wuvh + d * h, wvvh + e * h
+    right[0], right[1], right[2], right[3], right[4], right[5] = wh, wuh, wvh, wuuh, wuvh, wvvh
+    matrix[0, 0], matrix[1, 0], matrix[1, 1] = total, wu, wuu
+    matrix[2, 0], matrix[2, 1], matrix[2, 2] = wv, wuv, wvv
+    matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[3, 3] = wuu, wuuu, wuuv, wuuuu
+    matrix[4, 0], matrix[4, 1], matrix[4, 2], matrix[4, 3], matrix[4, 4] = wuv, wuuv, wuvv, wuuuv, wuuvv
+    matrix[5, 0], matrix[5, 1], matrix[5, 2], matrix[5, 3], matrix[5, 4] = wvv, wuvv, wvvv, wuuvv, wuvvv
+    matrix[5, 5] = wvvvv
+    return float(total)
+
+
 @kernel("void(f8[:,::1], f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], b1[::1], f8[:,::1], i8, i8)")
 def settle(
     points: Floats,
@@ -194,7 +227,7 @@ def settle(
         Points to work on.
     """
     found, axes = np.empty(MOST, np.int64), np.empty((2, 3))
-    matrix, right, terms, rows = np.empty((6, 6)), np.empty(6), np.empty(6), np.empty((MOST, 4))
+    matrix, right, rows = np.empty((6, 6)), np.empty(6), np.empty((MOST, 4))
     for p in range(begin, end):
         h = width[p]
         tangents(planes[p, :3], axes)
@@ -226,18 +259,7 @@ def settle(
                 break
             h *= WIDER
         h = h / WIDER if used < ENOUGH else h
-        matrix[:] = 0.0
-        right[:] = 0.0
-        total = 0.0
-        for n in range(used):
-            u, v, w = rows[n, 0], rows[n, 1], rows[n, 3]
-            terms[0], terms[1], terms[2], terms[3], terms[4], terms[5] = 1.0, u, v, u * u, u * v, v * v
-            total += w
-            for i in range(6):
-                weighted = w * terms[i]
-                right[i] += weighted * rows[n, 2]
-                for j in range(i + 1):
-                    matrix[i, j] += weighted * terms[j]
+        total = add_terms(rows, used, matrix, right)
         # a millionth of the weights on the diagonal: neighbors on a line leave some of the six terms open
         for i in range(6):
             matrix[i, i] += 1e-6 * total

@@ -83,30 +83,57 @@ def fill_triangle(samples: Floats, a: int, b: int, c: int, gap: float, places: F
             squared += (samples[one, axis] - samples[two, axis]) ** 2
         longest = max(longest, np.sqrt(squared))
     pieces = np.int64(longest / gap) + 1
+    x, y, z, share = samples[a, 0], samples[a, 1], samples[a, 2], 1.0 / pieces
+    ux, uy, uz = share * (samples[b, 0] - x), share * (samples[b, 1] - y), share * (samples[b, 2] - z)
+    vx, vy, vz = share * (samples[c, 0] - x), share * (samples[c, 1] - y), share * (samples[c, 2] - z)
     for i in range(pieces + 1):
         for j in range(pieces + 1 - i):
             if total < len(places):
-                for axis in range(3):
-                    start = samples[a, axis]
-                    one, two = samples[b, axis] - start, samples[c, axis] - start
-                    places[total, axis] = start + (i * one + j * two) / pieces
+                places[total, 0], places[total, 1] = x + i * ux + j * vx, y + i * uy + j * vy
+                places[total, 2] = z + i * uz + j * vz
             total += 1
     return total
 
 
-@kernel("i8(f8[:,::1], i8[::1], i4[::1], f8[::1], f8, f8, f8[:,::1], i8, i8)")
+@kernel("i8(f8[:,::1], i8, f8[::1], f8[::1], i8[::1], i8[::1], i8)")
+def take_cubes(
+    places: Floats, count: int, lowest: Floats, cell: Floats, steps: Integers, taken: Integers, total: int
+) -> int:
+    """Take the cubes of some places into a table of keys, (2^h,) with room for all; return how many it then holds."""
+    last, mask = np.int64(-1), len(taken) - 1
+    a, b, c = 1.0 / cell[0], 1.0 / cell[1], 1.0 / cell[2]
+    for n in range(count):
+        key = steps[3] + steps[0] * np.int64(np.floor(a * (places[n, 0] - lowest[0])))
+        key += steps[1] * np.int64(np.floor(b * (places[n, 1] - lowest[1])))
+        key += steps[2] * np.int64(np.floor(c * (places[n, 2] - lowest[2])))
+        if key == last:
+            continue
+        last, at = key, (key ^ key >> 17 ^ key >> 34) & mask  # bits of all three axes
+        while taken[at] >= 0 and taken[at] != key:
+            at = (at + 1) & mask
+        if taken[at] < 0:
+            taken[at] = key
+            total += 1
+    return total
+
+
+@kernel("i8(f8[:,::1], i8[::1], i4[::1], f8[::1], f8, f8[::1], f8[::1], f8, i8[::1], f8[:,::1], i8[::1], i8, i8)")
 def lay_stars(
     samples: Floats,
     blocks: Integers,
     start: NDArray[np.int32],
     frame: Floats,
     sight: float,
+    lowest: Floats,
+    cell: Floats,
     gap: float,
+    steps: Integers,
     places: Floats,
+    taken: Integers,
     begin: int,
     end: int,
 ) -> int:
-    """Lay places over the Delaunay triangles of each sample and its neighbors, in its plane.
+    """Find the cubes of the Delaunay triangles of each sample and its neighbors, in its plane.
 
     Parameters
     ----------
@@ -116,17 +143,23 @@ def lay_stars(
         See `tomomesh.kernels.pointcloud.samples`.
     sight : float
         How far to look, times the spacing.
+    lowest, cell : (3,) float arrays
+        Lowest corner of cube (0, 0, 0), and the edges of the cubes.
     gap : float
-        Largest distance of the places.
+        Largest distance of the places on a triangle.
+    steps : (4,) int64 array
+        What a step along each axis adds to a cube's key, and the key of cube (0, 0, 0); none is negative.
     places : (b, 3) float array
-        Result; some are left out where the array is too short.
+        Room for those of one triangle.
+    taken : (2^h,) int64 array
+        -1 on entry. Result: the keys among others of -1, in no order.
     begin, end : int
-        Points to work on.
+        Samples to work on.
 
     Returns
     -------
     int
-        Places that there are.
+        0, or 1 where the table is too short to be half empty, or 2 where the places are too few.
     """
     found, flat = np.empty(MOST, np.int64), np.empty((MOST, 2))
     total = 0
@@ -146,11 +179,16 @@ def lay_stars(
                 two = beside(flat, count, one, way)
                 if two < 0:
                     break
-                total = fill_triangle(samples, p, found[one], found[two], gap, places, total)
+                laid = fill_triangle(samples, p, found[one], found[two], gap, places, 0)
+                if laid > len(places):
+                    return 2
+                if 2 * (total + laid) > len(taken):
+                    return 1
+                total = take_cubes(places, laid, lowest, cell, steps, taken, total)
                 closed = two == first
                 if closed:
                     break
                 one = two
             if closed:
                 break
-    return total
+    return 0

@@ -15,7 +15,9 @@ from ...cuberille.parting import joint, neck
 from ...cuberille.partition import cubes_over
 from ...measure.tree import Tree
 from ...model.cubes import cells_of, keys_of
-from ...pointcloud.stars import cells_between
+from ...model.mesh import TriMesh
+from ...pointcloud.facing import facing_pairs
+from ...pointcloud.stars import keys_between
 from ...stage import Stage
 from .samples import NOISE
 
@@ -25,7 +27,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...cuberille.bitmasks import Bitmask
-    from ...model.mesh import TriMesh
     from ...pointcloud.samples import Samples
     from ...progress import Progress
     from ...settings import Settings
@@ -51,18 +52,30 @@ passes a sample by: all that are joined do both, a rounded edge only one."""
 PASSED, BESIDE = 24, 4.0
 """Samples passed by that tell of a joint, within how many sampling distances of one of them: 36 and more where turns of
 a coil were joined, at most 17 in the clouds of docs/clouds.md (cat, skull, fandisk; measured)."""
-FACING, ACROSS, TAKEN_IN = 2.0, 0.9, 0.1
-"""How near, sampling distances, two samples lie that face one another, the cosine from which the step between them is
-along the normals of both, and how far off, over the noise, the mesh passes a pair by that it has joined; of more noise
-than that nothing is said, for its normals face anywhere (bunny and wingnut of .1 % noise were warned of). It passes 2
-to 12 pairs by where rods cross 1 s apart (six seeds), none in the clouds of docs/clouds.md. With a cosine of .8 the
-skull has 15 and the rocker-arm 1; with .25 s two seeds of six have none; 2.5 s changes nothing of it."""
+FACING, TAKEN_IN = 2.0, 0.1
+"""How near, sampling distances, two samples lie that face one another, and how far off, over the noise, the mesh passes
+a pair by that it has joined; of more noise than that nothing is said, for its normals face anywhere (bunny and wingnut
+of .1 % noise were warned of). It passes 2 to 12 pairs by where rods cross 1 s apart (six seeds), none in the clouds of
+docs/clouds.md. With .25 s two seeds of six have none; 2.5 s changes nothing of it."""
+NO_PAIRS = np.empty((0, 2), np.int64)
+"""Of samples in noise."""
 
 
-def may_join(shell: Shell) -> bool:
-    """Tell whether a shell has handles, or points deep inside: what is near one another may have been joined."""
+def may_join(shell: Shell, samples: Samples, *, threads: int = 0) -> bool:
+    """Tell whether a shell may have joined what is near one another.
+
+    Either it has points deep inside; or it has handles, and samples face one another that its cubes can join. In noise
+    these face anywhere, and handles suffice.
+    """
     test = shell.leak_test
-    return test.tight and (test.faces.handles > 0 or joint(test.shell) is not None)
+    if not test.tight or joint(test.shell) is not None:
+        return test.tight
+    if test.faces.handles == 0 or not _is_clean(samples):
+        return test.faces.handles > 0
+    widest = 2 * (1 + test.shell.closing) * shell.cell  # along each axis, of cubes that touch once they are dilated
+    pairs = facing_pairs(samples, float(np.linalg.norm(widest)), threads=threads)
+    steps = np.abs(np.diff(samples.positions[pairs], axis=1)[:, 0])
+    return bool((steps <= widest).all(axis=1).any())
 
 
 def apart(
@@ -119,8 +132,8 @@ def of_small_cubes(shell: Shell, samples: Samples, settings: Settings, progress:
         return shell
     threads = settings.run.threads
     lowest, keys = cubes_over(np.concatenate([samples.positions, shell.spanned.places]), cell)
-    between = cells_between(samples, lowest, cell, threads=threads, progress=progress)
-    cells = cells_of(once_each(np.concatenate([keys, keys_of(between)])))
+    between = keys_between(samples, lowest, cell, threads=threads, progress=progress)
+    cells = cells_of(once_each(np.concatenate([keys, between])))
     cavities = settings.cubes.surface != "outer"
     test = close_leaks(cells, CLOSINGS, cavities=cavities, threads=threads, progress=progress)
     return replace(shell, cell=cell, lowest=lowest, cubes=len(cells), leak_test=test, finer=FINER)
@@ -143,8 +156,9 @@ def _is_noisy(samples: Samples) -> bool:
 
 
 def _without_say(shell: Shell, samples: Samples) -> int:
-    away = scipy.spatial.cKDTree(shell.middles(shell.leak_test.faces.cells)).query(samples.positions)[0]
-    return int(np.count_nonzero(away > BURIED * float(np.median(samples.spacing))))
+    reach, order = BURIED * float(np.median(samples.spacing)), np.arange(len(samples.positions), dtype=np.int32)
+    tree = Tree.of_points(shell.middles(shell.leak_test.faces.cells))
+    return int(np.count_nonzero(tree.nearest(samples.positions, order=order, enough=reach)[0] > reach))
 
 
 def _leaks_more(other: Shell, shell: Shell, samples: Samples) -> bool:
@@ -155,7 +169,7 @@ def _leaks_more(other: Shell, shell: Shell, samples: Samples) -> bool:
     """
     reach = BESIDE * float(np.median(samples.spacing))
     looked_at = _places(other, other.leak_test.shell.occupied & ~other.leak_test.shell.witnesses)
-    _, once = np.unique(np.floor(looked_at / reach), axis=0, return_index=True)
+    _, once = np.unique(keys_of(np.floor(looked_at / reach).astype(np.int64)), return_index=True)
     shares = (_share_around(looked_at[once], one, reach) for one in (other, shell))
     return any(after < HOPELESS and before >= TIGHT for after, before in zip(*shares, strict=True))
 
@@ -175,13 +189,15 @@ def _places(shell: Shell, bitmask: Bitmask) -> Floats:
     return shell.middles(shell.leak_test.shell.blocks.cells(bitmask))
 
 
-def follows(shell: Shell, mesh: TriMesh, samples: Samples, origin: Floats, *, threads: int = 0) -> Stage[None]:
-    """Say where points lie deep inside of a mesh, or it passes them by."""
+def follows(
+    shell: Shell, mesh: TriMesh, samples: Samples, origin: Floats, tree: Tree | None, *, threads: int = 0
+) -> Stage[None]:
+    """Say where points lie deep inside of a mesh, or it passes them by; the tree is that of its faces."""
     if not shell.leak_test.tight or shell.doubt:
         return Stage(None)
     deep = joint(shell.leak_test.shell, shell.finer)
     inside = None if deep is None else shell.middles(deep)
-    place = passed_by(mesh, samples, threads=threads) if inside is None else inside
+    place = passed_by(mesh, samples, tree, threads=threads) if inside is None else inside
     if place is None:
         return Stage(None)
     where = f"points lie deep inside of the surface around {place_in_words(place + origin)}"
@@ -193,29 +209,27 @@ def place_in_words(place: Floats) -> str:
     return "(" + ", ".join(f"{c:.6g}" for c in place) + ")"
 
 
-def passed_by(mesh: TriMesh, samples: Samples, *, threads: int = 0) -> Floats | None:
+def passed_by(mesh: TriMesh, samples: Samples, tree: Tree | None = None, *, threads: int = 0) -> Floats | None:
     """Return the place (3,) where a mesh passes samples by, facing pairs or most; None if it follows all but a few."""
-    away, face = Tree.of_faces(mesh, threads=threads).nearest(samples.positions, threads=threads)
-    normals = mesh.face_vectors[face]
-    across = np.abs((normals * samples.normals).sum(axis=1)) / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
-    spacing = float(np.median(samples.spacing))
-    between = facing(samples)
+    spacing, noise = float(np.median(samples.spacing)), float(np.median(samples.noise))
+    enough = min(OFF * spacing, TAKEN_IN * spacing + noise)
+    tree = Tree.of_faces(mesh, threads=threads) if tree is None else tree
+    order = np.arange(len(samples.positions), dtype=np.int32)  # that of their cubes
+    away, face = tree.nearest(samples.positions, order=order, enough=enough, threads=threads)
+    between = facing_pairs(samples, FACING * spacing, threads=threads) if _is_clean(samples) else NO_PAIRS
     taken_in = away[between].max(axis=1, initial=0)
-    if taken_in.max(initial=0) > TAKEN_IN * spacing + float(np.median(samples.noise)):
+    if taken_in.max(initial=0) > TAKEN_IN * spacing + noise:
         return np.asarray(samples.positions[between[taken_in.argmax()]].mean(axis=0))
-    passed = samples.positions[(away > OFF * spacing) & (across < TURNED)]
+    off = np.flatnonzero(away > OFF * spacing)
+    normals = TriMesh(mesh.vertices, mesh.faces[face[off]]).face_vectors
+    across = np.abs((normals * samples.normals[off]).sum(axis=1)) / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+    passed = samples.positions[off[across < TURNED]]
     if len(passed) < PASSED:
         return None
     beside = scipy.spatial.cKDTree(passed).query_ball_point(passed, BESIDE * spacing, return_length=True)
     return np.asarray(passed[beside.argmax()]) if beside.max() >= PASSED else None
 
 
-def facing(samples: Samples) -> NDArray[np.int64]:
-    """Return the pairs (k, 2) of samples that face one another across what parts two sheets; none in noise."""
-    spacing = float(np.median(samples.spacing))
-    if float(np.median(samples.noise)) > TAKEN_IN * spacing:
-        return np.empty((0, 2), np.int64)
-    pairs = scipy.spatial.cKDTree(samples.positions).query_pairs(FACING * spacing, output_type="ndarray")
-    step = np.diff(samples.positions[pairs], axis=1)
-    along = np.abs((step * samples.normals[pairs]).sum(axis=2)).min(axis=1)
-    return np.asarray(pairs[along > ACROSS * np.linalg.norm(step[:, 0], axis=1)])
+def _is_clean(samples: Samples) -> bool:
+    """Tell whether there is so little noise that normals tell which samples face one another."""
+    return float(np.median(samples.noise)) <= TAKEN_IN * float(np.median(samples.spacing))

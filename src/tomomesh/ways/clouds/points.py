@@ -55,7 +55,7 @@ class Points:
     @property
     def places(self) -> NDArray[np.float64]:
         """The points, and what was interpolated between them, (n + k, 3)."""
-        return np.concatenate([self.cloud.positions, self.between])
+        return np.concatenate([self.cloud.positions, self.between]) if len(self.between) else self.cloud.positions
 
     @property
     def input(self) -> str:

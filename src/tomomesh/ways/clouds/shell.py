@@ -111,7 +111,7 @@ def shell_around(points: Points, samples: Samples, settings: Settings, progress:
     if unsure and (settings.cubes.fill_holes or merged or not _is_open(_borders(shell, samples, settings), samples)):
         other = _by_normals(shell, samples, lowest_corner(points), settings, progress)
         shell = other if other.leak_test.is_better_than(shell.leak_test) else shell
-    if settings.cubes.closing is None and may_join(shell):
+    if settings.cubes.closing is None and may_join(shell, samples, threads=settings.run.threads):
         origin = lowest_corner(points)
         normals = partial(_by_normals, samples=samples, origin=origin, settings=settings, progress=progress)
         shell = apart(shell, samples, origin, settings, progress, normals)
