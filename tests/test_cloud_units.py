@@ -69,7 +69,7 @@ class TestStated:
         meters = placed * {"m": 1.0, "mm": 1e-3}[unit]
         turned = np.array([-1, -1, 1]) if cloud.frame == "RAS" else np.ones(3)
         assert cloud.frame == ("RAS" if kind == "gii" else "LPS")
-        assert cKDTree(mesh.vertices).query(meters * turned, p=np.inf)[0].max() < 1e-6
+        assert np.max(cKDTree(mesh.vertices).query(meters * turned, p=np.inf)[0]) < 1e-6
 
     def test_by_an_e57(self, tmp_path: Path) -> None:
         pye57 = needed("pye57")

@@ -66,7 +66,8 @@ def _way(name: str) -> list[str]:
 
 def _ball(side: int, kind: Any, outside: int, inside: int) -> NDArray[Any]:
     z, y, x = (axis - side / 2 for axis in np.ogrid[:side, :side, :side])
-    return np.where(x * x + y * y + z * z < (side / 3) ** 2, kind(inside), kind(outside))
+    ball: NDArray[Any] = np.where(x * x + y * y + z * z < (side / 3) ** 2, kind(inside), kind(outside))
+    return ball
 
 
 def clouds(folder: Path) -> list[tuple[str, list[str], Path]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -123,9 +124,9 @@ def meshes(folder: Path) -> None:
     mesh = TriMesh(50 * vertices, faces)
     for suffix, (reads, writes) in MESHES.items():
         ours, theirs = folder / f"ours{suffix}", str(folder / f"theirs{suffix}")
-        _race(f"{suffix} of {len(faces)} faces written", lambda at=ours: write_mesh(mesh, at), writes, mesh, theirs)
+        _race(f"{suffix} of {len(faces)} faces written", partial(write_mesh, mesh, ours), writes, mesh, theirs)
         write_mesh(mesh, ours)
-        _race(f"{suffix} of {len(faces)} faces read", lambda at=ours: read_mesh(at), reads, mesh, str(ours))
+        _race(f"{suffix} of {len(faces)} faces read", partial(read_mesh, ours), reads, mesh, str(ours))
 
 
 def clouds(folder: Path) -> None:
@@ -133,7 +134,7 @@ def clouds(folder: Path) -> None:
     for suffix, reads in CLOUDS.items():
         path = folder / f"cloud{suffix}"
         if find_spec(reads.package) and _written(positions, path):
-            _race(f"{suffix} of {POINTS} points read", lambda at=path: read_points(at), reads, None, str(path))
+            _race(f"{suffix} of {POINTS} points read", partial(read_points, path), reads, None, str(path))
         else:
             note(f"{suffix} of {POINTS} points read", f"not measured: {reads.package} is not installed")
 
@@ -161,7 +162,8 @@ def _race(figure: str, ours: Callable[[], object], peer: Peer, made: Any, path: 
     if not find_spec(peer.package):
         note(figure, f"not measured: {peer.package} is not installed")
         return
-    race(f"{figure}, {peer.package}", *costs(ours, lambda: peer.does(made, path), repeats=3), MOST)
+    own, other = costs(ours, lambda: peer.does(made, path), repeats=3)
+    race(f"{figure}, {peer.package}", own, other, MOST)
 
 
 if __name__ == "__main__":

@@ -47,7 +47,9 @@ def main() -> None:
         study, window = _study(Path(folder))
         line = [*_program(), "reconstruct", str(study), "-o", f"{folder}/m.stl", "--quiet"]
         for name, more in (("as it is", []), ("--network none", ["--network", "none"])):
-            _command(f"54 slices to STL, {name}", [*line, "--lower", window[0], "--upper", window[1], *more], study, window)
+            _command(
+                f"54 slices to STL, {name}", [*line, "--lower", window[0], "--upper", window[1], *more], study, window
+            )
         _import()
         _first_demo(Path(folder))
 
@@ -83,7 +85,8 @@ def _command(figure: str, line: list[str], study: Path, window: tuple[str, str])
 
 def _import() -> None:
     ours, numpy = costs(
-        lambda: _run(sys.executable, "-c", "import tomomesh.pipeline"), lambda: _run(sys.executable, "-c", "import numpy")
+        lambda: _run(sys.executable, "-c", "import tomomesh.pipeline"),
+        lambda: _run(sys.executable, "-c", "import numpy"),
     )
     at_most("import tomomesh.pipeline: CPU", ours.cpu, 0.6, "s")
     note("of it Python and NumPy", f"{numpy.cpu:.3g} s")
