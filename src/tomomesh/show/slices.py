@@ -104,7 +104,7 @@ def _regions(mask: Pixels, places: Floats, plane: Plane) -> Pixels:
     """Give each pixel of the window the color of its nearest neuron, (J, I, 3)."""
     rows, columns = np.nonzero(mask)
     pixels = plane.place(np.stack([columns, rows], axis=1))
-    winners, _ = match(np.ascontiguousarray(places.T), np.ascontiguousarray(pixels.T))
+    winners, _ = match(places, pixels)
     shown = np.zeros((*mask.shape, 3), np.uint8)
     shown[rows, columns] = _wheel(len(places))[winners]
     return shown
