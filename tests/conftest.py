@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import pkgutil
+from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from itertools import product
 from pathlib import Path
@@ -48,8 +50,9 @@ def pytest_configure(config: pytest.Config) -> None:
     if config.getoption("dist", "no") != "no" and not hasattr(config, "workerinput"):
         names = [one.name for one in pkgutil.walk_packages(tomomesh.__path__, "tomomesh.")]
         modules = [import_module(name) for name in names if not name.endswith("__main__")]
-        for kernel in {one for module in modules for one in vars(module).values() if isinstance(one, Kernel)}:
-            loaded(kernel)
+        kernels = {one: None for module in modules for one in vars(module).values() if isinstance(one, Kernel)}
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(loaded, kernels))
 
 
 def size(compiled: Number, plain: Number) -> Number:
