@@ -94,12 +94,13 @@ def _curves(
     ax.limit(1 - 0.03 * count, bottom, count + 0.03 * count, top, equal=False)
     words = [f"{value:g}" for value in 10.0**marked] if log else None
     rule(ax, along=along, x=ticks(1, count, 9, whole=True), y=marked, words=words, grid=True)
+    places: list[Floats] = []
     if at is not None and (at > 0 or not log):
         line = np.log10(at) if log else at
         level_line = np.array([[[ax.limits[0], line], [ax.limits[2], line]]])
         lines(ax, level_line, color=MUTED, width=0.9, dashed=True)
         small_print(ax, name, np.array([1, line]), (0, 6), align=0)
-    places = []
+        places.append(np.column_stack([np.arange(1, count + 1), np.full(count, line)]))
     for each, color in zip(heights, COLORS, strict=False):
         places.append(_places(each, log=log))
         sides, known = np.stack([places[-1][:-1], places[-1][1:]], axis=1), np.isfinite(places[-1][:, 1])
