@@ -23,7 +23,7 @@ from tomomesh.agreement.sides import areas_of, samples_of, sides_in_slabs
 from tomomesh.agreement.voxels import compare_with_voxels, distance_to_voxels
 from tomomesh.cli import main
 from tomomesh.errors import UsageError
-from tomomesh.isosurface.sides import Sides
+from tomomesh.isosurface.sides import WindowSides
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -59,7 +59,7 @@ class TestSides:
             patch.setattr(sides, "SLAB_VOXELS", slab)
             parts = list(sides_in_slabs(mask))
         found = np.concatenate([part.middles for part in parts])
-        assert sorted(map(tuple, found)) == sorted(map(tuple, Sides.of(mask).some()))
+        assert sorted(map(tuple, found)) == sorted(map(tuple, WindowSides.of(mask).some()))
         for part in parts:
             corners, triangles = part.triangles()
             if len(part.middles):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from conftest import law, seeds
 from tomomesh import reconstruct_points
-from tomomesh.kernels.dynamics.interpolation import ALIKE, NEAREST, SMOOTH, height_between, nearest_alike
+from tomomesh.kernels.dynamics.interpolation import LEAST_COSINE, NEAREST, SMOOTH, height_between, nearest_facing
 from tomomesh.pointcloud.samples import settle_points
 from tomomesh.pointcloud.search import Index
 
@@ -76,11 +76,11 @@ def test_the_nearest_samples_that_face_alike_are_listed(seed: int, reach: float)
     samples = np.column_stack([rng.uniform(-1, 1, (40, 3)), normals, np.ones(40)])
     index, near = Index.of(samples[:, :3], 0.7), np.empty((NEAREST, 4))
     up, place = np.array([0, 0, 1.0]), rng.uniform(-0.3, 0.3, 3)
-    count = nearest_alike(samples[index.order], *index.cells, place, up, reach, np.empty(64, np.int64), near)
+    count = nearest_facing(samples[index.order], *index.cells, place, up, reach, np.empty(64, np.int64), near)
     steps = samples[:, :3] - place
     squared = (steps**2).sum(axis=1)
-    alike = np.flatnonzero((normals[:, 2] >= ALIKE) & (squared <= reach**2))
-    expected = alike[np.argsort(squared[alike])][:NEAREST]
+    facing = np.flatnonzero((normals[:, 2] >= LEAST_COSINE) & (squared <= reach**2))
+    expected = facing[np.argsort(squared[facing])][:NEAREST]
     np.testing.assert_allclose(near[:count, 3], squared[expected], rtol=0, atol=1e-12)
     np.testing.assert_allclose(near[:count, 2], steps[expected, 2], rtol=0, atol=1e-12)
     flat = (steps[expected, :2] ** 2).sum(axis=1)

@@ -22,7 +22,7 @@ from tomomesh.cli import main
 from tomomesh.errors import GeometryError
 from tomomesh.finish import finish
 from tomomesh.followed import boundary_followed, outline_followed
-from tomomesh.isosurface.sides import Sides
+from tomomesh.isosurface.sides import WindowSides
 from tomomesh.judgement import LIMITS, OFF, TOLD, follow
 from tomomesh.progress import silent
 
@@ -92,7 +92,7 @@ class TestMeasure:
                     place = np.array([k, j, i], float)
                     place[axis] += side / 2
                     expected.add(tuple(place[::-1]))
-        sides = Sides.of(mask)
+        sides = WindowSides.of(mask)
         found = [tuple(place) for place in sides.some()]
         assert len(found) == len(set(found)) == len(expected) == len(sides)
         assert set(found) == expected
@@ -105,7 +105,7 @@ class TestMeasure:
         rng = np.random.default_rng(seed)
         mask = rng.random(shape) < share
         places = rng.uniform(-1.5, 2.5, (40, 3)) * shape[::-1]
-        sides = Sides.of(mask)
+        sides = WindowSides.of(mask)
         expected = cdist(places, sides.some()).min(axis=1, initial=np.inf)
         np.testing.assert_allclose(sides.distances(places), expected, rtol=1e-12)
 

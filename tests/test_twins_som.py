@@ -18,7 +18,7 @@ from tomomesh.kernels.som.neighborhoods import BUBBLE, GAUSSIAN, LATERAL, weigh
 from tomomesh.kernels.som.search import BLOCK
 from tomomesh.model.lattice import TOPOLOGIES, Lattice, lattice
 from tomomesh.som import products
-from tomomesh.som.inputs import Blocks, match
+from tomomesh.som.inputs import SortedInputs, match
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -78,7 +78,7 @@ def box_of(inputs: Floats) -> Floats:
 
 def train_in_blocks(codebook: Floats, by_axis: Floats, amounts: Floats, *falls: Any) -> int:
     """Train on inputs (d, n) as `products.train_batch` does, by the compiled loops."""
-    blocks = Blocks.of(by_axis, box_of(by_axis.T))
+    blocks = SortedInputs.of(by_axis, box_of(by_axis.T))
     return batch_kernels.train_batch(codebook, blocks.places, blocks.boxes, blocks.filled(amounts), *falls)
 
 
@@ -193,7 +193,7 @@ def test_a_block_leaves_out_no_neuron_that_may_win(seed: int, d: int, n: int, sh
 @given(seed=seeds, n=st.integers(1, 300), d=st.integers(2, 4))
 def test_blocks_hold_every_input_once_and_their_boxes_hold_it(seed: int, n: int, d: int) -> None:
     inputs = np.random.default_rng(seed).normal(size=(d, n))
-    blocks = Blocks.of(inputs, box_of(inputs.T))
+    blocks = SortedInputs.of(inputs, box_of(inputs.T))
     np.testing.assert_array_equal(np.sort(blocks.order[:n]), np.arange(n))
     np.testing.assert_array_equal(blocks.places, inputs[:, blocks.order])
     middle, half = (np.repeat(edge, BLOCK, axis=1) for edge in blocks.boxes)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .isosurface.sides import Sides
+from .isosurface.sides import WindowSides
 from .kernels.threads import in_blocks
 from .measure.links import Links
 from .measure.report import area_samples
@@ -75,7 +75,7 @@ class Followed:
         How it is followed, a key of `tomomesh.judgement.LIMITS`.
     affine : (4, 4) float array
         Indices of the voxels that lengths are counted in to patient millimeters.
-    places : (n, 3) float array or Sides
+    places : (n, 3) float array or WindowSides
         On the boundary, as voxel indices (x, y, z); or the faces of a window.
     inside : float
         Voxels that the surface should enclose.
@@ -83,17 +83,17 @@ class Followed:
         Voxels that count as one: more than 1 where a network cannot be asked to tell voxels apart.
     wall : (K, J, I) bool array or None
         The window, where the surface runs along its middle.
-    besides : Sides or None
+    besides : WindowSides or None
         Where the surface may lie as well: around what lies in a hole, or over the openings of a wall.
     """
 
     what: str
     affine: Floats
-    places: Floats | Sides
+    places: Floats | WindowSides
     inside: float
     unit: float = 1.0
     wall: Mask | None = None
-    besides: Sides | None = None
+    besides: WindowSides | None = None
 
     @classmethod
     def in_space(cls, found: Boundary, mask: Mask) -> Followed:
@@ -128,27 +128,27 @@ class Followed:
         return there
 
 
-def _distances(places: Floats | Sides, samples: Floats, threads: int) -> Floats:
-    if isinstance(places, Sides):
+def _distances(places: Floats | WindowSides, samples: Floats, threads: int) -> Floats:
+    if isinstance(places, WindowSides):
         return places.distances(samples, threads)
     return Tree.of_points(places, threads=threads).nearest(samples, threads=threads)[0]
 
 
-def _some(places: Floats | Sides) -> Floats:
+def _some(places: Floats | WindowSides) -> Floats:
     """Return about `SAMPLES` of many places."""
     every = -(-len(places) // SAMPLES)
-    return places.some(every) if isinstance(places, Sides) else places[::every]
+    return places.some(every) if isinstance(places, WindowSides) else places[::every]
 
 
 def boundary_followed(mask: Mask, volume: Volume) -> Followed:
     """Ask contours for the whole boundary of a window (K, J, I)."""
-    return Followed("contours", volume.affine, Sides.of(mask), float(np.count_nonzero(mask)))
+    return Followed("contours", volume.affine, WindowSides.of(mask), float(np.count_nonzero(mask)))
 
 
 def components_followed(mask: Mask, volume: Volume, *, outlined: bool, threads: int = 0) -> Followed:
     """Ask for the outline of each component of a window (K, J, I); some of them may lie in holes of others."""
     found = outline_followed(mask, volume, outlined=outlined, threads=threads).as_closed("contours")
-    return found if found.wall is not None else replace(found, unit=1.0, besides=Sides.of(mask))
+    return found if found.wall is not None else replace(found, unit=1.0, besides=WindowSides.of(mask))
 
 
 def outline_followed(mask: Mask, volume: Volume, *, outlined: bool = False, threads: int = 0) -> Followed:
@@ -160,9 +160,10 @@ def outline_followed(mask: Mask, volume: Volume, *, outlined: bool = False, thre
     filled = _over_bare(_filled(mask, threads))
     own, enclosed = int(np.count_nonzero(mask)), int(np.count_nonzero(filled))
     if outlined or own > SHELL * enclosed:
-        return Followed("outline", volume.affine, Sides.of(filled), float(enclosed), unit=unit_of(mask))
+        return Followed("outline", volume.affine, WindowSides.of(filled), float(enclosed), unit=unit_of(mask))
     return Followed(
-        "wall", volume.affine, Sides.of(mask), enclosed - own / 2, unit_of(mask), wall=mask, besides=Sides.of(filled)
+        "wall", volume.affine, WindowSides.of(mask), enclosed - own / 2, unit_of(mask),
+        wall=mask, besides=WindowSides.of(filled),
     )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ SOME = 500
 
 
 @dataclass(frozen=True)
-class Sides:
+class WindowSides:
     """The faces of a mask, told from its voxels; `len` counts them.
 
     Attributes
@@ -41,7 +41,7 @@ class Sides:
     mask: Mask
 
     @classmethod
-    def of(cls, mask: Mask) -> Sides:
+    def of(cls, mask: Mask) -> WindowSides:
         """Look at the faces of a window (K, J, I)."""
         box = box_of(mask)
         k, j, i = (side.stop - side.start for side in box)

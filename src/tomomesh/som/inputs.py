@@ -30,7 +30,7 @@ THIN = 0.25
 
 
 @dataclass(frozen=True)
-class Blocks:
+class SortedInputs:
     """Inputs as `tomomesh.kernels.som.search.sort_into_blocks` lays them out.
 
     Attributes
@@ -49,7 +49,7 @@ class Blocks:
     boxes: NDArray[np.float64]
 
     @classmethod
-    def of(cls, by_axis: NDArray[np.float64], box: NDArray[np.float64]) -> Blocks:
+    def of(cls, by_axis: NDArray[np.float64], box: NDArray[np.float64]) -> SortedInputs:
         """Sort inputs (d, n), d > 1, that lie in a box (2, d)."""
         d, n = by_axis.shape
         blocks = -(-n // BLOCK)
@@ -140,9 +140,9 @@ class Shown:
         return np.stack([self.by_axis.min(axis=1), self.by_axis.max(axis=1)])
 
     @cached_property
-    def blocks(self) -> Blocks:
+    def blocks(self) -> SortedInputs:
         """The inputs in blocks of near ones, of `products.WIDE` dimensions at most."""
-        return Blocks.of(self.by_axis, self.box)
+        return SortedInputs.of(self.by_axis, self.box)
 
     @cached_property
     def filled(self) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ NEAREST, FEWEST = 10, 6
 as the fewest that are asked for, half of the gain is lost (fandisk, torus)."""
 BESIDE = -0.5
 """Least barycentric coordinate of a place among the samples: beyond it lies beside all of them, and is a guess."""
-ALIKE = 0.7
+LEAST_COSINE = 0.7
 """Cosine of the angle between a sample's normal and the one at the place over which the surface goes through it: with
 less, the far side of a sharp edge bends what is flat."""
 SMOOTH = 1e-3
@@ -29,7 +29,7 @@ SMOOTH = 1e-3
 
 
 @kernel("i8(f8[:,::1], i8[::1], i4[::1], f8[::1], f8[::1], f8[::1], f8, i8[::1], f8[:,::1])")
-def nearest_alike(
+def nearest_facing(
     samples: Floats,
     blocks: Integers,
     start: NDArray[np.int32],
@@ -56,11 +56,11 @@ def nearest_alike(
     order = np.empty(NEAREST, np.int64)
     for n in range(count):
         p = found[n]
-        alike = squared = 0.0
+        facing = squared = 0.0
         for axis in range(3):
-            alike += normal[axis] * samples[p, 3 + axis]
+            facing += normal[axis] * samples[p, 3 + axis]
             squared += (samples[p, axis] - place[axis]) ** 2
-        if alike < ALIKE or (kept == NEAREST and squared >= near[kept - 1, 3]):
+        if facing < LEAST_COSINE or (kept == NEAREST and squared >= near[kept - 1, 3]):
             continue
         at = min(kept, NEAREST - 1)
         while at > 0 and near[at - 1, 3] > squared:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..compile import kernel
 from ..pointcloud.samples import MOST, SIGHT, gather
-from .interpolation import FEWEST, NEAREST, height_between, nearest_alike
+from .interpolation import FEWEST, NEAREST, height_between, nearest_facing
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -241,8 +241,8 @@ def renew_projections(
         if through:
             seen = samples, blocks, start, frame
             wide = LONGER * SIGHT * samples[nearest[v], 6]
-            alike = nearest_alike(*seen, places[v], projections[v, 1:], wide, found, near)
-            height = height_between(near, alike) if alike >= FEWEST else np.nan
+            kept = nearest_facing(*seen, places[v], projections[v, 1:], wide, found, near)
+            height = height_between(near, kept) if kept >= FEWEST else np.nan
             if abs(height) < LOW * samples[nearest[v], 6]:
                 projections[v, 0], anchors[v] = -height, places[v]
                 continue
