@@ -16,6 +16,8 @@ from studies import AFFINES, LPS_TO_RAS, SHEARED, TURNED, assert_in_place, rotat
 from tomomesh.cli import main
 from tomomesh.errors import GeometryError
 from tomomesh.io import read_volume, write_labels
+from tomomesh.io.volumes import nifti_frame
+from tomomesh.io.volumes.nifti_header import unpack_header
 from tomomesh.model.volume import Volume
 from tomomesh.settings import ReadSettings
 
@@ -94,6 +96,28 @@ class TestQuirks:
         itk = placed_by_itk(SimpleITK.ReadImage(str(path)))
         # twice the fourth number that three ulps of 32 bits leave open: readers round it to 0 or not
         np.testing.assert_allclose(read_volume(path).grid.affine, itk, atol=2 * (3 * 2**-23) ** 0.5)
+
+    @pytest.mark.parametrize("order", ["<", ">"])
+    @pytest.mark.parametrize("kind", [nibabel.Nifti1Header, nibabel.Nifti2Header])
+    @pytest.mark.parametrize("form", ["sform", "qform"])
+    @given(seed=st.integers(0, 2**32 - 1), half=st.booleans())
+    @law(25)
+    def test_either_form_of_either_version_is_where_nibabel_puts_it(
+        self, kind: Any, order: str, form: str, seed: int, half: bool
+    ) -> None:
+        """Half a turn, too, whose fourth number is 0."""
+        chosen, header = np.random.default_rng(seed), kind(endianness=order)
+        quaternion = chosen.normal(size=3) / (1.0 if half else 4.0)
+        quaternion /= np.linalg.norm(quaternion) if half else 1 + np.linalg.norm(quaternion)
+        header["pixdim"][:4] = [chosen.choice([-1, 1]), *chosen.uniform(0.1, 9, 3)]
+        for letter, value in zip("bcd", quaternion, strict=True):
+            header[f"quatern_{letter}"] = value
+        for axis in "xyz":
+            header[f"qoffset_{axis}"], header[f"srow_{axis}"] = chosen.normal(), chosen.normal(size=4)
+        start = header.binaryblock
+        start = start[:344] + b"n+1\0" if len(start) == 348 else start
+        ours = nifti_frame._form(unpack_header(start, ReadSettings(), paired=False, file="s.nii"), form, "s.nii")
+        np.testing.assert_allclose(ours, getattr(header, f"get_{form}")(), rtol=0, atol=1e-12)
 
     @pytest.mark.parametrize("slope", [np.nan, np.inf, 0.0])
     def test_a_slope_that_is_none_scales_nothing(self, tmp_path: Path, slope: float) -> None:

@@ -43,6 +43,7 @@ def test_components_are_those_of_all_voxels(mask: Mask, *, value: bool, corners:
         assert len(own) == 1
         np.testing.assert_array_equal(painted, labels == own[0])
         assert found.sizes[part] == painted.sum()
+        assert tuple(map(slice, *found.boxes[part])) == ndimage.find_objects(painted.view(np.int8))[0]
         inner = painted[1:-1, 1:-1, 1:-1]
         assert found.bordering[part] == (inner.sum() < painted.sum())
 

@@ -44,6 +44,8 @@ writer.Write()
 
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # an installed program has its bytecode, and so have its peers
+        os.environ["PYTHONPYCACHEPREFIX"] = f"{folder}/bytecode"
         study, window = _study(Path(folder))
         line = [*_program(), "reconstruct", str(study), "-o", f"{folder}/m.stl", "--quiet"]
         for name, more in (("as it is", []), ("--network none", ["--network", "none"])):

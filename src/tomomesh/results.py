@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
-import scipy
 
+from .measure.tree import Tree
 from .model.columns import any_of
 from .model.mesh import QuadMesh
 from .model.points import CAP
@@ -196,6 +196,6 @@ class Surface(Reported):
     @property
     def cap_faces(self) -> NDArray[np.bool_]:
         """Faces (m,) with a corner that is nearest to a cap: filled, not measured."""
-        _, nearest = scipy.spatial.cKDTree(self.points.positions).query(self.mesh.vertices)
+        _, nearest = Tree.of_points(self.points.positions).nearest(self.mesh.vertices)
         on_cap = self.points.kinds[nearest] == CAP
         return any_of(on_cap[self.mesh.faces])

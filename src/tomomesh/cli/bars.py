@@ -7,11 +7,11 @@ import time
 from threading import Event, Lock, Thread
 from typing import TYPE_CHECKING
 
-from tqdm import tqdm
-
 if TYPE_CHECKING:
     from types import TracebackType
     from typing import NoReturn
+
+    from tqdm import tqdm
 
 FORMAT = "{desc} {bar:30} {n_fmt}/{total_fmt} {elapsed}"
 TICK = 1.0
@@ -69,7 +69,7 @@ class Bars:
             self._close()
             self._stage, self._since = stage, time.perf_counter()
             self._said = self._since
-            self._bar = tqdm(total=total, desc=f"{stage:10s}", bar_format=FORMAT) if self._drawn else None
+            self._bar = _bar_of(stage, total) if self._drawn else None
         self._done, self._total = done, total
         if self._bar is not None:
             self._bar.total = total
@@ -87,3 +87,9 @@ class Bars:
             self._bar.refresh()
             self._bar.close()
             self._bar = None
+
+
+def _bar_of(stage: str, total: int) -> tqdm[NoReturn]:
+    from tqdm import tqdm
+
+    return tqdm(total=total, desc=f"{stage:10s}", bar_format=FORMAT)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 
+from ..measure.distance import pairs_within
 from ..measure.links import Links
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def without_collapse(smoothed: TriMesh, fitted: TriMesh) -> tuple[TriMesh, int]:
     corners = smoothed.corners
     close = CLOSE * float(np.median(np.sqrt(((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2))))
     for _ in range(MOST):
-        pairs = scipy.spatial.cKDTree(vertices).query_pairs(close, output_type="ndarray")
+        pairs = pairs_within(vertices, close)
         if len(pairs) == 0:
             break
         meeting = np.unique(pairs)

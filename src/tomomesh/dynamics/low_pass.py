@@ -54,8 +54,10 @@ class OneRing:
     @classmethod
     def of_edges(cls, edges: NDArray[np.int64], count: int, threads: int = 0) -> OneRing:
         """Take the neighbors along edges (e, 2), each named once."""
-        links = adjacency(edges, count)
-        return cls(links.indptr.astype(np.int64), links.indices.astype(np.int32), np.empty((0, 4), np.int32), threads)
+        pairs = np.concatenate([edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]])
+        pairs.sort()
+        start = np.searchsorted(pairs, np.arange(count + 1) * count)
+        return cls(start, (pairs % count).astype(np.int32), np.empty((0, 4), np.int32), threads)
 
     def smoothed(self, vertices: Floats, passes: int) -> Floats:
         """Move each vertex to a weighted mean of itself and its neighbors, several times.

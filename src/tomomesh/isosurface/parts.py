@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy
 
 from ..kernels.isosurface.columns import move_within_columns, ranges_around
 from ..kernels.threads import in_blocks
@@ -99,6 +98,13 @@ def _weights(times: int) -> Values:
     """Return how much of each of the slices around a voxel is in each of its parts, (n, 2 BESIDE + 1)."""
     slices = 2 * BESIDE + 1
     sums = np.concatenate([np.zeros((1, slices)), np.tril(np.ones((slices, slices)))])
-    spline = scipy.interpolate.make_interp_spline(np.arange(slices + 1), sums)
-    weights = times * np.diff(spline(BESIDE + np.arange(times + 1) / times), axis=0)
+    at = BESIDE + np.arange(times + 1) / times
+    weights = times * np.diff(_powers(at) @ np.linalg.solve(_powers(np.arange(slices + 1)), sums), axis=0)
     return np.asarray((weights + weights[::-1, ::-1]) / 2, np.float32)
+
+
+def _powers(at: NDArray[Any]) -> NDArray[np.float64]:
+    """Return what makes up a cubic spline through 0 .. 2 BESIDE + 1 that has no knot at the second from either end."""
+    middle = at[:, None] - BESIDE - 0.5
+    after = np.maximum(at[:, None] - np.arange(2, 2 * BESIDE), 0.0)
+    return np.hstack([middle ** np.arange(4), after**3])

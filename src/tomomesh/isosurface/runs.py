@@ -77,6 +77,17 @@ class Runs:
         return self._summed(self.stops - self.starts)
 
     @cached_property
+    def boxes(self) -> Longs:
+        """First slice, row and column of each component, and those behind its last, (c, 2, 3)."""
+        line = np.repeat(np.arange(len(self.begin) - 1), np.diff(self.begin))
+        k, j = line // self.shape[1], line % self.shape[1]
+        boxes = np.zeros((len(self.sizes), 2, 3), np.int64)
+        boxes[:, 0] = self.shape
+        np.minimum.at(boxes[:, 0], self.parts, np.column_stack([k, j, self.starts]))
+        np.maximum.at(boxes[:, 1], self.parts, np.column_stack([k + 1, j + 1, self.stops]))
+        return boxes
+
+    @cached_property
     def bordering(self) -> Mask:
         """Whether a component reaches the border of the mask, (c,)."""
         count, rows, columns = self.shape

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 
+from .distance import pairs_within
 from .polygon import area, side_lengths
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def _crossing(start: Floats, stop: Floats) -> NDArray[np.int64]:
     Segments cross only where their middles are at most as far apart as the longest is long.
     """
     longest = float(np.sqrt(((stop - start) ** 2).sum(axis=1)).max(initial=0.0))
-    pairs = scipy.spatial.cKDTree((start + stop) / 2).query_pairs(longest, output_type="ndarray").astype(np.int64)
+    pairs = pairs_within((start + stop) / 2, longest)
     a, b, c, d = start[pairs[:, 0]], stop[pairs[:, 0]], start[pairs[:, 1]], stop[pairs[:, 1]]
     parted = _turn(a, b, c) * _turn(a, b, d) < 0
     parted &= _turn(c, d, a) * _turn(c, d, b) < 0

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy
 
+from ..kernels.measure.edges import join_pairs
 from ..kernels.remeshing.links import CREASE, FIXED, FREE, KEPT
 from ..kernels.remeshing.surface import find_sharp
+from ..measure.distance import pairs_within
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -72,7 +73,7 @@ def _doubled(mesh: TriMesh, starts: NDArray[np.int64], ends: NDArray[np.int64], 
     ways = mesh.vertices[ends] - mesh.vertices[starts]
     ways /= np.maximum(np.sqrt((ways**2).sum(axis=1)), 1e-300)[:, None]
     middles = 0.5 * (mesh.vertices[ends] + mesh.vertices[starts])
-    one, other = scipy.spatial.cKDTree(middles).query_pairs(near, output_type="ndarray").T
+    one, other = pairs_within(middles, near).T
     apart = middles[other] - middles[one]
     along = np.abs(np.einsum("ij,ij->i", apart, ways[one]))
     beside = along < 0.5 * np.sqrt((apart**2).sum(axis=1))
@@ -85,11 +86,11 @@ def _doubled(mesh: TriMesh, starts: NDArray[np.int64], ends: NDArray[np.int64], 
 def _lengths(mesh: TriMesh, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the length of the crease that each sharp edge (e,) belongs to."""
     one, other, _ = _passed(mesh, starts, ends)
-    joined = scipy.sparse.coo_array((np.ones(len(one), np.int8), (one, other)), shape=(len(starts), len(starts)))
-    count, crease = scipy.sparse.csgraph.connected_components(joined, directed=False)
+    crease = np.arange(len(starts), dtype=np.int32)
+    join_pairs(one, other, crease)
     steps = mesh.vertices[ends] - mesh.vertices[starts]
     lengths = np.sqrt((steps**2).sum(axis=1))
-    return np.asarray(np.bincount(crease, lengths, count)[crease])
+    return np.asarray(np.bincount(crease, lengths)[crease])
 
 
 def _passed(

@@ -13,7 +13,6 @@ import zipfile
 from dataclasses import replace
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -116,6 +115,8 @@ def _check_readable(vertices: NDArray[np.float64], path: str | Path) -> None:
 
 
 def _model(mesh: TriMesh, beside: MeshAttributes) -> Iterator[str]:
+    from xml.sax.saxutils import quoteattr  # imports what speaks with servers
+
     colors = named_colors(beside.vertex_fields)
     palette, numbers = np.unique(colors[1], axis=0, return_inverse=True) if colors else (None, np.zeros(0, np.int64))
     yield f'{DECLARATION}<model unit="millimeter" xml:lang="en-US" xmlns="{CORE}" xmlns:m="{MATERIAL}">\n'

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import FormatError, GeometryError
-from ..files.source import third_party
 from .affine import (
     GIVEN,
     SMALLEST_SPACING,
@@ -36,9 +35,11 @@ FORMS = ("sform", "qform")
 APART = 0.1
 """Part of a voxel by which the two forms may differ at the corners of the volume without a word: interpolation would
 not show it. A form in 32 bits is off by a ten-thousandth of that."""
-SHORTEST, LONGEST = 1 - 5e-8, 1.01
-"""A quaternion's three numbers that are so long are brought to a length of 1, where the fourth is 0: rounding makes
-them longer, and from the shortest on the standard's code takes the rest for rounding, too."""
+LONGEST = 1.01
+"""A quaternion's three numbers that are longer than 1, as rounding makes them, are brought to it, up to this length."""
+ROUNDED = 1e-7
+"""What is left to the fourth number's square that is taken for rounding (nifti1_io.c); nibabel takes as much as three
+units in the last place of 1, which is more in 32 bits."""
 
 
 def frame_of(
@@ -48,7 +49,8 @@ def frame_of(
 
     Parameters
     ----------
-    header : nibabel header
+    header : record
+        From `nifti_header.unpack_header`.
     settings : ReadSettings
         `nifti_form` chooses between two forms; `spacing` stands in for what there is not.
     shape : (I, J, K)
@@ -84,16 +86,26 @@ def frame_of(
 
 
 def _form(header: Any, form: str, name: str) -> Affine:
-    """Return the matrix of a form, RAS; a quaternion's sign and length as nifti1_io.c takes them."""
-    header = header.copy()
-    header["pixdim"][0] = -1 if header["pixdim"][0] < 0 else 1
-    turn = np.array([float(header[f"quatern_{letter}"]) for letter in "bcd"])
-    if SHORTEST < (length := float(np.linalg.norm(turn))) <= LONGEST:
-        longer = 1 + 7.5e-8  # by no more than nibabel takes for rounding, whatever 32 bits make of each
-        for letter, value in zip("bcd", longer * turn / length, strict=True):
-            header[f"quatern_{letter}"] = value
-    with third_party("nibabel", name):
-        return np.asarray(getattr(header, f"get_{form}")(), np.float64)
+    """Return the matrix of a form, RAS."""
+    placed = np.eye(4)
+    if form == "sform":
+        placed[:3] = header["srow"]
+        return placed
+    sizes = header["pixdim"][1:4] * [1, 1, -1 if header["pixdim"][0] < 0 else 1]
+    placed[:3, :3], placed[:3, 3] = _turned(header["quatern"], name) * sizes, header["qoffset"]
+    return placed
+
+
+def _turned(quaternion: NDArray[Any], name: str) -> NDArray[Any]:
+    """Return the turn (3, 3) of a unit quaternion whose last three numbers are given (nifti1.h, method 2)."""
+    x, y, z = axis = quaternion.astype(np.longdouble)
+    if (squared := axis @ axis) > LONGEST**2:
+        raise FormatError(
+            "the quaternion is too long", file=name, found=f"{np.sqrt(squared):.4g}", expected="at most 1"
+        )
+    w = 0 * x if 1 - squared < max(ROUNDED, 3 * np.finfo(quaternion.dtype).eps) else np.sqrt(1 - squared)
+    crossed = np.array([[0 * x, -z, y], [z, 0 * x, -x], [-y, x, 0 * x]])
+    return np.eye(3) + 2 / (w * w + squared) * (w * crossed + crossed @ crossed)
 
 
 def _other(

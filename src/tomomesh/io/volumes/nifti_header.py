@@ -1,4 +1,7 @@
-"""What a NIfTI header promises, checked: nibabel knows the fields, but would repair them in silence."""
+"""What a NIfTI header promises, checked.
+
+The fields are read here: nibabel would repair some in silence, and takes as long to import as a study to reconstruct.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,32 @@ import numpy as np
 
 from ...errors import FormatError, GeometryError
 from ..files.limits import require_bytes
-from ..files.source import third_party
 from .gray import check_scale
 
 if TYPE_CHECKING:
     from ...settings import ReadSettings
 
-NIFTI_HEADERS = {348: "Nifti1Header", 540: "Nifti2Header"}
-"""Header lengths in bytes (nifti1.h, nifti2.h), and nibabel's classes for them."""
+NIFTI_HEADERS: dict[int, dict[str, tuple[str, int]]] = {
+    348: {
+        **{"sizeof_hdr": ("i4", 0), "dim": ("8i2", 40), "datatype": ("i2", 70), "pixdim": ("8f4", 76)},
+        **{"vox_offset": ("f4", 108), "scl_slope": ("f4", 112), "scl_inter": ("f4", 116), "xyzt_units": ("u1", 123)},
+        **{"qform_code": ("i2", 252), "sform_code": ("i2", 254), "quatern": ("3f4", 256), "qoffset": ("3f4", 268)},
+        "srow": ("(3,4)f4", 280),
+    },
+    540: {
+        **{"sizeof_hdr": ("i4", 0), "dim": ("8i8", 16), "datatype": ("i2", 12), "pixdim": ("8f8", 104)},
+        **{"vox_offset": ("i8", 168), "scl_slope": ("f8", 176), "scl_inter": ("f8", 184), "xyzt_units": ("i4", 500)},
+        **{"qform_code": ("i4", 344), "sform_code": ("i4", 348), "quatern": ("3f8", 352), "qoffset": ("3f8", 376)},
+        "srow": ("(3,4)f8", 400),
+    },
+}
+"""Header lengths in bytes, and of each field we read its type and first byte (nifti1.h, nifti2.h)."""
+
+DATA_TYPES = {
+    **{2: "u1", 4: "i2", 8: "i4", 16: "f4", 32: "c8", 64: "f8", 128: "u1,u1,u1", 256: "i1", 512: "u2", 768: "u4"},
+    **{1024: "i8", 1280: "u8", 1792: "c16", 2304: "u1,u1,u1,u1"},
+}
+"""Codes of data types (nifti1.h), but for those of no use here: bits, and numbers of 128 bits."""
 
 MAGIC_AT = {348: 344, 540: 4}
 """Byte at which a header of each length says what it is."""
@@ -73,8 +94,8 @@ def unpack_header(start: bytes, settings: ReadSettings, *, paired: bool, file: s
 
     Returns
     -------
-    nibabel.Nifti1Header or nibabel.Nifti2Header
-        Without form, unit and intercept where the file is Analyze 7.5.
+    record
+        Its fields by their names; without form, unit and intercept where the file is Analyze 7.5.
 
     Raises
     ------
@@ -97,13 +118,16 @@ def unpack_header(start: bytes, settings: ReadSettings, *, paired: bool, file: s
             hint="a NIfTI copy made where it is known, or --spacing x y z: columns to the left, rows to the back",
         )
     require_bytes(size, len(start), file=file)
-    import nibabel
-
-    with third_party("nibabel", file):
-        header = getattr(nibabel, NIFTI_HEADERS[size])(start[:size], check=False)
+    header = np.frombuffer(start, _fields(size, "<" if _int(start, "<") == size else ">"), 1).copy()[0]
     for field in ANALYZE_LACKS if analyze else ():
         header[field] = 0
     return header
+
+
+def _fields(size: int, order: str) -> np.dtype[Any]:
+    fields = NIFTI_HEADERS[size]
+    formats, offsets = zip(*fields.values(), strict=True)
+    return np.dtype({"names": [*fields], "formats": formats, "offsets": offsets, "itemsize": size}).newbyteorder(order)
 
 
 def _int(start: bytes, order: str) -> int:
@@ -147,10 +171,7 @@ def _shape(header: Any, file: str) -> tuple[int, int, int]:
 
 
 def _dtype(header: Any, file: str) -> np.dtype[Any]:
-    from nibabel.nifti1 import data_type_codes
-
     code = int(header["datatype"])
-    dtype: np.dtype[Any] = np.dtype(data_type_codes.dtype.get(code, np.void))
-    if not dtype.itemsize:  # 0 and 1, an unknown kind and single bits, have none either
+    if code not in DATA_TYPES:
         raise FormatError("the voxels are of an unknown kind", file=file, found=f"datatype = {code}")
-    return dtype.newbyteorder(header.endianness)
+    return np.dtype(DATA_TYPES[code]).newbyteorder(header["dim"].dtype.byteorder)

@@ -1,13 +1,14 @@
-"""Positions that are equal."""
+"""Positions that are equal, or near each other."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..compile import kernel
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 
@@ -43,3 +44,48 @@ def first_equal(
         if table[place] < 0:
             table[place] = n
         first[n] = table[place]
+
+
+@kernel("i8(f8[:,::1], i8[::1], i8, f8, i8[:,::1])")
+def list_near(
+    points: NDArray[np.float64], cells: NDArray[np.int64], side: int, radius: float, pairs: NDArray[np.int64]
+) -> int:
+    """List the pairs of points that are at most as far apart as a radius.
+
+    Parameters
+    ----------
+    points : (n, 3) float array
+        In the order of their cells.
+    cells : (n,) int64 array
+        The number of the cube that holds each, ``(x side + y) side + z``, rising; cubes at least as wide as the radius,
+        none of them at a border of the side^3 there are.
+    side : int
+    radius : float
+    pairs : (p, 2) int64 array
+        Result; none are written where the array is too short.
+
+    Returns
+    -------
+    int
+        Pairs that there are.
+    """
+    total = 0
+    first = np.zeros(5, np.int64)
+    for p in range(len(points)):
+        for row in range(5):  # the cube's own, and those of the 26 around it that follow in the order, row by row
+            low = cells[p] + (0 if row == 0 else side if row == 1 else side * (side + row - 3)) - 1
+            q = first[row]
+            while q < len(points) and cells[q] < low:
+                q += 1
+            first[row] = q
+            q = max(q, p + 1)
+            while q < len(points) and cells[q] <= low + 2:
+                squared = 0.0
+                for axis in range(3):
+                    squared += (points[p, axis] - points[q, axis]) ** 2
+                if squared <= radius * radius:
+                    if total < len(pairs):
+                        pairs[total, 0], pairs[total, 1] = p, q
+                    total += 1
+                q += 1
+    return total

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
+from ...isosurface.runs import Runs
 from ...kernels.threads import in_blocks
 from ...model.contours import HOLE, OUTER
 from ...som.starts import moments
@@ -235,13 +236,10 @@ def _coarse(plane: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _side_by_side(plane: NDArray[np.bool_]) -> bool:
-    labels, count = scipy.ndimage.label(_coarse(plane), TOUCHING)
-    if count < 2:
+    boxes = Runs.of(_coarse(plane)[None], corners=True).boxes
+    if len(boxes) < 2:
         return False
-    boxes = np.array([[(one.start, one.stop) for one in box] for box in scipy.ndimage.find_objects(labels)])
-    sizes = (boxes[:, :, 1] - boxes[:, :, 0]).prod(axis=1)
+    sizes = (boxes[:, 1] - boxes[:, 0]).prod(axis=1)
     large = boxes[sizes >= BESIDE * sizes.max()]
-    within = ((large[:, None, :, 0] >= large[None, :, :, 0]) & (large[:, None, :, 1] <= large[None, :, :, 1])).all(
-        axis=2
-    )
+    within = ((large[:, None, 0] >= large[:, 0]) & (large[:, None, 1] <= large[:, 1])).all(axis=2)
     return bool((within.sum(axis=1) == 1).sum() > 1)
