@@ -220,7 +220,8 @@ def _across(points: PointSet, fill: PointSet, limit: float) -> float:
 def _to_nearest_of(own: NDArray[np.float64], *others: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the distance of each point to the nearest of some others."""
     there = np.concatenate(others)
-    return np.asarray(np.sqrt(sum((own[:, None, axis] - there[:, axis]) ** 2 for axis in range(3)).min(axis=1)))
+    x, y, z = ((own[:, None, axis] - there[:, axis]) ** 2 for axis in range(3))
+    return np.asarray(np.sqrt((x + y + z).min(axis=1)))
 
 
 def _caps(networks: Networks, volume: Volume, spacing: float) -> PointSet:

@@ -105,7 +105,7 @@ def _turned(quaternion: NDArray[Any], name: str) -> NDArray[Any]:
         )
     w = 0 * x if 1 - squared < max(ROUNDED, 3 * np.finfo(quaternion.dtype).eps) else np.sqrt(1 - squared)
     crossed = np.array([[0 * x, -z, y], [z, 0 * x, -x], [-y, x, 0 * x]])
-    return np.eye(3) + 2 / (w * w + squared) * (w * crossed + crossed @ crossed)
+    return np.asarray(np.eye(3) + 2 / (w * w + squared) * (w * crossed + crossed @ crossed))
 
 
 def _other(

@@ -6,7 +6,7 @@ The fields are read here: nibabel would repair some in silence, and takes as lon
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -124,7 +124,7 @@ def unpack_header(start: bytes, settings: ReadSettings, *, paired: bool, file: s
     return header
 
 
-def _fields(size: int, order: str) -> np.dtype[Any]:
+def _fields(size: int, order: Literal["<", ">"]) -> np.dtype[Any]:
     fields = NIFTI_HEADERS[size]
     formats, offsets = zip(*fields.values(), strict=True)
     return np.dtype({"names": [*fields], "formats": formats, "offsets": offsets, "itemsize": size}).newbyteorder(order)
