@@ -196,6 +196,8 @@ class Surface(Reported):
     @property
     def cap_faces(self) -> NDArray[np.bool_]:
         """Faces (m,) with a corner that is nearest to a cap: filled, not measured."""
+        if not self.capped:
+            return np.zeros(len(self.mesh.faces), np.bool_)
         _, nearest = Tree.of_points(self.points.positions).nearest(self.mesh.vertices)
         on_cap = self.points.kinds[nearest] == CAP
         return any_of(on_cap[self.mesh.faces])
