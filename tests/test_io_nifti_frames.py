@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from conftest import law
 from studies import AFFINES, LPS_TO_RAS, SHEARED, TURNED, assert_in_place, rotation, sampled, write_nifti
 from tomomesh.cli import main
-from tomomesh.errors import GeometryError
+from tomomesh.errors import FormatError, GeometryError
 from tomomesh.io import read_volume, write_labels
 from tomomesh.io.volumes import nifti_frame
 from tomomesh.io.volumes.nifti_header import unpack_header
@@ -96,6 +96,16 @@ class TestQuirks:
         itk = placed_by_itk(SimpleITK.ReadImage(str(path)))
         # twice the fourth number that three ulps of 32 bits leave open: readers round it to 0 or not
         np.testing.assert_allclose(read_volume(path).grid.affine, itk, atol=2 * (3 * 2**-23) ** 0.5)
+
+    @pytest.mark.parametrize("length", [1.02, 3.0, np.nan, np.inf])
+    def test_one_that_is_no_turn_is_refused(self, tmp_path: Path, length: float) -> None:
+        def edit(header: Any) -> None:
+            for letter, value in zip("bcd", (0.6, 0.0, 0.8), strict=True):
+                header[f"quatern_{letter}"] = value * length
+
+        path = qform_alone(tmp_path / "q.nii", OBLIQUE, edit)
+        with pytest.raises(FormatError, match="the quaternion is no turn"):
+            read_volume(path)
 
     @pytest.mark.parametrize("order", ["<", ">"])
     @pytest.mark.parametrize("kind", [nibabel.Nifti1Header, nibabel.Nifti2Header])

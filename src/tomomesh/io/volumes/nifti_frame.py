@@ -99,9 +99,9 @@ def _form(header: Any, form: str, name: str) -> Affine:
 def _turned(quaternion: NDArray[Any], name: str) -> NDArray[Any]:
     """Return the turn (3, 3) of a unit quaternion whose last three numbers are given (nifti1.h, method 2)."""
     x, y, z = axis = quaternion.astype(np.longdouble)
-    if (squared := axis @ axis) > LONGEST**2:
+    if not (squared := axis @ axis) <= LONGEST**2:  # nor is it where a number is none
         raise FormatError(
-            "the quaternion is too long", file=name, found=f"{np.sqrt(squared):.4g}", expected="at most 1"
+            "the quaternion is no turn", file=name, found=f"length = {np.sqrt(squared):.4g}", expected="at most 1"
         )
     w = 0 * x if 1 - squared < max(ROUNDED, 3 * np.finfo(quaternion.dtype).eps) else np.sqrt(1 - squared)
     crossed = np.array([[0 * x, -z, y], [z, 0 * x, -x], [-y, x, 0 * x]])
