@@ -122,7 +122,8 @@ def _told_of_slices(made: ContourSurface, slices: Slices, widest: float, left: i
         told.append(f"slices lie up to {widest:.4g} apart, {stack.step:.4g} as a rule: that is interpolated")
     if stack.alone and stack.thickness is None:
         places = (slices.origin + part.place @ slices.axes for part in stack.alone[:NAMED])
-        named = "; ".join(", ".join(f"{axis:.4g}" for axis in place) for place in places)
+        least = 1e-6 * made.edge  # what rounding leaves of 0 would be told with its power of ten
+        named = "; ".join(", ".join(f"{axis:.4g}" for axis in np.where(abs(at) < least, 0.0, at)) for at in places)
         more = "; ..." if len(stack.alone) > NAMED else ""
         told.append(
             f"{len(stack.alone)} contour(s) go on in no other slice, and are made a slice distance thick: "
