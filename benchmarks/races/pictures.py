@@ -142,7 +142,7 @@ def two_million_faces() -> None:
     if importlib.util.find_spec("matplotlib"):
         with contextlib.suppress(MemoryError):
             (theirs,) = costs(by_matplotlib(mesh), repeats=1)
-            race(f"{name}, beside matplotlib's painter", mine, theirs, 0.2)
+            race(f"{name}, beside matplotlib's painter", mine, theirs, 0.1)
 
 
 if __name__ == "__main__":
