@@ -200,12 +200,12 @@ def best_matching_units(
     -----
     Two axes at least. Single precision, twice as many lanes as double; relative to each block's middle it loses
     nothing. A block looks only at the neurons that may be the nearest to a place in it: ten of 82, on a skull. In the
-    plane four are compared in a pass, which loads and stores the best a quarter as often. Neurons at infinity fill the
-    last vector.
+    plane four are compared in a pass, which loads and stores the best a quarter as often. The last neuron again and
+    again fills the last vector: the lowest of equals is taken.
     """
     d, u = codebook.shape
     lanes = -(-u // LANES) * LANES
-    own, bounds = np.full((d, lanes), np.inf, np.float32), np.zeros((3, lanes), np.float32)
+    own, bounds = np.empty((d, lanes), np.float32), np.zeros((3, lanes), np.float32)
     near, half, chosen = np.empty((d, BLOCK), np.float32), np.empty(d, np.float32), np.empty(lanes + 1, np.int32)
     winners[:], squared[:] = 0, np.inf
     for block in range(boxes.shape[2]):
@@ -213,8 +213,8 @@ def best_matching_units(
         for axis in range(d):
             middle, row, place = boxes[0, axis, block], codebook[axis], places[axis, here]
             half[axis] = np.float32(boxes[1, axis, block])
-            for i in range(u):
-                own[axis, i] = np.float32(row[i] - middle)
+            for i in range(lanes):
+                own[axis, i] = np.float32(row[min(i, u - 1)] - middle)
             for n in range(BLOCK):
                 near[axis, n] = np.float32(place[n] - middle)
         count = _candidates(own, half, bounds, chosen)
