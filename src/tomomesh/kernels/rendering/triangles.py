@@ -142,6 +142,6 @@ def mean_of_samples(nearest: NDArray[np.int64], pixels: Bytes) -> None:
                         green += (key >> 8) & 255
                         blue += key & 255
             if seen > 0:
-                pixels[j, i, 0] = (red + (count - seen) * pixels[j, i, 0] + count // 2) // count
-                pixels[j, i, 1] = (green + (count - seen) * pixels[j, i, 1] + count // 2) // count
-                pixels[j, i, 2] = (blue + (count - seen) * pixels[j, i, 2] + count // 2) // count
+                pixels[j, i, 0] = (red + (count - seen) * int(pixels[j, i, 0]) + count // 2) // count
+                pixels[j, i, 1] = (green + (count - seen) * int(pixels[j, i, 1]) + count // 2) // count
+                pixels[j, i, 2] = (blue + (count - seen) * int(pixels[j, i, 2]) + count // 2) // count
