@@ -71,19 +71,24 @@ def pull_squares(places: Floats, quads: Ints, pulls: Floats, drawn: Floats, star
             drawn[f, axis] = pulls[f, axis] - 0.25 * middle
 
 
+@kernel("UniTuple(f8, 3)(f8[:,::1], i4[:,::1], i8)")
+def lean_of(values: Floats, links: Ints, v: int) -> tuple[float, float, float]:
+    """Return by how much the mean of a vertex' neighbors (n, 6) is more than its own value (n, 3)."""
+    x = y = z = 0.0
+    count = 0
+    for s in range(links.shape[1]):
+        n = links[v, s]
+        if n >= 0:
+            x, y, z, count = x + values[n, 0], y + values[n, 1], z + values[n, 2], count + 1
+    share = 1.0 / count
+    return x * share - values[v, 0], y * share - values[v, 1], z * share - values[v, 2]
+
+
 @kernel("void(f8[:,::1], i4[:,::1], f8[:,::1], i8, i8)")
 def lean(values: Floats, links: Ints, leaning: Floats, start: int, stop: int) -> None:
-    """Find by how much the mean of each vertex' neighbors (n, 6) is more than its own value (n, 3)."""
+    """Find for each vertex by how much the mean of its neighbors is more, see `lean_of`."""
     for v in range(start, stop):
-        x = y = z = 0.0
-        count = 0
-        for s in range(links.shape[1]):
-            n = links[v, s]
-            if n >= 0:
-                x, y, z, count = x + values[n, 0], y + values[n, 1], z + values[n, 2], count + 1
-        share = 1.0 / count
-        leaning[v, 0], leaning[v, 1] = x * share - values[v, 0], y * share - values[v, 1]
-        leaning[v, 2] = z * share - values[v, 2]
+        leaning[v, 0], leaning[v, 1], leaning[v, 2] = lean_of(values, links, v)
 
 
 @kernel(
@@ -133,16 +138,8 @@ def move_in_cells(
             x, y, z, count = x + drawn[f, 0], y + drawn[f, 1], z + drawn[f, 2], count + 1
         part = 1.0 / count
         force[0], force[1], force[2] = x * part, y * part, z * part
-        x = y = z = 0.0
-        count = 0
-        for s in range(links.shape[1]):
-            n = links[v, s]
-            if n >= 0:
-                x, y, z, count = x + values[n, 0], y + values[n, 1], z + values[n, 2], count + 1
-        part = 1.0 / count
-        force[0] += (x * part - values[v, 0]) * stiff
-        force[1] += (y * part - values[v, 1]) * stiff
-        force[2] += (z * part - values[v, 2]) * stiff
+        x, y, z = lean_of(values, links, v)
+        force[0], force[1], force[2] = force[0] + x * stiff, force[1] + y * stiff, force[2] + z * stiff
         speed = change = 0.0
         for axis in range(3):
             place = places[v, axis] + force[axis] * share

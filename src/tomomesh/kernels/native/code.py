@@ -91,6 +91,6 @@ def keep(name: str, code: Code) -> None:
         handle, unfinished = tempfile.mkstemp(dir=folder())
         with os.fdopen(handle, "wb") as file:
             file.write(code.packed())
-        os.replace(unfinished, folder() / name)  # noqa: PTH105
+        Path(unfinished).replace(folder() / name)
     except OSError:
         return
