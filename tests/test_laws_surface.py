@@ -101,7 +101,7 @@ class TestOrder:
 
 class TestPlace:
     @pytest.mark.parametrize("attraction", ATTRACTIONS)
-    @pytest.mark.parametrize("far", [1e6, 1e9, -1e9])
+    @pytest.mark.parametrize("far", [-1e9, 1e9, 1e6][: size(3, 1)])
     def test_far_away_costs_no_precision_beyond_that_of_the_numbers(self, far: float, attraction: str) -> None:
         near = here(attraction)
         there = reconstruct_points(dyadic(torus(COUNT)) + far, attraction=attraction, remesh=False)
@@ -110,7 +110,7 @@ class TestPlace:
         off = there.mesh.vertices - far - near.mesh.vertices
         assert np.abs(off).max() <= 4 * np.spacing(abs(far))
 
-    @pytest.mark.parametrize("scale", [2.0**-20, 2.0**20])
+    @pytest.mark.parametrize("scale", [2.0**-20, 2.0**20][: size(2, 1)])
     def test_the_unit_of_the_points_does_not_matter(self, scale: float) -> None:
         near, there = made_of(torus), reconstruct_points(torus(COUNT) * scale)
         assert near.mesh.faces.tobytes() == there.mesh.faces.tobytes()
