@@ -231,7 +231,9 @@ class TestWays:
     @pytest.mark.parametrize("way", ["rings", "loops", "voxels", "sphere"])
     def test_the_built_in_head_is_written(self, way: str) -> None:
         # half as many rows and columns where every pixel's side is followed
-        coarse = {"shape": (54, 128, 128), "spacing_mm": (1.875, 1.875, 2.7)} if way in ("loops", "voxels") else {}
+        coarse: dict[str, Any] = (
+            {"shape": (54, 128, 128), "spacing_mm": (1.875, 1.875, 2.7)} if way in ("loops", "voxels") else {}
+        )
         head = phantom(**coarse)
         asked = ASKED[way] | {"lower": head.lower, "upper": head.upper}
         found = followed(reconstruct(head.volume, **asked))
