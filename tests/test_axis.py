@@ -32,7 +32,7 @@ def evenly(curve: Floats, apart: float) -> Floats:
     return np.stack([np.interp(at, along, column) for column in closed.T], axis=1)
 
 
-def ellipse(angle: float, aside: Floats, apart: float = 1.2) -> Floats:
+def ellipse(angle: float, aside: Floats, apart: float = 2.4) -> Floats:
     """Cut the ellipsoid around `aside` by the plane through the z axis."""
     ahead, up = np.array([np.cos(angle), np.sin(angle), 0.0]), np.array([0.0, 0.0, 1.0])
     basis = np.stack([ahead, up]) / RADII
@@ -45,15 +45,15 @@ def ellipse(angle: float, aside: Floats, apart: float = 1.2) -> Floats:
     return evenly(flat.T @ np.stack([ahead, up]), apart)
 
 
-def ellipsoid(planes: int, aside: tuple[float, float, float] = (0, 0, 0)) -> Floats:
-    return np.concatenate([ellipse(angle, np.array(aside)) for angle in np.pi * np.arange(planes) / planes])
+def ellipsoid(planes: int, aside: tuple[float, float, float] = (0, 0, 0), apart: float = 2.4) -> Floats:
+    return np.concatenate([ellipse(angle, np.array(aside), apart) for angle in np.pi * np.arange(planes) / planes])
 
 
 def torus(planes: int) -> Floats:
     turn = np.linspace(0, 2 * np.pi, 2000, endpoint=False)
     loop = np.stack([20 + 6 * np.cos(turn), np.zeros(2000), 6 * np.sin(turn)], axis=1)
     angles = np.pi * np.arange(2 * planes) / planes
-    return np.concatenate([evenly(loop @ Rotation.from_euler("z", angle).as_matrix().T, 0.8) for angle in angles])
+    return np.concatenate([evenly(loop @ Rotation.from_euler("z", angle).as_matrix().T, 1.6) for angle in angles])
 
 
 def volume_of(points: Floats) -> tuple[float, int]:
@@ -71,7 +71,7 @@ def volume_of(points: Floats) -> tuple[float, int]:
 def test_what_is_between_lies_on_the_ellipsoid_wherever_the_axis_is(
     planes: int, turn: tuple[float, ...], aside: tuple[float, float, float], moved: tuple[float, ...], seed: int
 ) -> None:
-    points = ellipsoid(planes, aside)
+    points = ellipsoid(planes, aside, apart=1.2)
     placed = Rotation.from_euler("xyz", turn).apply(np.random.default_rng(seed).permutation(points)) + moved
     found = half_planes(placed)
     assert found is not None
@@ -130,7 +130,7 @@ class TestVolume:
         assert genus == 1
 
     def test_what_is_interpolated_is_marked_as_filled(self) -> None:
-        found = reconstruct_points(ellipsoid(6))
+        found = reconstruct_points(ellipsoid(6, apart=1.2))
         assert found.filled is not None
         centers = found.mesh.corners.mean(axis=1)[~found.filled]
         angle = np.arctan2(centers[:, 1], centers[:, 0]) % (np.pi / 6)
@@ -140,7 +140,7 @@ class TestVolume:
         assert found.report["points"]["interpolated"] > 5000
 
     def test_stacks_none_takes_the_points_alone(self) -> None:
-        report = reconstruct_points(ellipsoid(9), stacks="none").report
+        report = reconstruct_points(ellipsoid(9, apart=1.2), stacks="none").report
         assert report["points"]["interpolated"] == 0
         assert report["quality"]["volume_mm3"] < 0.97 * VOLUME
 
@@ -171,7 +171,7 @@ def test_loops_about_an_axis_are_a_torus_and_a_part_of_one_is_not_closed(planes:
     turn = np.linspace(0, 2 * np.pi, 2000, endpoint=False)
     loop = np.stack([20 + 6 * np.cos(turn), np.zeros(2000), 6 * np.sin(turn)], axis=1)
     ways = [Rotation.from_euler("z", angle).as_matrix().T for angle in 2 * np.pi * np.arange(planes) / planes]
-    drawn = [evenly(loop @ way, 0.8) for way in ways]
+    drawn = [evenly(loop @ way, 1.6) for way in ways]
     volume, genus = volume_of(np.concatenate(drawn))
     assert volume == pytest.approx(2 * np.pi**2 * 20 * 36, rel=0.01)
     assert genus == 1

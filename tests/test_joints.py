@@ -83,7 +83,7 @@ class TestObjects:
 
     @pytest.mark.parametrize("apart", [0.5, 1.0])
     def test_nearer_boxes_are_told_of_by_their_place(self, apart: float) -> None:
-        cloud = beside_another(on_box(5_000), apart * spacing_of(24, 5_000))
+        cloud = beside_another(on_box(1_500), apart * spacing_of(24, 1_500))
         surface = reconstruct_points(cloud)
         assert surface.report["quality"]["components"] == 2 or any(
             "around (" in one for one in surface.report["warnings"]
@@ -106,7 +106,7 @@ class TestObjects:
 class TestSheetsOfOneObject:
     @pytest.mark.parametrize("apart", [2.0, 3.0])
     def test_the_turns_of_a_coil_stay_apart(self, apart: float) -> None:
-        quality = assert_sound(reconstruct_points(on_coil(6_000, apart)))
+        quality = assert_sound(reconstruct_points(on_coil(4_000, apart)))
         tube, ends = np.pi * 0.15**2 * 3 * 2 * np.pi, 4 / 3 * np.pi * 0.15**3
         assert quality["volume_mm3"] == pytest.approx(tube + ends, rel=0.03)
 

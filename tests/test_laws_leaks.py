@@ -169,7 +169,7 @@ class TestThreshold:
         assert low < tested.two_sided < high
         assert tested.tight == tight
 
-    @pytest.mark.parametrize(("reach", "closing"), [(1.6, 2), (1.9, 4), (2.6, 4)])
+    @pytest.mark.parametrize(("reach", "closing"), [(1.6, 2), (1.9, 4), (2.6, 4)][: size(3, 1)])
     def test_wider_closings_are_tried_until_80_percent_tell_of_an_inside(self, reach: float, closing: int) -> None:
         """At 1.6 radii the shares are .72, .76, .82, .88, .90; elsewhere .74 and .48 at most, closed by 4 cubes."""
         cells = with_fin(10, reach)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,12 @@ COUNT = size(1200, 600)
 ATTRACTIONS = ["nearest", "surface"]
 
 
+@cache
+def made_of(shape: Any, attraction: str = "surface") -> Surface:
+    """Return the surface of a shape's points, made once for the laws that compare others with it."""
+    return reconstruct_points(shape(COUNT), attraction=attraction)
+
+
 def bytes_of(surface: Surface) -> tuple[bytes, bytes]:
     return surface.mesh.vertices.tobytes(), surface.mesh.faces.tobytes()
 
@@ -33,6 +40,12 @@ def bytes_of(surface: Surface) -> tuple[bytes, bytes]:
 def dyadic(points: Floats) -> Floats:
     """Round so that moving by whole numbers up to 2^30 loses nothing."""
     return np.round(points * 2**16) / 2**16
+
+
+@cache
+def here(attraction: str) -> Surface:
+    """Return the surface of a torus about the origin."""
+    return reconstruct_points(dyadic(torus(COUNT)), attraction=attraction, remesh=False)
 
 
 def hollow_head() -> Volume:
@@ -46,10 +59,9 @@ class TestOrder:
     @law(12)
     @given(seed=seeds, shape=st.sampled_from([sphere, torus]), attraction=st.sampled_from(ATTRACTIONS))
     def test_changes_no_byte(self, seed: int, shape: Any, attraction: str) -> None:
-        points = shape(COUNT)
-        shuffled = np.random.default_rng(seed).permutation(points)
-        one, other = (reconstruct_points(some, attraction=attraction) for some in (points, shuffled))
-        assert bytes_of(one) == bytes_of(other)
+        shuffled = np.random.default_rng(seed).permutation(shape(COUNT))
+        other = reconstruct_points(shuffled, attraction=attraction)
+        assert bytes_of(made_of(shape, attraction)) == bytes_of(other)
 
     @law(8)
     @given(seed=seeds)
@@ -57,7 +69,7 @@ class TestOrder:
         points = sphere(COUNT)
         rng = np.random.default_rng(seed)
         again = rng.permutation(np.concatenate([points, points[rng.integers(COUNT, size=COUNT // 2)]]))
-        assert bytes_of(reconstruct_points(points)) == bytes_of(reconstruct_points(again))
+        assert bytes_of(made_of(sphere)) == bytes_of(reconstruct_points(again))
 
     @pytest.mark.parametrize("attraction", ATTRACTIONS)
     def test_nor_do_threads(self, attraction: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,7 +90,7 @@ class TestOrder:
         assert bytes_of(one) == bytes_of(two)
 
     def test_nor_does_a_second_run(self) -> None:
-        assert bytes_of(reconstruct_points(torus(COUNT))) == bytes_of(reconstruct_points(torus(COUNT)))
+        assert bytes_of(made_of(torus)) == bytes_of(reconstruct_points(torus(COUNT)))
 
     @pytest.mark.parametrize("training", ["online", "batch"])
     def test_nor_do_threads_on_the_way_from_a_study(self, training: str) -> None:
@@ -89,20 +101,20 @@ class TestOrder:
 
 class TestPlace:
     @pytest.mark.parametrize("attraction", ATTRACTIONS)
-    @pytest.mark.parametrize("far", [1e6, 1e9, -1e9])
+    @pytest.mark.parametrize("far", [-1e9, 1e9, 1e6][: size(3, 1)])
     def test_far_away_costs_no_precision_beyond_that_of_the_numbers(self, far: float, attraction: str) -> None:
-        points = dyadic(torus(COUNT))
-        here, there = (reconstruct_points(points + place, attraction=attraction, remesh=False) for place in (0.0, far))
-        assert here.mesh.faces.tobytes() == there.mesh.faces.tobytes()
-        assert here.cuberille.quads.tobytes() == there.cuberille.quads.tobytes()
-        off = there.mesh.vertices - far - here.mesh.vertices
+        near = here(attraction)
+        there = reconstruct_points(dyadic(torus(COUNT)) + far, attraction=attraction, remesh=False)
+        assert near.mesh.faces.tobytes() == there.mesh.faces.tobytes()
+        assert near.cuberille.quads.tobytes() == there.cuberille.quads.tobytes()
+        off = there.mesh.vertices - far - near.mesh.vertices
         assert np.abs(off).max() <= 4 * np.spacing(abs(far))
 
-    @pytest.mark.parametrize("scale", [2.0**-20, 2.0**20])
+    @pytest.mark.parametrize("scale", [2.0**-20, 2.0**20][: size(2, 1)])
     def test_the_unit_of_the_points_does_not_matter(self, scale: float) -> None:
-        here, there = reconstruct_points(torus(COUNT)), reconstruct_points(torus(COUNT) * scale)
-        assert here.mesh.faces.tobytes() == there.mesh.faces.tobytes()
-        np.testing.assert_allclose(there.mesh.vertices, here.mesh.vertices * scale, rtol=1e-12)
+        near, there = made_of(torus), reconstruct_points(torus(COUNT) * scale)
+        assert near.mesh.faces.tobytes() == there.mesh.faces.tobytes()
+        np.testing.assert_allclose(there.mesh.vertices, near.mesh.vertices * scale, rtol=1e-12)
 
 
 class TestSound:

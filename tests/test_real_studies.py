@@ -39,22 +39,6 @@ class TestRealStudies:
         assert advised or found.report["cubes"]["tight"]
         assert advised or 0.8 < found.report["quality"]["volume_over_rings"] < 1.25
 
-    @pytest.mark.parametrize(
-        ("name", "options"),
-        [
-            ("dicom2stl/ct_example.nii.gz", {"preset": "bone"}),
-            ("derived/dev54_synth_t1/dev54_synth_t1_labels.nii.gz", {"select": (515, 516)}),
-            ("derived/dev54_synth_t1/dev54_synth_t1_labels.nii.gz", {"select": (4, 43, 14, 15)}),
-        ],
-    )
-    def test_the_way_that_fits_keeps_the_volume_of_the_window(self, name: str, options: dict[str, Any]) -> None:
-        found = reconstruct(tomomesh.read_volume(shared(name)), **options)
-        assert found.way == "voxels"
-        assert found.segmentation is not None
-        assert judged(found).is_watertight
-        window = found.segmentation.mask.sum() * found.segmentation.volume.voxel_mm3
-        assert found.mesh.face_volumes.sum() == pytest.approx(window, rel=0.05)
-
     def test_a_vendors_slab_of_four_slices_is_closed(self) -> None:
         found = reconstruct(tomomesh.read_volume(shared("dicom2nifti/siemens/anatomical/001")), way="ring")
         assert judged(found).is_watertight

@@ -163,9 +163,9 @@ class TestNearSheets:
     @pytest.mark.parametrize("gap", [1.0, 1.5, 2.0, 3.0])
     @pytest.mark.parametrize("radius", [1.0, 0.25])
     def test_are_two_objects_or_told_of_with_the_place(self, radius: float, gap: float) -> None:
-        spacing = np.sqrt(4 * np.pi / 30_000)
-        other = on_sphere(int(30_000 * radius**2), radius, seed=2) + np.array([1 + gap * spacing + radius, 0, 0])
-        surface = reconstruct_points(np.concatenate([on_sphere(30_000), other]))
+        spacing = np.sqrt(4 * np.pi / 15_000)
+        other = on_sphere(int(15_000 * radius**2), radius, seed=2) + np.array([1 + gap * spacing + radius, 0, 0])
+        surface = reconstruct_points(np.concatenate([on_sphere(15_000), other]))
         if surface.report["quality"]["components"] == 2:
             assert quality_of(surface, components=2)["volume_mm3"] == pytest.approx(
                 4 / 3 * np.pi * (1 + radius**3), rel=1e-3

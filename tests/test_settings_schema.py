@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -37,6 +38,7 @@ def numbers(draw: st.DrawFn, entry: Field[Any]) -> float:
     return int(value) if value == int(value) else value
 
 
+@cache  # a strategy anew for each example takes longer than the example
 def values(entry: Field[Any]) -> st.SearchStrategy[Any]:
     single = st.one_of(
         numbers(entry),
