@@ -12,7 +12,7 @@ from ..model.points import COLORS, KINDS, PointSet
 from .colors import named_colors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -40,7 +40,16 @@ def split_fields(columns: Mapping[str, NDArray[Any]], *, file: str) -> Cloud:
     axes = [columns[axis] for axis in AXES if axis in columns]
     if len(axes) < 3 or len({axis.shape for axis in axes}) > 1 or axes[0].ndim != 1 or not all(map(_are_numbers, axes)):
         raise FormatError("the points have no positions", file=file, expected="as many numbers x, y and z")
-    return doubles(np.stack(axes, axis=1)), {name: column for name, column in columns.items() if name not in AXES}
+    return side_by_side(axes), {name: column for name, column in columns.items() if name not in AXES}
+
+
+def side_by_side(columns: Sequence[NDArray[Any]]) -> NDArray[np.float64]:
+    """Return columns (n,) of numbers as doubles (n, k), each copied once; NaN of whatever bits is told later."""
+    rows = np.empty((len(columns[0]), len(columns)))
+    with np.errstate(invalid="ignore"):
+        for number, column in enumerate(columns):
+            rows[:, number] = column
+    return rows
 
 
 def doubles(values: NDArray[Any]) -> NDArray[np.float64]:
@@ -82,7 +91,7 @@ def _ids(fields: Mapping[str, NDArray[Any]]) -> Fields:
         return {}
     ids: Fields = {name: fields[name].astype(kind) for name, kind in IDS.items()}
     same = all(np.array_equal(ids[name], fields[name]) for name in IDS)
-    return ids if same and np.isin(ids["kind"], KINDS).all() else {}
+    return ids if same and set(np.flatnonzero(np.bincount(ids["kind"]))) <= set(KINDS) else {}
 
 
 def flat_columns(fields: Mapping[str, NDArray[Any]], count: int, taken: Iterable[str]) -> Fields:

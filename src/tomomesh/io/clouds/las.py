@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import FormatError
 from ...model.units import MM
+from ..fields import AXES, side_by_side
 from ..files.extras import required
 from ..files.limits import require_bytes, require_memory, require_rows
 from ..files.source import first_bytes, third_party
@@ -62,7 +63,9 @@ def read_las(path: Path) -> Cloud:
     if not chunks:
         return np.empty((0, 3)), {}
     columns = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
-    return columns.pop("") * np.array([1.0, 1.0, heights]), columns
+    positions = columns.pop("")
+    positions[:, 2] *= heights
+    return positions, columns
 
 
 def las_frame(path: Path) -> dict[str, Any]:
@@ -110,5 +113,5 @@ def _check_promises(path: Path, header: Any) -> None:
 
 def _columns(chunk: Any, names: list[str]) -> dict[str, Any]:
     """Return a chunk's positions, under the empty name, and its fields."""
-    positions = np.stack([np.array(chunk[axis], np.float64) for axis in ("x", "y", "z")], axis=1)
+    positions = side_by_side([chunk[axis].scaled_array() for axis in AXES])
     return {"": positions, **{name: np.array(chunk[name]) for name in names}}

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import FormatError, OutputError
+from ...model.columns import carried
 from ...model.units import MM, unit_named
 from ..colors import named_colors
 from ..files.atomic import replacing
@@ -200,7 +201,7 @@ def _placed(objects: dict[str, Element], item: Element, outer: NDArray[np.float6
     mesh = found.find(f"{{{CORE}}}mesh")
     vertices, faces = _numbers(mesh, "vertex", "xyz", np.float64), _numbers(mesh, "triangle", TRIPLE, np.int64)
     mirrored = np.linalg.det(matrix[:3]) < 0
-    yield vertices @ matrix[:3] + matrix[3], faces[:, ::-1] if mirrored else faces
+    yield carried(vertices, matrix[:3], matrix[3]), faces[:, ::-1] if mirrored else faces
     for component in found.iter(f"{{{CORE}}}component"):
         yield from _placed(objects, component, matrix, depth - 1)
 
