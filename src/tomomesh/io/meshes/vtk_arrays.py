@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+import string
 import zlib
 from dataclasses import dataclass
 from functools import cached_property
@@ -62,7 +63,7 @@ class PolyData:
         FormatError
             Where they are none of VTK's polygons.
         """
-        found = APPENDED.search(data)
+        found = APPENDED.search(data, max(data.find(b"<AppendedData"), 0))
         text, appended = (data, b"") if found is None else (data[: found.start()] + b"</VTKFile>", data[found.end() :])
         root = parsed_xml(text, file)
         kind, packed = root.get("type"), root.get("compressor")
@@ -109,7 +110,7 @@ class PolyData:
         if one.get("format") == "appended":
             source, raw = self.appended[int(one.attrib["offset"]) :], self.raw
         else:
-            source, raw = "".join((one.text or "").split()).encode("ascii"), False
+            source, raw = _joined((one.text or "").strip()).encode("ascii"), False
         size = 8 if self.root.get("header_type") == "UInt64" else 4
         word = np.dtype(f"{self.order}u{size}")
         if self.root.get("compressor") is None:
@@ -122,6 +123,11 @@ class PolyData:
         packed, ends = _taken(source[start:], raw, int(head[3:].sum())), np.cumsum(head[3:])
         parts = [packed[end - length : end] for end, length in zip(ends, head[3:], strict=True)]
         return b"".join(_unpacked(part, int(head[1])) for part in parts)
+
+
+def _joined(text: str) -> str:
+    """Return a text without white space; most have none inside, which is quickly seen."""
+    return "".join(text.split()) if any(space in text for space in string.whitespace) else text
 
 
 def _letters(count: int) -> int:
