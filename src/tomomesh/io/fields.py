@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -69,7 +70,6 @@ def point_set(positions: NDArray[np.float64], fields: Mapping[str, NDArray[Any]]
         Numbers become attributes, colors as uint8 ``red``, ``green`` and ``blue``; ids of tomomesh's own files
         become slices, neurons and kinds; normals and text are passed over.
     """
-    points = PointSet.from_positions(positions)
     ids = _ids(fields)
     colors = named_colors(fields)
     taken = {*ids, *(colors[0] if colors else ())}
@@ -77,8 +77,9 @@ def point_set(positions: NDArray[np.float64], fields: Mapping[str, NDArray[Any]]
     for name, values in fields.items():
         if name not in taken and name not in attributes and name.lower() not in NORMALS and _are_numbers(values):
             attributes[name] = np.array(values, values.dtype.newbyteorder("="))
-    slices, neurons, kinds = ids.values() if ids else (points.slices, points.neurons, points.kinds)
-    return PointSet(positions, slices, neurons, kinds, attributes)
+    if ids:
+        return PointSet(positions, *ids.values(), attributes)
+    return replace(PointSet.from_positions(positions), attributes=attributes)
 
 
 def _are_numbers(values: NDArray[Any]) -> bool:
@@ -90,8 +91,8 @@ def _ids(fields: Mapping[str, NDArray[Any]]) -> Fields:
     if not all(name in fields and fields[name].dtype.kind in "iu" and fields[name].ndim == 1 for name in IDS):
         return {}
     ids: Fields = {name: fields[name].astype(kind) for name, kind in IDS.items()}
-    same = all(np.array_equal(ids[name], fields[name]) for name in IDS)
-    return ids if same and set(np.flatnonzero(np.bincount(ids["kind"]))) <= set(KINDS) else {}
+    same = all(fields[name].dtype == kind or np.array_equal(ids[name], fields[name]) for name, kind in IDS.items())
+    return ids if same and ids["kind"].max(initial=0) <= max(KINDS) else {}
 
 
 def flat_columns(fields: Mapping[str, NDArray[Any]], count: int, taken: Iterable[str]) -> Fields:

@@ -11,6 +11,8 @@ from ...measure.topology import first_equals
 from ...model.mesh import TriMesh
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
@@ -68,6 +70,17 @@ def _repeated(faces: NDArray[np.int64], count: int) -> int:
     """Count the faces that run along an edge as another one does, and edges without a length."""
     tails, heads = _edges(faces)
     return len(tails) - len(np.unique(tails * count + heads)) + int((tails == heads).sum())
+
+
+def together(meshes: Iterable[Arrays]) -> Arrays:
+    """Put meshes beside each other: the vertices of all, and the faces by their numbers among these."""
+    parts = list(meshes)
+    if len(parts) == 1:
+        return parts[0]
+    first = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
+    vertices = [np.empty((0, 3)), *(vertices for vertices, _ in parts)]
+    faces = [np.empty((0, 3), np.int64), *(faces + n for (_, faces), n in zip(parts, first, strict=False))]
+    return np.concatenate(vertices), np.concatenate(faces)
 
 
 def fans(corners: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:

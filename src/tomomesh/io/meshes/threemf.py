@@ -29,6 +29,7 @@ from ..files.source import third_party
 from ..frames import frame_in_file
 from ..text import written
 from .attributes import single_precision
+from .cells import together
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -166,10 +167,7 @@ def read_3mf(data: bytes, file: str) -> Arrays:
             raise ValueError(len(placed))
     except (KeyError, ValueError, TypeError, IndexError, OverflowError):
         raise FormatError("the model cannot be understood", file=file, expected="objects and a build of 3MF") from None
-    first = np.cumsum([0, *(len(vertices) for vertices, _ in placed)])
-    vertices = np.concatenate([np.empty((0, 3)), *(vertices for vertices, _ in placed)])
-    faces = [np.empty((0, 3), np.int64), *(faces + n for (_, faces), n in zip(placed, first, strict=False))]
-    return vertices, np.concatenate(faces)
+    return together(placed)
 
 
 def threemf_frame(data: bytes, file: str) -> dict[str, str]:

@@ -63,7 +63,8 @@ class PolyData:
         FormatError
             Where they are none of VTK's polygons.
         """
-        found = APPENDED.search(data, max(data.find(b"<AppendedData"), 0))
+        at = data.find(b"<AppendedData")
+        found = None if at < 0 else APPENDED.search(data, at)
         text, appended = (data, b"") if found is None else (data[: found.start()] + b"</VTKFile>", data[found.end() :])
         root = parsed_xml(text, file)
         kind, packed = root.get("type"), root.get("compressor")
@@ -105,7 +106,7 @@ class PolyData:
             values = np.frombuffer(self._bytes(one), kind)
         return values.reshape(-1, columns) if columns > 1 else values
 
-    def _bytes(self, one: Element) -> bytes:
+    def _bytes(self, one: Element) -> bytes | memoryview:
         """Return the bytes of an array, unpacked."""
         if one.get("format") == "appended":
             source, raw = self.appended[int(one.attrib["offset"]) :], self.raw
@@ -115,7 +116,7 @@ class PolyData:
         word = np.dtype(f"{self.order}u{size}")
         if self.root.get("compressor") is None:
             count = int(np.frombuffer(_taken(source, raw, size), word)[0])
-            return _taken(source, raw, size + count)[size:]
+            return memoryview(_taken(source, raw, size + count))[size:]
         blocks = int(np.frombuffer(_taken(source, raw, size), word)[0])
         head = np.frombuffer(_taken(source, raw, (3 + blocks) * size), word).astype(np.int64)
         require_memory(int(blocks * head[1]), file=self.file)
