@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import OutputError
 from ...measure.topology import count_positions
+from ...model.columns import box
 from ..files.signature import signature
 
 if TYPE_CHECKING:
@@ -108,5 +109,6 @@ def _distance(positions: NDArray[np.float64]) -> float:
     """Return how far apart so many positions are that lie evenly on the faces of their box; of one, without a limit."""
     if len(positions) < 2:
         return np.inf
-    a, b, c = np.ptp(positions, axis=0)
+    lowest, highest = box(positions)
+    a, b, c = highest - lowest
     return float(np.sqrt(2 * (a * b + b * c + c * a) / len(positions)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import re
-import string
 import zlib
 from dataclasses import dataclass
 from functools import cached_property
@@ -128,7 +127,7 @@ class PolyData:
 
 def _joined(text: str) -> str:
     """Return a text without white space; most have none inside, which is quickly seen."""
-    return "".join(text.split()) if any(space in text for space in string.whitespace) else text
+    return "".join(text.split()) if any(space in text for space in " \t\r\n") else text
 
 
 def _letters(count: int) -> int:
