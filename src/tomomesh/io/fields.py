@@ -78,7 +78,8 @@ def point_set(positions: NDArray[np.float64], fields: Mapping[str, NDArray[Any]]
         if name not in taken and name not in attributes and name.lower() not in NORMALS and _are_numbers(values):
             attributes[name] = np.array(values, values.dtype.newbyteorder("="))
     if ids:
-        return PointSet(positions, *ids.values(), attributes)
+        slices, neurons, kinds = ids.values()
+        return PointSet(positions, slices, neurons, kinds, attributes)
     return replace(PointSet.from_positions(positions), attributes=attributes)
 
 

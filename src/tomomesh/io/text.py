@@ -179,7 +179,7 @@ def lists_of(lines: Sequence[str], sizes: NDArray[np.int64]) -> NDArray[np.int64
     for size in np.unique(sizes[sizes > 0]):
         rows = np.flatnonzero(sizes == size)
         places = starts[rows, None] + np.arange(size)
-        found[places] = numbers_of([lines[row] for row in rows], range(1, size + 1), np.int64)
+        found[places] = numbers_of([lines[row] for row in rows.tolist()], range(1, size + 1), np.int64)
     return found
 
 
