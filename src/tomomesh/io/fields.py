@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from ..model.points import COLORS, KINDS, PointSet
 from .colors import named_colors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -40,7 +41,16 @@ def split_fields(columns: Mapping[str, NDArray[Any]], *, file: str) -> Cloud:
     axes = [columns[axis] for axis in AXES if axis in columns]
     if len(axes) < 3 or len({axis.shape for axis in axes}) > 1 or axes[0].ndim != 1 or not all(map(_are_numbers, axes)):
         raise FormatError("the points have no positions", file=file, expected="as many numbers x, y and z")
-    return doubles(np.stack(axes, axis=1)), {name: column for name, column in columns.items() if name not in AXES}
+    return side_by_side(axes), {name: column for name, column in columns.items() if name not in AXES}
+
+
+def side_by_side(columns: Sequence[NDArray[Any]]) -> NDArray[np.float64]:
+    """Return columns (n,) of numbers as doubles (n, k), each copied once; NaN of whatever bits is told later."""
+    rows = np.empty((len(columns[0]), len(columns)))
+    with np.errstate(invalid="ignore"):
+        for number, column in enumerate(columns):
+            rows[:, number] = column
+    return rows
 
 
 def doubles(values: NDArray[Any]) -> NDArray[np.float64]:
@@ -60,7 +70,6 @@ def point_set(positions: NDArray[np.float64], fields: Mapping[str, NDArray[Any]]
         Numbers become attributes, colors as uint8 ``red``, ``green`` and ``blue``; ids of tomomesh's own files
         become slices, neurons and kinds; normals and text are passed over.
     """
-    points = PointSet.from_positions(positions)
     ids = _ids(fields)
     colors = named_colors(fields)
     taken = {*ids, *(colors[0] if colors else ())}
@@ -68,8 +77,10 @@ def point_set(positions: NDArray[np.float64], fields: Mapping[str, NDArray[Any]]
     for name, values in fields.items():
         if name not in taken and name not in attributes and name.lower() not in NORMALS and _are_numbers(values):
             attributes[name] = np.array(values, values.dtype.newbyteorder("="))
-    slices, neurons, kinds = ids.values() if ids else (points.slices, points.neurons, points.kinds)
-    return PointSet(positions, slices, neurons, kinds, attributes)
+    if ids:
+        slices, neurons, kinds = ids.values()
+        return PointSet(positions, slices, neurons, kinds, attributes)
+    return replace(PointSet.from_positions(positions), attributes=attributes)
 
 
 def _are_numbers(values: NDArray[Any]) -> bool:
@@ -81,8 +92,8 @@ def _ids(fields: Mapping[str, NDArray[Any]]) -> Fields:
     if not all(name in fields and fields[name].dtype.kind in "iu" and fields[name].ndim == 1 for name in IDS):
         return {}
     ids: Fields = {name: fields[name].astype(kind) for name, kind in IDS.items()}
-    same = all(np.array_equal(ids[name], fields[name]) for name in IDS)
-    return ids if same and np.isin(ids["kind"], KINDS).all() else {}
+    same = all(fields[name].dtype == kind or np.array_equal(ids[name], fields[name]) for name, kind in IDS.items())
+    return ids if same and ids["kind"].max(initial=0) <= max(KINDS) else {}
 
 
 def flat_columns(fields: Mapping[str, NDArray[Any]], count: int, taken: Iterable[str]) -> Fields:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..model.columns import carried
 from ..model.mesh import TriMesh
 from ..model.units import MM
 from .files.source import suffix_of
@@ -42,7 +43,7 @@ class Frame:
 
     def place(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Carry (n, 3) positions."""
-        return np.asarray(positions @ self.matrix[:3, :3].T + self.matrix[:3, 3])
+        return carried(positions, self.matrix[:3, :3].T, self.matrix[:3, 3])
 
     def mesh(self, mesh: TriMesh) -> TriMesh:
         """Carry a mesh; where the frame is a mirror, the faces are turned, so that they look outward in it too."""

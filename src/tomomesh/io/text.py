@@ -74,20 +74,26 @@ def parse_rows(
         For ragged rows, and for text, NaN and infinite numbers in the required columns; it names the row.
     """
     lines = [line.replace('"', "") for line in lines] if '"' in "".join(first_row(lines)) else lines
-    if any("//" in line or "%" in line for line in lines):  # NumPy's fast way knows `#` alone
-        lines = [content(line) for line in lines]
     delimiter = delimiter_of(lines)
-    lines = [line.replace(",", ".") for line in lines] if delimiter != "," and _has_commas(lines) else lines
     least = max(width, *(column + 1 for column in required), 1)
     if not any(map(content, lines)):
         return np.empty((0, least))
+    if (rows := _loaded(lines, delimiter)) is None:  # NumPy's reader knows comments by `#` alone, and no decimal commas
+        lines = [content(line) for line in lines]
+        lines = lines if delimiter == "," else [line.replace(",", ".") for line in lines]
+        rows = _loaded(lines, delimiter)
+    whole = rows is not None and width in (0, rows.shape[1]) and rows.shape[1] >= least
+    if rows is not None and whole and np.isfinite(rows[:, required]).all():
+        return rows
+    return _parse_slowly(lines, delimiter, required, file, before, width)  # it finds the row, or passes over text
+
+
+def _loaded(lines: Sequence[str], delimiter: str | None) -> NDArray[np.float64] | None:
+    """Return rows of numbers; None where something is none, or rows differ in length."""
     try:
-        rows = np.loadtxt(lines, delimiter=delimiter, ndmin=2)
-        if width in (0, rows.shape[1]) and rows.shape[1] >= least and np.isfinite(rows[:, required]).all():
-            return rows
+        return np.loadtxt(lines, delimiter=delimiter, ndmin=2)
     except ValueError:
-        pass  # the slow way finds the row, or passes over text
-    return _parse_slowly(lines, delimiter, required, file, before, width)
+        return None
 
 
 def delimiter_of(lines: Sequence[str]) -> str | None:
@@ -97,10 +103,6 @@ def delimiter_of(lines: Sequence[str]) -> str | None:
     if ";" in first or (len(words) > 2 and all(map(DECIMAL_COMMA.fullmatch, words))):
         return ";" if ";" in first else None
     return "," if "," in first else None
-
-
-def _has_commas(lines: Sequence[str]) -> bool:
-    return any("," in line for line in lines)
 
 
 def first_row(lines: Sequence[str]) -> list[str]:
@@ -150,6 +152,35 @@ def _check(value: float, cell: str, number: int, file: str) -> None:
 
 def _fault(what: str, number: int, found: str, expected: str, file: str) -> FormatError:
     return FormatError(what, file=file, found=f"row {number} = {found}", expected=expected)
+
+
+def numbers_of(lines: Sequence[str], columns: Sequence[int], kind: type) -> NDArray[Any]:
+    """Return some columns (c,) of rows (n,) that white space parts, none of them empty, as (n, c) numbers of a type.
+
+    Raises
+    ------
+    ValueError
+        For rows that have fewer columns, or no such numbers there.
+    """
+    if not lines:
+        return np.empty((0, len(columns)), kind)
+    return np.loadtxt(lines, kind, comments=None, usecols=columns, ndmin=2)
+
+
+def lists_of(lines: Sequence[str], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the whole numbers behind the first word of rows (n,), `sizes` (n,) of each, row after row.
+
+    Raises
+    ------
+    ValueError
+        As `numbers_of`.
+    """
+    starts, found = np.cumsum(sizes) - sizes, np.empty(sizes.sum(), np.int64)
+    for size in np.unique(sizes[sizes > 0]):
+        rows = np.flatnonzero(sizes == size)
+        places = starts[rows, None] + np.arange(size)
+        found[places] = numbers_of([lines[row] for row in rows.tolist()], range(1, size + 1), np.int64)
+    return found
 
 
 def written(row: str, *columns: Sequence[Any]) -> str:

@@ -117,7 +117,7 @@ def welded(mesh: TriMesh, dtype: type[np.floating[Any]] = np.float32) -> TriMesh
     Faces that lose a corner are dropped.
     """
     rounded = np.array(mesh.vertices.astype(dtype, copy=False), np.float64, order="C")
-    first = _first_equal(rounded)
+    first = first_equals(rounded)
     kept = first == np.arange(len(first))
     faces = (np.cumsum(kept) - 1)[first][mesh.faces]
     whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
@@ -160,12 +160,27 @@ def check_promise(mesh: TriMesh, *, cavities: int = 0, open_: bool = False) -> N
 
 def distinct_positions(mesh: TriMesh, dtype: type[np.floating[Any]]) -> int:
     """Count the positions that stay apart at a precision."""
-    first = _first_equal(np.array(mesh.vertices.astype(dtype, copy=False), np.float64, order="C"))
+    return count_positions(np.array(mesh.vertices.astype(dtype, copy=False), np.float64, order="C"))
+
+
+def count_positions(positions: NDArray[np.float64]) -> int:
+    """Count positions (n, 3), equal ones once; each -0 becomes 0, in place."""
+    first = first_equals(positions)
     return int((first == np.arange(len(first))).sum())
 
 
-def _first_equal(positions: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Return the first vertex at the position of each, (n,). -0 becomes 0, which is the same position."""
+def first_equals(positions: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Return the number of the first position that equals each of them.
+
+    Parameters
+    ----------
+    positions : (n, 3) float array
+        Row after row in memory. Each -0 becomes 0, which is the same position, in place.
+
+    Returns
+    -------
+    (n,) int32 array
+    """
     positions += 0.0
     rows = positions.view(np.int64)
     bits = len(rows).bit_length() + 1

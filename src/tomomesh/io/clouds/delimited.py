@@ -163,7 +163,7 @@ def _named_columns(rows: NDArray[np.float64], names: list[str], axes: list[int],
 
 def read_obj(path: Path) -> Cloud:
     """Read the vertices of an OBJ file, with their colors where they have any."""
-    vertices = [words[1:] if words[:1] in VERTEX else [] for words in map(str.split, unfolded(whole(path), str(path)))]
+    vertices = [line.split()[1:] if VERTEX.match(line) else [] for line in unfolded(whole(path), str(path))]
     width = max(min((len(words) for words in vertices if words), default=3), 3)
     lines = [" ".join(words[:width]) for words in vertices]
     rows = parse_rows(lines, required=(0, 1, 2), file=str(path))

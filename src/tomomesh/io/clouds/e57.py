@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import FormatError
+from ...model.columns import carried
+from ..fields import side_by_side
 from ..files.extras import required
 from ..files.limits import require_rows
 from ..files.source import third_party
@@ -55,11 +57,13 @@ def _read_scan(pye57: Any, image: Any, scan: Any, file: str) -> Cloud:
     wanted = [*axes, *E57_COLORS, "intensity", INVALID[axes == SPHERICAL]]
     columns = _columns(pye57, image, header, [name for name in wanted if name in header.point_fields])
     require_rows(header.point_count, len(columns[axes[0]]), "points", file=file)
-    valid = columns.pop(wanted[-1], np.zeros(len(columns[axes[0]]))) == 0
-    placed = np.stack([columns.pop(axis) for axis in axes], axis=1)[valid]
+    if (invalid := columns.pop(wanted[-1], None)) is not None:
+        columns = {name: column[invalid == 0] for name, column in columns.items()}
+    placed = side_by_side([columns.pop(axis) for axis in axes])
     local = placed if axes == CARTESIAN else pye57.utils.convert_spherical_to_cartesian(placed)
-    positions = local @ header.rotation_matrix.T + header.translation
-    return positions, {name: _whole(column[valid]) for name, column in columns.items()}
+    return carried(local, header.rotation_matrix.T, header.translation), {
+        name: _whole(column) for name, column in columns.items()
+    }
 
 
 def _columns(pye57: Any, image: Any, header: Any, names: list[str]) -> Fields:

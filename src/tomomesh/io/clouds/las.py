@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import FormatError
 from ...model.units import MM
+from ..fields import AXES, side_by_side
 from ..files.extras import required
 from ..files.limits import require_bytes, require_memory, require_rows
 from ..files.source import first_bytes, third_party
@@ -48,12 +49,12 @@ def read_las(path: Path) -> Cloud:
     laspy = required("laspy", file=file)
     if path.suffix.lower() == ".laz":
         required("lazrs", file=file)
-    heights = _meters(path)[1]
     with (
         third_party("laspy", file),
         # one thread: the parallel decoder takes memory for whatever a chunk's entry in their table says
         laspy.open(path, read_evlrs=False, laz_backend=laspy.LazBackend.Lazrs) as reader,
     ):
+        heights = _meters(reader.header, file)[1]
         _check_promises(path, reader.header)
         names = [name for name in reader.header.point_format.dimension_names if name in CARRIED]
         names += reader.header.point_format.extra_dimension_names
@@ -62,24 +63,24 @@ def read_las(path: Path) -> Cloud:
     if not chunks:
         return np.empty((0, 3)), {}
     columns = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
-    return columns.pop("") * np.array([1.0, 1.0, heights]), columns
+    positions = columns.pop("")
+    positions[:, 2] *= heights
+    return positions, columns
 
 
 def las_frame(path: Path) -> dict[str, Any]:
     """Return the unit of the coordinate system that a LAS or LAZ file names; None where it names none."""
-    return {"unit": _meters(path)[0]}
-
-
-def _meters(path: Path) -> tuple[str | None, float]:
-    """Return the unit of the first two axes, and how many of them a unit of height is."""
     file = str(path)
-    laspy = required("laspy", file=file)
-    with third_party("laspy", file), laspy.open(path, read_evlrs=False) as reader:
-        records = reader.header.vlrs
-        if not any(record.user_id == PROJECTION and record.record_id in SYSTEMS for record in records):
-            return None, 1.0
-        required("pyproj", file=file)
-        system = reader.header.parse_crs()
+    with third_party("laspy", file), required("laspy", file=file).open(path, read_evlrs=False) as reader:
+        return {"unit": _meters(reader.header, file)[0]}
+
+
+def _meters(header: Any, file: str) -> tuple[str | None, float]:
+    """Return the unit of the first two axes, and how many of them a unit of height is."""
+    if not any(record.user_id == PROJECTION and record.record_id in SYSTEMS for record in header.vlrs):
+        return None, 1.0
+    required("pyproj", file=file)
+    system = header.parse_crs()
     axes = [] if system is None else system.axis_info
     if not axes:
         return None, 1.0
@@ -110,5 +111,5 @@ def _check_promises(path: Path, header: Any) -> None:
 
 def _columns(chunk: Any, names: list[str]) -> dict[str, Any]:
     """Return a chunk's positions, under the empty name, and its fields."""
-    positions = np.stack([np.array(chunk[axis], np.float64) for axis in ("x", "y", "z")], axis=1)
+    positions = side_by_side([chunk[axis].scaled_array() for axis in AXES])
     return {"": positions, **{name: np.array(chunk[name]) for name in names}}

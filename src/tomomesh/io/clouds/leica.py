@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import FormatError
+from ...model.columns import carried
 from ...model.points import COLORS
 from ..files.limits import require_rows
 from ..text import parse_rows, read_lines
@@ -43,7 +44,7 @@ def read_ptx(path: Path) -> Cloud:
         require_rows(count, len(lines) - at, "points", file=file)
         rows = parse_rows(lines[at : at + count], required=(0, 1, 2), file=file, before=at)
         measured = rows[rows[:, :3].any(axis=1)]
-        measured[:, :3] = measured[:, :3] @ matrix[:3, :3] + matrix[3, :3]
+        measured[:, :3] = carried(measured[:, :3], matrix[:3, :3], matrix[3, :3])
         found.append(measured)
         at += count
     width = min((rows.shape[1] for rows in found), default=3)

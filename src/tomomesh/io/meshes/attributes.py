@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import OutputError
+from ...measure.topology import count_positions
+from ...model.columns import box
 from ..files.signature import signature
-from .cells import weld
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -92,17 +93,22 @@ def _narrow(positions: NDArray[np.float64]) -> NDArray[np.float32] | None:
     """Return positions in 32 bits, None where one is too large or would move too far, or two would fall together."""
     with np.errstate(over="ignore"):
         narrow = positions.astype(np.float32)
-    wide = narrow.astype(np.float64)
+    wide = narrow.astype(np.float64, order="C")
     near = np.isfinite(wide).all() and np.abs(wide - positions).max(initial=0) <= MOVED * _distance(positions)
     if not near:
         return None
-    apart = len(weld(wide)[0])  # most meshes have each position once: then the others need not be counted
-    return narrow if apart == len(positions) or apart == len(weld(positions)[0]) else None
+    apart = count_positions(wide)  # most meshes have each position once: then the others need not be counted
+    return (
+        narrow
+        if apart == len(positions) or apart == count_positions(np.array(positions, np.float64, order="C"))
+        else None
+    )
 
 
 def _distance(positions: NDArray[np.float64]) -> float:
     """Return how far apart so many positions are that lie evenly on the faces of their box; of one, without a limit."""
     if len(positions) < 2:
         return np.inf
-    a, b, c = np.ptp(positions, axis=0)
+    lowest, highest = box(positions)
+    a, b, c = highest - lowest
     return float(np.sqrt(2 * (a * b + b * c + c * a) / len(positions)))

@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...measure.links import Links
+from ...measure.topology import first_equals
+from ...model.mesh import TriMesh
+
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
@@ -28,16 +34,10 @@ def weld(positions: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     numbers : (n,) int64 array
         ``unique[numbers]`` equals `positions`.
     """
-    positions = positions + 0.0  # -0.0 is 0.0
-    order = np.lexsort(positions.T)
-    new = np.ones(len(order), bool)
-    new[1:] = (np.diff(positions[order], axis=0) != 0).any(axis=1)
-    groups = np.empty(len(order), np.int64)
-    groups[order] = np.cumsum(new) - 1
-    first = order[new]  # lexsort is stable: the first of each group
-    rank = np.empty(len(first), np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return positions[np.sort(first)], rank[groups]
+    positions = np.array(positions, np.float64, order="C")
+    first = first_equals(positions)
+    kept = first == np.arange(len(first))
+    return positions[kept], (np.cumsum(kept) - 1)[first]
 
 
 def joined(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Arrays:
@@ -46,12 +46,10 @@ def joined(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Arrays:
     Vertices away from a border stay, whatever their positions; so do all where an edge would get two faces that run
     along it in the same way.
     """
-    count, (tails, heads) = len(vertices), _edges(faces)
-    edges, uses = np.unique(np.minimum(tails, heads) * count + np.maximum(tails, heads), return_counts=True)
-    border = edges[uses == 1]
-    if not len(border):
+    count, borders = len(vertices), Links(TriMesh(vertices, faces)).borders
+    if not len(borders):
         return vertices, faces
-    at = np.unique([border // count, border % count])
+    at = np.unique([ends[borders] for ends in _edges(faces)])
     numbers = weld(vertices[at])[1]
     _, first = np.unique(numbers, return_index=True)
     target = np.arange(count)
@@ -65,13 +63,24 @@ def joined(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Arrays:
 
 def _edges(faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return where the edges of all faces (3m,) begin and end."""
-    return faces.T.ravel(), faces[:, [1, 2, 0]].T.ravel()
+    return faces.ravel(), faces[:, [1, 2, 0]].ravel()
 
 
 def _repeated(faces: NDArray[np.int64], count: int) -> int:
     """Count the faces that run along an edge as another one does, and edges without a length."""
     tails, heads = _edges(faces)
     return len(tails) - len(np.unique(tails * count + heads)) + int((tails == heads).sum())
+
+
+def together(meshes: Iterable[Arrays]) -> Arrays:
+    """Put meshes beside each other: the vertices of all, and the faces by their numbers among these."""
+    parts = list(meshes)
+    if len(parts) == 1:
+        return parts[0]
+    first = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
+    vertices = [np.empty((0, 3)), *(vertices for vertices, _ in parts)]
+    faces = [np.empty((0, 3), np.int64), *(faces + n for (_, faces), n in zip(parts, first, strict=False))]
+    return np.concatenate(vertices), np.concatenate(faces)
 
 
 def fans(corners: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -88,6 +97,8 @@ def fans(corners: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int
     -------
     (c - 2p, 3) int64 array
     """
+    if (sizes == 3).all():
+        return corners.reshape(-1, 3)
     first = np.repeat(np.cumsum(sizes) - sizes, sizes - 2)
     step = np.arange(len(first)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
     return np.asarray(corners[np.stack([first, first + step + 1, first + step + 2], axis=1)])

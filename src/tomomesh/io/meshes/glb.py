@@ -16,7 +16,7 @@ from ..colors import linear, named_colors
 from ..files.atomic import replacing
 from ..files.source import third_party
 from .attributes import single_precision
-from .cells import weld
+from .cells import together, weld
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -111,12 +111,10 @@ def read_glb(data: bytes, file: str) -> Arrays:
     """
     scene, named = _scene(data, file)
     meshes = [*scene.geometry.values()] if named else scene.dump()
-    parts = [mesh for mesh in meshes if hasattr(mesh, "faces")]
-    first = np.cumsum([0, *(len(mesh.vertices) for mesh in parts)])
-    vertices = np.concatenate([np.empty((0, 3)), *(mesh.vertices for mesh in parts)])
-    faces = [np.empty((0, 3), np.int64), *(mesh.faces + n for mesh, n in zip(parts, first, strict=False))]
-    unique, numbers = weld(np.array(vertices, np.float64))
-    return unique, numbers[np.concatenate(faces)]
+    parts = [(np.asarray(mesh.vertices), np.asarray(mesh.faces)) for mesh in meshes if hasattr(mesh, "faces")]
+    vertices, faces = together(parts)
+    unique, numbers = weld(vertices)
+    return unique, numbers[faces]
 
 
 def glb_frame(data: bytes, file: str) -> dict[str, str]:

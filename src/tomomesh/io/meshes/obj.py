@@ -11,18 +11,23 @@ import numpy as np
 from ...errors import FormatError
 from ..colors import named_colors
 from ..files.atomic import replacing
-from ..text import written
+from ..text import lists_of, numbers_of, written
 from .cells import fans, weld
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
     from .cells import Arrays
 
-VERTEX, FACE = (["v"], ["V"]), (["f"], ["F"], ["fo"])
-"""The words that begin the lines of vertices and of faces; old files name outlines of faces apart."""
+VERTEX, FACE = re.compile(r"\s*[vV](?!\S)"), re.compile(r"\s*(f|F|fo)(?!\S)")
+"""How the lines of vertices and of faces begin; old files name outlines of faces apart."""
+
+BESIDE = re.compile(r"(?<=\d)/\S*")
+"""The numbers of textures and normals behind that of a vertex."""
 
 
 def write_obj(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
@@ -49,24 +54,30 @@ def read_obj_mesh(data: bytes, file: str) -> Arrays:
     FormatError
         For a vertex or a face that cannot be understood.
     """
-    words = [line.split() for line in unfolded(data, file)]
-    places = [line[1:4] for line in words if line[:1] in VERTEX]
-    polygons = [[corner.partition("/")[0] for corner in line[1:]] for line in words if line[:1] in FACE]
-    before = np.cumsum([line[:1] in VERTEX for line in words], dtype=np.int64)[[line[:1] in FACE for line in words]]
+    lines = unfolded(data, file)
+    polygons = BESIDE.sub("", "\n".join(filter(FACE.match, lines))).splitlines()
+    sizes = np.array([len(line.split()) - 1 for line in polygons], np.int64)
     try:
-        vertices = np.array(places, np.float64).reshape(-1, 3)
-        corners = np.array([corner for polygon in polygons for corner in polygon], np.int64)
-    except (ValueError, OverflowError):  # of numbers beyond 64 bits
+        vertices = numbers_of(list(filter(VERTEX.match, lines)), (1, 2, 3), np.float64)
+        corners = lists_of(polygons, sizes)
+    except ValueError:
         raise FormatError("a vertex or a face cannot be understood", file=file, expected="numbers") from None
-    sizes = np.array([len(polygon) for polygon in polygons], np.int64)
     if (corners == 0).any() or (sizes < 3).any():
         raise FormatError("a face cannot be understood", file=file, expected="three vertices or more, from 1 on")
-    numbers = np.where(corners > 0, corners - 1, corners + np.repeat(before, sizes))
+    numbers = corners - 1
+    if (corners < 0).any():
+        numbers = np.where(corners > 0, numbers, corners + np.repeat(_vertices_before(lines), sizes))
     faces = fans(numbers, sizes)
     if len(numbers) == 0 or not np.array_equal(np.sort(numbers), np.arange(len(vertices))):
         return vertices, faces
     unique, merged = weld(vertices)
     return unique, merged[faces]
+
+
+def _vertices_before(lines: list[str]) -> NDArray[np.int64]:
+    """Return how many vertices stand before each face."""
+    vertices = np.cumsum([bool(VERTEX.match(line)) for line in lines], dtype=np.int64)
+    return vertices[[bool(FACE.match(line)) for line in lines]]
 
 
 def unfolded(data: bytes, file: str) -> list[str]:
@@ -75,4 +86,5 @@ def unfolded(data: bytes, file: str) -> list[str]:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")  # names of materials may be in any code; the numbers are ASCII
-    return [line.partition("#")[0] for line in re.sub(r"\\[ \t]*\r?\n", " ", text).splitlines()]
+    lines = (re.sub(r"\\[ \t]*\r?\n", " ", text) if "\\" in text else text).splitlines()
+    return [line.partition("#")[0] for line in lines] if "#" in text else lines

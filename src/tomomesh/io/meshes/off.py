@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import FormatError
 from ..files.atomic import replacing
 from ..files.limits import require_rows
-from ..text import written
+from ..text import lists_of, numbers_of, written
 from .cells import fans
 
 if TYPE_CHECKING:
@@ -36,24 +36,23 @@ def read_off(data: bytes, file: str) -> Arrays:
     FormatError
         For a file that is cut off, or cannot be understood.
     """
-    text = re.sub(r"#.*", "", data.decode("utf-8-sig", "replace"))
+    text = data.decode("utf-8-sig", "replace")
+    text = re.sub(r"#.*", "", text) if "#" in text else text
     head = HEAD.match(text)
-    lines = [words for line in text[head.end() if head else 0 :].splitlines() if (words := line.split())]
+    lines = [line for line in text[head.end() if head else 0 :].splitlines() if line and not line.isspace()]
     try:
-        vertices, faces = (int(word) for word in (lines[0] if lines else [])[:2])
+        vertices, faces = (int(word) for word in (lines[0] if lines else "").split()[:2])
         if min(vertices, faces) < 0:
             raise ValueError(vertices, faces)
         require_rows(vertices + faces, len(lines) - 1, "vertices and faces", file=file)
-        places = np.array([words[:3] for words in lines[1 : vertices + 1]], np.float64).reshape(-1, 3)
-        polygons = [words[1 : int(words[0]) + 1] for words in lines[vertices + 1 : vertices + faces + 1]]
-        corners = np.array([corner for polygon in polygons for corner in polygon], np.int64)
-    except (ValueError, OverflowError):  # of numbers beyond 64 bits
+        places = numbers_of(lines[1 : vertices + 1], (0, 1, 2), np.float64)
+        polygons = lines[vertices + 1 : vertices + faces + 1]
+        sizes = numbers_of(polygons, (0,), np.int64)[:, 0]
+        if (sizes < 3).any() or (sizes >= [len(line.split()) for line in polygons]).any():
+            raise FormatError("a face cannot be understood", file=file, expected="three vertices or more")
+        return places, fans(lists_of(polygons, sizes), sizes)
+    except ValueError:
         raise FormatError("the file cannot be understood", file=file, expected="OFF: vertices and faces") from None
-    sizes = np.array([len(polygon) for polygon in polygons], np.int64)
-    promised = np.array([int(words[0]) for words in lines[vertices + 1 : vertices + faces + 1]], np.int64)
-    if (sizes < 3).any() or not np.array_equal(sizes, promised):
-        raise FormatError("a face cannot be understood", file=file, expected="three vertices or more")
-    return places, fans(corners, sizes)
 
 
 def write_off(mesh: TriMesh, path: str | Path, _beside: MeshAttributes) -> None:

@@ -141,8 +141,9 @@ def _stl_parts(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> Itera
         some = TriMesh(mesh.vertices, mesh.faces[part])
         rows = np.zeros(len(some.faces), FACE)
         rows["corners"] = places[some.faces]
-        length = np.linalg.norm(some.face_vectors, axis=1, keepdims=True)
-        rows["normal"] = some.face_vectors / np.where(length > 0, length, 1.0)
+        normals = some.face_vectors
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        rows["normal"] = normals / np.where(length > 0, length, 1.0)
         yield rows.tobytes()
 
 

@@ -10,27 +10,30 @@ from __future__ import annotations
 
 import io
 import zipfile
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import chain, islice
-from typing import TYPE_CHECKING, Any
+from operator import itemgetter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...errors import FormatError, OutputError
+from ...model.columns import carried
 from ...model.units import MM, unit_named
 from ..colors import named_colors
 from ..files.atomic import replacing
 from ..files.limits import require_memory
-from ..files.markup import parsed_xml
+from ..files.markup import parsed_until, parsed_xml
 from ..files.source import third_party
 from ..frames import frame_in_file
 from ..text import written
 from .attributes import single_precision
+from .cells import together
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
     from pathlib import Path
-    from xml.etree.ElementTree import Element
 
     from numpy.typing import NDArray
 
@@ -64,8 +67,13 @@ COLORS_ID, MESH_ID = 1, 2
 MOST_PIECES = 1 << 16
 """Objects that a file may build, those within others counted each time: they could double from object to object."""
 
-IDENTITY, TRIPLE = "1 0 0 0 1 0 0 0 1 0 0 0", ("v1", "v2", "v3")
-"""The place of what has none, as four rows of three; the corners of a triangle."""
+IDENTITY = "1 0 0 0 1 0 0 0 1 0 0 0"
+"""The place of what has none, as four rows of three."""
+
+RESOURCES, VERTEX, TRIANGLE, OBJECT, COMPONENT, ITEM = (
+    f"{{{CORE}}}{name}" for name in ("resources", "vertex", "triangle", "object", "component", "item")
+)
+"""The elements that are read."""
 
 
 LARGEST_MM = 1e9
@@ -151,60 +159,87 @@ def read_3mf(data: bytes, file: str) -> Arrays:
     FormatError
         For a file that is no zip with one model, or whose model cannot be understood.
     """
-    root = _root(data, file)
+    model = parsed_xml(_text(data, file), file, Model())
     try:
-        objects = {one.get("id", ""): one for one in root.iter(f"{{{CORE}}}object")}
-        items = root.iter(f"{{{CORE}}}item")
-        every = chain.from_iterable(_placed(objects, item, np.eye(4, 3), len(objects)) for item in items)
+        every = chain.from_iterable(model.placed(item, np.eye(4, 3), len(model.objects)) for item in model.items)
         placed = list(islice(every, MOST_PIECES + 1))
         if len(placed) > MOST_PIECES:
             raise ValueError(len(placed))
-    except (KeyError, ValueError, TypeError, IndexError):
+    except (KeyError, ValueError, TypeError, IndexError, OverflowError):
         raise FormatError("the model cannot be understood", file=file, expected="objects and a build of 3MF") from None
-    first = np.cumsum([0, *(len(vertices) for vertices, _ in placed)])
-    vertices = np.concatenate([np.empty((0, 3)), *(vertices for vertices, _ in placed)])
-    faces = [np.empty((0, 3), np.int64), *(faces + n for (_, faces), n in zip(placed, first, strict=False))]
-    return vertices, np.concatenate(faces)
+    return together(placed)
 
 
 def threemf_frame(data: bytes, file: str) -> dict[str, str]:
     """Return the unit, and the frame where tomomesh wrote the file."""
-    root = _root(data, file)
+    root = parsed_until(RESOURCES, _text(data, file), file)
     told = next((one.text or "" for one in root.iter(f"{{{CORE}}}metadata") if one.get("name") == "Description"), "")
     frame = [word.removeprefix("frame=") for word in told.split() if word.startswith("frame=")]
     unit = {"unit": unit_named(root.get("unit", "")) or "mm"}
     return unit | ({"frame": frame[0]} if told.startswith("tomomesh") and frame else {})
 
 
-def _root(data: bytes, file: str) -> Element:
+def _text(data: bytes, file: str) -> bytes:
     """Return the model of a package."""
     with third_party("zipfile", file), zipfile.ZipFile(io.BytesIO(data)) as archive:
         models = [one for one in archive.infolist() if one.filename.lower().endswith("3d/3dmodel.model")]
         if len(models) != 1:
             raise FormatError("the file has no model", file=file, expected="3D/3dmodel.model")
         require_memory(models[0].file_size, file=file)
-        text = archive.read(models[0])
-    return parsed_xml(text, file)
+        return archive.read(models[0])
 
 
-def _placed(objects: dict[str, Element], item: Element, outer: NDArray[np.float64], depth: int) -> Iterator[Arrays]:
-    """Yield the mesh of an item or a component, empty or not, and of the components of its object.
+@dataclass
+class Solid:
+    """An object of a file, by the attributes of its parts."""
 
-    `depth` ends circles.
-    """
-    if depth < 0:
-        raise ValueError(depth)
-    own = np.array(item.get("transform", IDENTITY).split(), np.float64).reshape(4, 3)
-    matrix = np.vstack([own[:3] @ outer[:3], own[3] @ outer[:3] + outer[3]])
-    found = objects[item.get("objectid", "")]
-    mesh = found.find(f"{{{CORE}}}mesh")
-    vertices, faces = _numbers(mesh, "vertex", "xyz", np.float64), _numbers(mesh, "triangle", TRIPLE, np.int64)
-    mirrored = np.linalg.det(matrix[:3]) < 0
-    yield vertices @ matrix[:3] + matrix[3], faces[:, ::-1] if mirrored else faces
-    for component in found.iter(f"{{{CORE}}}component"):
-        yield from _placed(objects, component, matrix, depth - 1)
+    vertices: list[dict[str, str]] = field(default_factory=list)
+    triangles: list[dict[str, str]] = field(default_factory=list)
+    components: list[dict[str, str]] = field(default_factory=list)
+
+    @cached_property
+    def arrays(self) -> Arrays:
+        """Its mesh, empty or not."""
+        places = chain.from_iterable(map(itemgetter("x", "y", "z"), self.vertices))
+        corners = chain.from_iterable(map(itemgetter("v1", "v2", "v3"), self.triangles))
+        vertices, faces = np.fromiter(map(float, places), np.float64), np.fromiter(map(int, corners), np.int64)
+        return vertices.reshape(-1, 3), faces.reshape(-1, 3)
 
 
-def _numbers(mesh: Element | None, name: str, keys: Sequence[str], kind: type) -> NDArray[Any]:
-    every = [] if mesh is None else mesh.iter(f"{{{CORE}}}{name}")
-    return np.array([[one.attrib[key] for key in keys] for one in every], kind).reshape(-1, 3)
+class Model:
+    """The objects and the build of a file, told by a parser: a tree of all elements takes as long again."""
+
+    def __init__(self) -> None:
+        self.objects: dict[str, Solid] = {}
+        self.items: list[dict[str, str]] = []
+        self.solid = Solid()
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        """Take an element; what stands before the first object belongs to none."""
+        if tag == VERTEX:
+            self.solid.vertices.append(attributes)
+        elif tag == TRIANGLE:
+            self.solid.triangles.append(attributes)
+        elif tag == OBJECT:
+            self.solid = self.objects[attributes.get("id", "")] = Solid()
+        elif tag == COMPONENT:
+            self.solid.components.append(attributes)
+        elif tag == ITEM:
+            self.items.append(attributes)
+
+    def close(self) -> Model:
+        """End."""
+        return self
+
+    def placed(self, item: dict[str, str], outer: NDArray[np.float64], depth: int) -> Iterator[Arrays]:
+        """Yield the mesh of an item or a component, and of the components of its object; `depth` ends circles."""
+        if depth < 0:
+            raise ValueError(depth)
+        own = np.array(item.get("transform", IDENTITY).split(), np.float64).reshape(4, 3)
+        matrix = np.vstack([own[:3] @ outer[:3], own[3] @ outer[:3] + outer[3]])
+        found = self.objects[item.get("objectid", "")]
+        vertices, faces = found.arrays
+        mirrored = np.linalg.det(matrix[:3]) < 0
+        yield carried(vertices, matrix[:3], matrix[3]), faces[:, ::-1] if mirrored else faces
+        for component in found.components:
+            yield from self.placed(component, matrix, depth - 1)

@@ -62,7 +62,8 @@ class PolyData:
         FormatError
             Where they are none of VTK's polygons.
         """
-        found = APPENDED.search(data)
+        at = data.find(b"<AppendedData")
+        found = None if at < 0 else APPENDED.search(data, at)
         text, appended = (data, b"") if found is None else (data[: found.start()] + b"</VTKFile>", data[found.end() :])
         root = parsed_xml(text, file)
         kind, packed = root.get("type"), root.get("compressor")
@@ -104,17 +105,17 @@ class PolyData:
             values = np.frombuffer(self._bytes(one), kind)
         return values.reshape(-1, columns) if columns > 1 else values
 
-    def _bytes(self, one: Element) -> bytes:
+    def _bytes(self, one: Element) -> bytes | memoryview:
         """Return the bytes of an array, unpacked."""
         if one.get("format") == "appended":
             source, raw = self.appended[int(one.attrib["offset"]) :], self.raw
         else:
-            source, raw = "".join((one.text or "").split()).encode("ascii"), False
+            source, raw = _joined((one.text or "").strip()).encode("ascii"), False
         size = 8 if self.root.get("header_type") == "UInt64" else 4
         word = np.dtype(f"{self.order}u{size}")
         if self.root.get("compressor") is None:
             count = int(np.frombuffer(_taken(source, raw, size), word)[0])
-            return _taken(source, raw, size + count)[size:]
+            return memoryview(_taken(source, raw, size + count))[size:]
         blocks = int(np.frombuffer(_taken(source, raw, size), word)[0])
         head = np.frombuffer(_taken(source, raw, (3 + blocks) * size), word).astype(np.int64)
         require_memory(int(blocks * head[1]), file=self.file)
@@ -122,6 +123,11 @@ class PolyData:
         packed, ends = _taken(source[start:], raw, int(head[3:].sum())), np.cumsum(head[3:])
         parts = [packed[end - length : end] for end, length in zip(ends, head[3:], strict=True)]
         return b"".join(_unpacked(part, int(head[1])) for part in parts)
+
+
+def _joined(text: str) -> str:
+    """Return a text without white space; most have none inside, which is quickly seen."""
+    return "".join(text.split()) if any(space in text for space in " \t\r\n") else text
 
 
 def _letters(count: int) -> int:

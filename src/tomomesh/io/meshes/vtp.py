@@ -17,7 +17,7 @@ from ..fields import IDS, doubles, flat_columns
 from ..files.atomic import replacing
 from ..files.source import whole
 from .attributes import narrowed
-from .cells import fans, strips
+from .cells import fans, strips, together
 from .vtk_arrays import TYPES, PolyData
 
 if TYPE_CHECKING:
@@ -55,18 +55,20 @@ def read_vtp_mesh(data: bytes, file: str) -> Arrays:
         For a file that is none of VTK's polygons, or is broken.
     """
     parsed = PolyData.parsed(data, file)
-    vertices, faces, first = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
-    for piece in parsed.pieces:
-        for kind, cut in (("Polys", fans), ("Strips", strips)):
-            cells = parsed.arrays(piece, kind)
-            corners, ends = (np.array(cells.get(name, np.empty(0)), np.int64) for name in ("connectivity", "offsets"))
-            sizes = np.diff(ends, prepend=0)
-            if (sizes < 3).any() or sizes.sum() != len(corners):
-                raise FormatError("the polygons cannot be understood", file=file)
-            faces.append(cut(corners + first, sizes))
-        vertices.append(_positions(parsed, piece))
-        first += len(vertices[-1])
-    return np.concatenate(vertices), np.concatenate(faces)
+    return together((_positions(parsed, piece), _faces(parsed, piece)) for piece in parsed.pieces)
+
+
+def _faces(parsed: PolyData, piece: Element) -> NDArray[np.int64]:
+    """Return the polygons and strips of a piece, cut into triangles."""
+    found = []
+    for kind, cut in (("Polys", fans), ("Strips", strips)):
+        cells = parsed.arrays(piece, kind)
+        corners, ends = (np.asarray(cells.get(name, np.empty(0)), np.int64) for name in ("connectivity", "offsets"))
+        sizes = np.diff(ends, prepend=0)
+        if (sizes < 3).any() or sizes.sum() != len(corners):
+            raise FormatError("the polygons cannot be understood", file=parsed.file)
+        found.append(cut(corners, sizes))
+    return np.concatenate(found) if len(found[1]) else found[0]
 
 
 def read_vtp(path: Path) -> Cloud:

@@ -119,9 +119,9 @@ class _Slices:
 
     def _padded(self, levels: NDArray[Any], frame: ImageFrame) -> NDArray[Any]:
         """Give a slice the padding of the first one that names some, whose scale may be another."""
-        if frame.padding is None:
+        if (padding := frame.padding) is None:
             return levels
-        low, high = np.sort(scaled(np.array(frame.padding), *frame.scale, self._dtype))
+        low, high = np.sort(scaled(np.array(padding), *frame.scale, self._dtype))
         self.padding = self.padding or (float(low), float(high))
         if self.padding == (low, high):
             return levels
