@@ -30,7 +30,9 @@ def grow(plane: Words, start: int, stop: int, spare: Words) -> None:
     """
     rows, words = plane.shape
     for step in range(start, stop):
-        spare[:] = plane
+        for j in range(rows):
+            for w in range(words):
+                spare[j, w] = plane[j, w]
         for j in range(rows):
             above, below = max(j - 1, 0), min(j + 1, rows - 1)
             for w in range(words):

@@ -45,7 +45,8 @@ def unshrink(ring: Floats, gaps: Mask, averaged: float, half_width: float, strid
         Result.
     """
     count, spacing = len(ring), usual_side(ring, gaps)
-    put[:] = ring
+    for i in range(count):
+        put[i, 0], put[i, 1] = ring[i, 0], ring[i, 1]
     if spacing == 0.0 or count <= 2 * stride:
         return
     inward = (averaged - (half_width / spacing) ** 2 / 3.0) / stride**2

@@ -122,7 +122,10 @@ def track_surface(solid: Bitmask, table: Table, seed: int, exposed: NDArray[np.u
                 continue
             visit(table, there, exposed, corners)
             if count == len(waiting):
-                waiting = np.append(waiting, np.empty_like(waiting))
+                longer = np.empty(2 * count, np.int64)
+                for n in range(count):
+                    longer[n] = waiting[n]
+                waiting = longer
             waiting[count] = there
             count += 1
     return entered

@@ -101,7 +101,8 @@ def order_keys(keys: NDArray[np.int64], order: NDArray[np.int32]) -> None:
             continue
         for value in range(mask):
             begin[digit, value + 1] += begin[digit, value]
-        before[:] = order
+        for m in range(len(keys)):
+            before[m] = order[m]
         for m in range(len(keys)):
             value = here[m] >> DIGIT * digit & mask
             place = begin[digit, value]

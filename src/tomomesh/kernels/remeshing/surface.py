@@ -116,7 +116,9 @@ def vertex_normals(faces: Ints, normals: Floats, areas: Floats, mean: Floats) ->
 @kernel("void(i4[:,::1], f8[:,::1], f8[:,::1])")
 def mix_normals(faces: Ints, normals: Floats, mixed: Floats) -> None:
     """Add to each normal (n, 3) those of its neighbors, and bring all to length 1."""
-    mixed[:] = normals
+    for v in range(len(normals)):
+        for axis in range(3):
+            mixed[v, axis] = normals[v, axis]
     for f in range(len(faces)):
         for k in range(3):
             for other in range(1, 3):

@@ -151,7 +151,10 @@ def train_batch(
     for epoch in range(len(neighborhoods)):
         best_matching_units(codebook, places, boxes, winners, squared)
         sum_by_winner(places, amounts, winners, squared, totals)
-        history[epoch, 0] = totals[:, -1].sum() / amount
+        error = 0.0
+        for c in range(len(totals)):
+            error += totals[c, -1]
+        history[epoch, 0] = error / amount
         history[epoch, 1] = move_to_means(codebook, totals, hops, neighborhoods[epoch], box)
         if history[epoch, 1] <= tolerance and epoch >= settled:
             return epoch + 1

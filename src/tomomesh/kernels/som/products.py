@@ -115,7 +115,9 @@ def add_shares(
     some, own = np.zeros((u, COLUMNS)), np.empty((ROWS, COLUMNS))
     for start in range(0, k, COLUMNS):
         width = min(COLUMNS, k - start)
-        some[:, :width] = totals[:, start : start + width]
+        for c in range(u):
+            for column in range(width):
+                some[c, column] = totals[c, start + column]
         for first in range(0, u, ROWS):
             own[:] = 0.0
             i, j, m, n = first, min(first + 1, u - 1), min(first + 2, u - 1), min(first + 3, u - 1)
@@ -130,4 +132,5 @@ def add_shares(
                         own[2, column] += e * total
                         own[3, column] += f * total
             for row in range(min(ROWS, u - first)):
-                sums[first + row, start : start + width] = own[row, :width]
+                for column in range(width):
+                    sums[first + row, start + column] = own[row, column]
