@@ -7,6 +7,7 @@ surface that its neighbors describe, with a normal there of either sign.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,8 @@ import numpy as np
 from ..cuberille.partition import sampling_distance
 from ..model.columns import any_of
 from ..progress import Progress, silent
-from .cloud import FIRST, LEAST_POINTS, Cloud
+from .cloud import FIRST, LEAST_POINTS, SIGHT, Cloud
+from .search import Index
 from .whole import Whole
 
 if TYPE_CHECKING:
@@ -77,6 +79,19 @@ class Samples:
     bend: float
     whole: Whole = field(default_factory=Whole)
     offsets: NDArray[np.float32] | None = None
+
+    @cached_property
+    def index(self) -> Index:
+        """The samples sorted into cubes about as wide as neighbors are looked for."""
+        return Index.of(self.positions, SIGHT * float(np.median(self.spacing)))
+
+    @property
+    def rows(self) -> Floats:
+        """Position, normal and spacing of each, in the order of `index`, (p, 7); not kept, for they are most of it."""
+        found = np.empty((len(self.positions), 7))
+        for at, columns in ((slice(0, 3), self.positions), (slice(3, 6), self.normals), (6, self.spacing)):
+            found[:, at] = columns[self.index.order]
+        return found
 
 
 def settle_points(
