@@ -43,7 +43,8 @@ quarter along each of the others. Chosen: none of it changes the distance of ele
 +1.0 %, twice by +.7 %."""
 
 EDGE = 2.5
-"""Edge of the cubes that samples are sorted into, sampling distances: as far as bridges and stars look for neighbors."""
+"""Edge of the cubes that samples are sorted into, sampling distances: as far as bridges and stars look. Chosen: with 2.25
+of them a mesh of 172,444 faces has 8 more, as bridges begin at their other ends; no distance changes beyond its noise."""
 
 
 @dataclass(frozen=True)
