@@ -151,6 +151,9 @@ class TestFacing:
             frozenset(pair) for pair in np.argwhere(facing).tolist()
         }
         assert 2 * len(found) == facing.sum()
+        asked = rng.random(len(places)) < 0.2
+        kept = found[asked[found].any(axis=1)]
+        assert (np.unique(facing_pairs(samples, reach, asked), axis=0) == np.unique(kept, axis=0)).all()
 
     def test_room_is_made_for_more(self, monkeypatch: pytest.MonkeyPatch) -> None:
         samples = settle_points(beside_another(on_box(3_000), spacing_of(24, 3_000)))

@@ -160,6 +160,7 @@ def reconstruct_points(
     settings = replace(settings, printing=turned(settings.printing, cloud.frame))
     begun = _begin(settings, changes, input=taken.value.input)
     made = begun.value.surface(taken.value, settings, progress)
+    _give_back()
     done, later = finish(replace(made.value, place=taken.value.place), settings, progress)
     return replace(done.value, way=begun.value.name, settings=settings, stages=(taken, begun, made, done, *later))
 

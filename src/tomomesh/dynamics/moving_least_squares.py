@@ -119,12 +119,12 @@ def fit_to_surface(
     projector = _Projector.under(vertices, ring, samples, threads)
     steps = _ProjectionSteps(vertices, ring, projector, edge, settings, threads)
     state, trace = iterate(steps, settings.max_steps, progress)
-    filled, normals = _unprojected(state.projections), state.projections[:, 1:].copy()
+    filled, normals, places = _unprojected(state.projections), state.projections[:, 1:].copy(), state.places
+    del steps, projector, state  # before faces are made
     _require_any(~filled, samples)
     if filled.any():
-        normals[filled] = ring.normals(state.places)[filled]
-    places, faces = _split(state.places, normals, ring)
-    return SurfaceFit(places, faces, filled, trace)
+        normals[filled] = ring.normals(places)[filled]
+    return SurfaceFit(*_split(places, normals, ring), filled, trace)
 
 
 def _require_any(met: NDArray[np.bool_], samples: Samples) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 from ..kernels.pointcloud.bridges import bridge, full_sectors
 from ..kernels.threads import in_blocks
 from ..progress import Progress, silent
-from .search import Index
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -70,8 +69,7 @@ def bridges(
     -------
     Bridges
     """
-    index = Index.of(samples.positions, SIGHT * float(np.median(samples.spacing)))
-    rows = np.column_stack([samples.positions, samples.normals, samples.spacing])[index.order]
+    index, rows = samples.index, samples.rows
     cells, count = index.cells, len(rows)
     sectors = np.empty(count, np.int64)
     found: dict[int, NDArray[np.float64]] = {}

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..kernels.pointcloud.facing import find_facing
 from ..kernels.threads import in_blocks
-from .search import Index
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +23,9 @@ ROOM = 64
 """Pairs for which there is room at first. Where it does not suffice, room is made."""
 
 
-def facing_pairs(samples: Samples, reach: float, *, threads: int = 0) -> NDArray[np.int64]:
+def facing_pairs(
+    samples: Samples, reach: float, asked: NDArray[np.bool_] | None = None, *, threads: int = 0
+) -> NDArray[np.int64]:
     """Return the pairs (k, 2) of samples within reach that face one another.
 
     Parameters
@@ -32,6 +33,8 @@ def facing_pairs(samples: Samples, reach: float, *, threads: int = 0) -> NDArray
     samples : Samples
     reach : float
         Longest step between two.
+    asked : (p,) bool array, optional
+        Samples of which one at least is to be in each pair; all where not given.
     threads : int
 
     Returns
@@ -39,15 +42,15 @@ def facing_pairs(samples: Samples, reach: float, *, threads: int = 0) -> NDArray
     (k, 2) int64 array
         Numbers of the samples, in the order of their cubes.
     """
-    index = Index.of(samples.positions, reach)
-    rows = np.column_stack([samples.positions, samples.normals])[index.order]
+    index, rows, count = samples.index, samples.rows, len(samples.positions)
+    around = np.ones(count, np.bool_) if asked is None else asked[index.order]
     found: dict[int, NDArray[np.int64]] = {}
 
     def look(start: int, stop: int) -> None:
         pairs, room = np.empty((ROOM, 2), np.int64), 0
-        while (room := find_facing(rows, *index.cells, reach, ACROSS, pairs, start, stop)) > len(pairs):
+        while (room := find_facing(rows, around, *index.cells, reach, ACROSS, pairs, start, stop)) > len(pairs):
             pairs = np.empty((room, 2), np.int64)
         found[start] = pairs[:room]
 
-    in_blocks(look, len(rows), block=BLOCK, threads=threads)
+    in_blocks(look, count, block=BLOCK, threads=threads)
     return np.asarray(index.order[np.concatenate([found[start] for start in sorted(found)])])

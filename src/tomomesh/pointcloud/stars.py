@@ -16,7 +16,6 @@ from ..kernels.pointcloud.stars import lay_stars
 from ..kernels.threads import in_blocks
 from ..model.cubes import keys_of
 from ..progress import Progress, silent
-from .search import Index
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -54,8 +53,7 @@ def keys_between(
     (c,) int64 array
         Their keys (see `tomomesh.model.cubes.keys_of`), rising.
     """
-    index = Index.of(samples.positions, SIGHT * float(np.median(samples.spacing)))
-    rows = np.column_stack([samples.positions, samples.normals, samples.spacing])[index.order]
+    index, rows = samples.index, samples.rows
     first = keys_of(np.zeros((1, 3), np.int64))
     steps = np.append(keys_of(np.eye(3, dtype=np.int64)) - first, first)
     seen = (*index.cells, SIGHT, lowest, cell, DENSE * float(cell.min()), steps)

@@ -43,7 +43,11 @@ class Rough:
     faces: Faces
     lattice: Floats
     ring: OneRing
-    mesh: TriMesh
+    vertices: Floats
+
+    def cuberille(self, origin: Floats | float = 0.0) -> QuadMesh:
+        """Return the faces between the cubes, counted from an origin."""
+        return QuadMesh(self.lattice + origin, self.faces.quads.astype(np.int64))
 
 
 @dataclass(frozen=True)
@@ -58,36 +62,35 @@ class Rest:
 def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> Stage[Surface]:
     """Turn a cloud into a closed surface."""
     settled = settle(points, settings, progress)
-    samples, origin = settled.value, lowest_corner(points)
+    samples, origin, told = settled.value, lowest_corner(points), folded(None, settled)
     shell = shell_around(points, samples, settings, progress)
     walls = walls_of(shell.value, samples, points, origin, settings)
     rough = measured("smooth", _smoothed, shell.value, settings)
-    kept, smoothed, ring = rough.value.faces, rough.value.mesh, rough.value.ring
+    smoothed, ring = rough.value.vertices, rough.value.ring
     rest = measured("fit", _fitted, shell.value, rough.value, samples, settings, progress, still=walls.value == 2)
     tangled = CrossingFaces(settings.run.threads)
-    apart = measured("untangle", untangle, rest.value.mesh, smoothed.vertices, ring, tangled, rough.value.lattice)
+    apart = measured("untangle", untangle, rest.value.mesh, smoothed, ring, tangled, rough.value.lattice)
     mesh, taken_back, crossing = apart.value
-    cuberille = QuadMesh(rough.value.lattice + origin, kept.quads.astype(np.int64))
+    followed = follows(shell.value, mesh, samples, origin, tangled.tree, threads=settings.run.threads)
+    del samples, settled, tangled  # before more is made
     trace = None if rest.value.fitted is None else rest.value.fitted.trace
     filled = rest.value.filled | interpolated(mesh.moved(mesh.vertices + origin), points)
     enclosed = hollow(shell.value.leak_test, shell.value.taken(settings), shell.value.cubes, shell.value.cell)
     surface = Surface(
-        points.cloud, cuberille, smoothed.moved(smoothed.vertices + origin),
+        points.cloud, rough.value.cuberille(origin), mesh.moved(smoothed + origin),
         mesh.moved(mesh.vertices + origin), np.empty(0, np.int32), trace=trace, filled=filled,
-        cavities=int(kept.inward.sum()), crossing=crossing,
+        cavities=int(rough.value.faces.inward.sum()), crossing=crossing,
         encloses=enclosed if walls.value == 1 else None,
     )  # fmt: skip
-    fitted = fit_found(trace, len(smoothed.vertices), taken_back=taken_back, filled=filled)
-    followed = follows(shell.value, mesh, samples, origin, tangled.tree, threads=settings.run.threads)
-    return folded(surface, settled, shell, walls, rough, rest, apart, fitted, followed, place_found(points))
+    fitted = fit_found(trace, len(smoothed), taken_back=taken_back, filled=filled)
+    return folded(surface, told, shell, walls, rough, rest, apart, fitted, followed, place_found(points))
 
 
 def _smoothed(shell: Shell, settings: Settings) -> Rough:
     faces = shell.leak_test.faces.only(shell.taken(settings))
     ring = OneRing.of_quads(faces.quads, len(faces.corners), settings.run.threads)
     lattice = shell.lowest + faces.corners * shell.cell
-    vertices = ring.smoothed(lattice, settings.cubes.low_pass)
-    return Rough(faces, lattice, ring, QuadMesh(vertices, faces.quads.astype(np.int64)).triangulated())
+    return Rough(faces, lattice, ring, ring.smoothed(lattice, settings.cubes.low_pass))
 
 
 def _fitted(
@@ -95,10 +98,10 @@ def _fitted(
 ) -> Rest:
     """Draw the mesh to the surface under its samples, unless it is to stay as it is."""
     if still:
-        return Rest(rough.mesh, np.zeros(len(rough.mesh.faces), np.bool_), None)
+        split = rough.cuberille().triangulated().moved(rough.vertices)
+        return Rest(split, np.zeros(len(split.faces), np.bool_), None)
     edge, threads = float(shell.cell.min()), settings.run.threads
-    start = rough.mesh.vertices
-    fitted = fit_to_surface(start, rough.ring, samples, edge, settings.fit, threads=threads, progress=progress)
+    fitted = fit_to_surface(rough.vertices, rough.ring, samples, edge, settings.fit, threads=threads, progress=progress)
     mesh, filled = TriMesh(fitted.vertices, fitted.faces), fitted.filled
     if shell.by_normals:
         filled = filled | holes(mesh, samples, edge)

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     Integers = NDArray[np.int64]
 
 
-@kernel("i8(f8[:,::1], i8[::1], i4[::1], f8[::1], f8, f8, i8[:,::1], i8, i8)")
+@kernel("i8(f8[:,::1], b1[::1], i8[::1], i4[::1], f8[::1], f8, f8, i8[:,::1], i8, i8)")
 def find_facing(
     samples: Floats,
+    asked: NDArray[np.bool_],
     blocks: Integers,
     start: NDArray[np.int32],
     frame: Floats,
@@ -32,8 +33,10 @@ def find_facing(
 
     Parameters
     ----------
-    samples : (p, 6) float array
-        Position and unit normal; in the order of their cubes.
+    samples : (p, 7) float array
+        Position, unit normal, spacing; in the order of their cubes.
+    asked : (p,) bool array
+        Samples of which one at least is in each pair.
     blocks, start, frame : arrays
         See `tomomesh.kernels.pointcloud.samples`.
     reach : float
@@ -52,9 +55,11 @@ def find_facing(
     """
     found, total = np.empty(MOST, np.int64), 0
     for p in range(begin, end):
+        if not asked[p]:
+            continue
         for n in range(gather(samples, blocks, start, frame, samples[p], reach, found)):
             q = found[n]
-            if q <= p:
+            if q == p or (q < p and asked[q]):
                 continue
             x, y, z = samples[q, 0] - samples[p, 0], samples[q, 1] - samples[p, 1], samples[q, 2] - samples[p, 2]
             here = x * samples[p, 3] + y * samples[p, 4] + z * samples[p, 5]
@@ -62,6 +67,6 @@ def find_facing(
             least = across * across * (x * x + y * y + z * z)
             if here * here > least and there * there > least:
                 if total < len(pairs):
-                    pairs[total, 0], pairs[total, 1] = p, q
+                    pairs[total, 0], pairs[total, 1] = min(p, q), max(p, q)
                 total += 1
     return total

@@ -58,7 +58,7 @@ a pair by that it has joined; of more noise than that nothing is said, for its n
 of .1 % noise were warned of). It passes 2 to 12 pairs by where rods cross 1 s apart (six seeds), none in the clouds of
 docs/clouds.md. With .25 s two seeds of six have none; 2.5 s changes nothing of it."""
 NO_PAIRS = np.empty((0, 2), np.int64)
-"""Of samples in noise."""
+"""Of samples in noise, and of those that the mesh follows."""
 
 
 def may_join(shell: Shell, samples: Samples, *, threads: int = 0) -> bool:
@@ -216,9 +216,10 @@ def passed_by(mesh: TriMesh, samples: Samples, tree: Tree | None = None, *, thre
     tree = Tree.of_faces(mesh, threads=threads) if tree is None else tree
     order = np.arange(len(samples.positions), dtype=np.int32)  # that of their cubes
     away, face = tree.nearest(samples.positions, order=order, enough=enough, threads=threads)
-    between = facing_pairs(samples, FACING * spacing, threads=threads) if _is_clean(samples) else NO_PAIRS
+    asked = away > TAKEN_IN * spacing + noise if _is_clean(samples) else np.zeros(len(away), np.bool_)
+    between = facing_pairs(samples, FACING * spacing, asked, threads=threads) if asked.any() else NO_PAIRS
     taken_in = away[between].max(axis=1, initial=0)
-    if taken_in.max(initial=0) > TAKEN_IN * spacing + noise:
+    if len(between):
         return np.asarray(samples.positions[between[taken_in.argmax()]].mean(axis=0))
     off = np.flatnonzero(away > OFF * spacing)
     normals = TriMesh(mesh.vertices, mesh.faces[face[off]]).face_vectors
