@@ -90,7 +90,7 @@ class Net:
     @property
     def steps(self) -> NDArray[np.int32]:
         """Steps from the voxels inside to those outside, (q, 3)."""
-        return np.array(DIRECTIONS, np.int32)[self.directions]
+        return np.take(np.array(DIRECTIONS, np.int32), self.directions, axis=0)
 
 
 def net_around(
@@ -119,17 +119,16 @@ def net_around(
     owned = OWNED[cases]
     first = np.cumsum(owned) - owned
     total = int(owned.sum())
-    quads, directions = np.empty((total, 4), np.int32), np.empty(total, np.uint8)
-    fans = np.empty((len(cells), 6), np.int32)
+    quads, inner = np.empty((total, 4), np.int32), np.empty((total, 3), np.int32)
+    fans, directions = np.empty((len(cells), 6), np.int32), np.empty(total, np.uint8)
+    low = cells + lowest
 
     def work(start: int, stop: int) -> None:
-        list_faces(cases, table, first, quads, directions, start, stop)
+        list_faces(low, cases, table, first, quads, inner, directions, start, stop)
         list_fans(cases, table, first, fans, start, stop)
 
     in_blocks(work, len(cells), block=BLOCK, threads=threads)
-    low = cells + lowest
-    backward = np.maximum(-np.array(DIRECTIONS, np.int32), 0)[directions]
-    return Net(low.astype(np.float64), table, fans, quads, np.repeat(low, owned, axis=0) + backward, directions)
+    return Net(low.astype(np.float64), table, fans, quads, inner, directions)
 
 
 @dataclass(frozen=True)

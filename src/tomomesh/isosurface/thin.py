@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.isosurface.surface_nets import fall_short
+from ..kernels.isosurface.voxels import end_soon
 from ..kernels.threads import in_blocks
 from .means import BLOCK, means
 
@@ -36,7 +37,7 @@ ROUNDS = 6
 volume of rods and leaves by .3 %."""
 
 
-def thin_squares(mask: Marks, inner: NDArray[np.int32], steps: NDArray[np.int32]) -> Marks:
+def thin_squares(mask: Marks, inner: NDArray[np.int32], steps: NDArray[np.int32], threads: int = 0) -> Marks:
     """Tell behind which squares (q,) a mask (K, J, I) ends soon; it has one layer of background around it.
 
     Parameters
@@ -46,11 +47,13 @@ def thin_squares(mask: Marks, inner: NDArray[np.int32], steps: NDArray[np.int32]
         The voxel (x, y, z) of the mask behind each square.
     steps : (q, 3) int32 array
         From there to the voxel outside.
+    threads : int
     """
-    found, last = np.zeros(len(inner), np.bool_), np.array(mask.shape[::-1], np.int32) - 1
-    for step in range(1, DEPTH + 1):
-        x, y, z = np.clip(inner - step * steps, 0, last).T
-        found |= ~mask[z, y, x]
+    found = np.empty(len(inner), np.bool_)
+    in_blocks(
+        lambda start, stop: end_soon(mask, inner, steps, DEPTH, found, start, stop), len(found), block=BLOCK,
+        threads=threads,
+    )  # fmt: skip
     return found
 
 

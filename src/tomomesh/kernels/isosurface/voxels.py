@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..compile import kernel
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 
@@ -118,12 +119,14 @@ def link_cells(
         latest[z & 1, y, x] = v
 
 
-@kernel("void(u1[::1], i4[:,::1], i8[::1], i4[:,::1], u1[::1], i8, i8)")
+@kernel("void(i4[:,::1], u1[::1], i4[:,::1], i8[::1], i4[:,::1], i4[:,::1], u1[::1], i8, i8)")
 def list_faces(
+    cells: NDArray[np.int32],
     cases: NDArray[np.uint8],
     table: NDArray[np.int32],
     first: NDArray[np.int64],
     quads: NDArray[np.int32],
+    inner: NDArray[np.int32],
     directions: NDArray[np.uint8],
     start: int,
     stop: int,
@@ -135,6 +138,8 @@ def list_faces(
 
     Parameters
     ----------
+    cells : (n, 3) int32 array
+        The voxel (x, y, z) in the lowest corner of each cell.
     cases : (n,) uint8 array
     table : (n, 6) int32 array
         Neighboring cells by direction.
@@ -142,6 +147,8 @@ def list_faces(
         Faces of the cells before.
     quads : (q, 4) int32 array
         Result: the cells around, counter-clockwise seen from outside where the axes are right-handed.
+    inner : (q, 3) int32 array
+        Result: the voxel inside.
     directions : (q,) uint8 array
         Result: the direction from inside to outside.
     start, stop : int
@@ -160,6 +167,8 @@ def list_faces(
             quads[f, 1] = before if low else beside
             quads[f, 2] = table[before, 2 * c]
             quads[f, 3] = beside if low else before
+            inner[f, 0], inner[f, 1], inner[f, 2] = cells[v, 0], cells[v, 1], cells[v, 2]
+            inner[f, axis] += 1 - low
             directions[f] = 2 * axis + low
             f += 1
 
@@ -203,3 +212,77 @@ def list_fans(
             fans[v, n] = rank
             n += 1
         fans[v, n:] = -1
+
+
+@kernel("void(b1[:,:,::1], i4[:,::1], i4[:,::1], i8, b1[::1], i8, i8)")
+def end_soon(
+    mask: NDArray[np.bool_],
+    inner: NDArray[np.int32],
+    steps: NDArray[np.int32],
+    depth: int,
+    found: NDArray[np.bool_],
+    start: int,
+    stop: int,
+) -> None:
+    """Tell which voxels (q, 3) have one outside, or the mask's end, within so many steps (q, 3) back.
+
+    Parameters
+    ----------
+    mask : (K, J, I) bool array
+    inner, steps : (q, 3) int32 array
+        As (x, y, z).
+    depth : int
+    found : (q,) bool array
+        Result.
+    start, stop : int
+        Voxels to work on.
+    """
+    for f in range(start, stop):
+        found[f] = False
+        for n in range(1, depth + 1):
+            x, y, z = inner[f, 0] - n * steps[f, 0], inner[f, 1] - n * steps[f, 1], inner[f, 2] - n * steps[f, 2]
+            within = 0 <= x < mask.shape[2] and 0 <= y < mask.shape[1] and 0 <= z < mask.shape[0]
+            if not within or not mask[z, y, x]:
+                found[f] = True
+                break
+
+
+@kernel("void(f8[:,::1], f8[:,::1], f8[::1], f8[::1], b1, f8[::1], i8, i8)")
+def leave_window(
+    inside: NDArray[np.float64],
+    outside: NDArray[np.float64],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    first: bool,
+    shares: NDArray[np.float64],
+    start: int,
+    stop: int,
+) -> None:
+    """Find the share of the way from voxels inside to those outside where levels leave their layers' windows.
+
+    Parameters
+    ----------
+    inside, outside : (q, L) float array
+        NaN where a level is not known.
+    lower, upper : (L,) float array
+    first : bool
+        Whether the first layer counts that is not in its window any more; else the last of those that were.
+    shares : (q,) float array
+        Result; infinite where no layer counts, NaN where one is not known.
+    start, stop : int
+        Ways to work on.
+    """
+    for f in range(start, stop):
+        share = np.inf if first else -np.inf
+        for n in range(len(lower)):
+            a, b = inside[f, n], outside[f, n]
+            level = b if first else a
+            counts = not lower[n] < level <= upper[n] if first else lower[n] < level <= upper[n]
+            if counts:
+                bound = upper[n] if b > upper[n] else lower[n]
+                part = (a - bound) / (a - b)
+                if np.isnan(part):
+                    share = part
+                    break
+                share = min(share, part) if first else max(share, part)
+        shares[f] = share
