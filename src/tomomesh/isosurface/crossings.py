@@ -81,9 +81,7 @@ class Levels:
         beyond = np.nan_to_num(np.maximum(self.lower - levels, levels - self.upper), nan=np.inf)
         return np.asarray(beyond.max(axis=1) if self.layers == "all" else beyond.min(axis=1))
 
-    def crossed(
-        self, inner: NDArray[np.int32], outer: NDArray[np.int32], threads: int = 0
-    ) -> NDArray[np.float64]:
+    def crossed(self, inner: NDArray[np.int32], outer: NDArray[np.int32], threads: int = 0) -> NDArray[np.float64]:
         """Return the share of the way from voxels inside to their neighbors outside where a bound is crossed, (n,).
 
         Levels are interpolated linearly. Of several layers the first to leave its window counts; where one inside is

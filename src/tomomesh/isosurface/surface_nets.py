@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebinterpolate
 
 from ..cuberille.neighbors import DIRECTIONS
 from ..dynamics.iterate import iterate
-from ..kernels.isosurface.surface_nets import add_term, draw_out, lean, list_rings, move_in_cells
+from ..kernels.isosurface.surface_nets import draw_out, move_in_cells
 from ..kernels.isosurface.voxels import link_cells, list_faces, list_fans
 from ..kernels.threads import in_blocks
 from ..model.trace import Motion
 from ..progress import Progress, silent
 from .means import BLOCK, means
+from .rings import Rings, resistance
 from .thin import GIVEN_BACK, given_back
 from .well_composed import CORNERS, surface_cells
 
@@ -37,10 +37,6 @@ TENSION = 2.4
 than marching cubes by more than a tenth, and lie farther from them than 0.06 and 0.09 voxel."""
 SAFE = 0.95
 """Share of the longest step that never overshoots. Derived: at 1 a net that goes up and down would do so for ever."""
-
-TERMS = 6
-"""Degree of the series by which a net against bends begins. Chosen: with it the net of a skull's mask takes 16 more
-steps, with 3 18; with 4 and 5 rods two voxels wide keep .86 and .915 of their volume in place of .926."""
 
 OWNED = np.array([sum((case ^ case >> shift) & 1 for shift in (1, 2, 4)) for case in range(256)])
 """Faces that a cell owns: those between its lowest corner and the next along each axis."""
@@ -74,6 +70,8 @@ class Net:
         The squares around each vertex, then -1.
     quads : (q, 4) int32 array
         The squares, counter-clockwise from outside in the space of the indices.
+    twins : (q, 4) int32 array
+        The square beyond the side from each corner to the next, times four, plus the number of its own side there.
     inner : (q, 3) int32 array
         The voxel behind each.
     directions : (q,) uint8 array
@@ -84,6 +82,7 @@ class Net:
     links: NDArray[np.int32]
     fans: NDArray[np.int32]
     quads: NDArray[np.int32]
+    twins: NDArray[np.int32]
     inner: NDArray[np.int32]
     directions: NDArray[np.uint8]
 
@@ -119,16 +118,16 @@ def net_around(
     owned = OWNED[cases]
     first = np.cumsum(owned) - owned
     total = int(owned.sum())
-    quads, inner = np.empty((total, 4), np.int32), np.empty((total, 3), np.int32)
+    quads, twins, inner = (np.empty((total, count), np.int32) for count in (4, 4, 3))
     fans, directions = np.empty((len(cells), 6), np.int32), np.empty(total, np.uint8)
     low = cells + lowest
 
     def work(start: int, stop: int) -> None:
         list_faces(low, cases, table, first, quads, inner, directions, start, stop)
-        list_fans(cases, table, first, fans, start, stop)
+        list_fans(cases, table, first, fans, twins, start, stop)
 
     in_blocks(work, len(cells), block=BLOCK, threads=threads)
-    return Net(low.astype(np.float64), table, fans, quads, inner, directions)
+    return Net(low.astype(np.float64), table, fans, quads, twins, inner, directions)
 
 
 @dataclass(frozen=True)
@@ -171,67 +170,9 @@ def settle(
     NetFit
     """
     start = means(crossings.positions, net.fans, threads)
-    steps = _NetSteps(net, _Rings.of(net, threads), crossings, start, settings, threads)
+    steps = _NetSteps(net, Rings.of(net, threads), crossings, start, settings, threads)
     state, trace = iterate(steps, settings.max_steps, progress)
     return NetFit(start, state.position, trace)
-
-
-@dataclass(frozen=True)
-class _Rings:
-    """What lies around the vertices of a net, see `list_rings`."""
-
-    beside: NDArray[np.uint32]
-    aslant: NDArray[np.uint32]
-    shares: Floats
-    threads: int
-
-    @classmethod
-    def of(cls, net: Net, threads: int) -> _Rings:
-        """Look around."""
-        (beside, aslant), shares = np.empty((2, *net.links.shape), np.uint32), np.empty(len(net.links))
-        in_blocks(
-            lambda start, stop: list_rings(net.links, net.fans, net.quads, beside, aslant, shares, start, stop),
-            len(shares), block=BLOCK, threads=threads,
-        )  # fmt: skip
-        return cls(beside, aslant, shares, threads)
-
-    def lean(self, values: Floats) -> Floats:
-        """Return by how much the mean of the neighbors' values (n, 3) is more than a vertex' own."""
-        leaning = np.empty_like(values)
-        in_blocks(
-            lambda start, stop: lean(values, self.beside, self.shares, leaning, start, stop),
-            len(values), block=BLOCK, threads=self.threads,
-        )  # fmt: skip
-        return leaning
-
-    def evened(self, values: Floats, bending: float) -> Floats:
-        """Return where a net would rest that is drawn to values (n, 3) and resists bends, all but exactly.
-
-        Squares and springs together are  1 - l + b l^2  there, l as an operator that takes a mean from what it is of:
-        its inverse is a Chebyshev series. What it is more than 1 is a multiple of l, so that planes stay as they are.
-        """
-        coefficients = chebinterpolate(
-            lambda mean: (1 / _resistance(1 - mean, bending) - 1) / (mean - 1), TERMS,
-        )  # fmt: skip
-        last = self.lean(values)
-        total, before = values + coefficients[0] * last, last.copy()
-        for n, coefficient in enumerate(coefficients[1:]):
-            self._add(last, before, 2.0 if n else 1.0, coefficient, total)
-            last, before = before, last
-        return total
-
-    def _add(self, last: Floats, before: Floats, times: float, coefficient: float, total: Floats) -> None:
-        in_blocks(
-            lambda start, stop: add_term(
-                last, before, self.beside, self.shares, times, coefficient, total, start, stop
-            ),
-            len(total), block=BLOCK, threads=self.threads,
-        )  # fmt: skip
-
-
-def _resistance(lean: Any, bending: float) -> Any:
-    """Return what a net resists that leans so many times its distance from rest: squares, and springs against bends."""
-    return np.maximum(1 - lean, 0) + bending * lean**2
 
 
 @dataclass(frozen=True)
@@ -248,7 +189,7 @@ class _NetSteps:
     """The steps of a net without masses; each reads one state and writes the next, block by block."""
 
     net: Net
-    rings: _Rings
+    rings: Rings
     crossings: LevelCrossings
     start: Floats
     settings: FitSettings
@@ -294,7 +235,7 @@ class _NetSteps:
         """
         if not self.bending:
             return min(1.0, SAFE * 2 / (1 + 2 * TENSION * self.settings.stiffness)), 0.0
-        most, least = 1 + 4 * self.bending, float(_resistance(np.linspace(0, 2, 201), self.bending).min())
+        most, least = 1 + 4 * self.bending, float(resistance(np.linspace(0, 2, 201), self.bending).min())
         over = 2 / (1 + np.sqrt(1 - ((most - least) / (most + least)) ** 2))
         return over * 2 / (most + least), over - 1
 

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.isosurface.surface_nets import fall_short
-from ..kernels.isosurface.voxels import end_soon
+from ..kernels.isosurface.surface_nets import end_soon, fall_short
 from ..kernels.threads import in_blocks
 from .means import BLOCK, means
 

@@ -247,3 +247,36 @@ def move_in_cells(
         speed = p * p + q * q + r * r
         longest, changed, energy = max(longest, speed), max(changed, a * a + b * b + c * c), energy + 0.5 * speed
     sums[0], sums[1], sums[2] = np.sqrt(longest), np.sqrt(changed), energy
+
+
+@kernel("void(b1[:,:,::1], i4[:,::1], i4[:,::1], i8, b1[::1], i8, i8)")
+def end_soon(
+    mask: NDArray[np.bool_],
+    inner: NDArray[np.int32],
+    steps: NDArray[np.int32],
+    depth: int,
+    found: NDArray[np.bool_],
+    start: int,
+    stop: int,
+) -> None:
+    """Tell which voxels (q, 3) have one outside, or the mask's end, within so many steps (q, 3) back.
+
+    Parameters
+    ----------
+    mask : (K, J, I) bool array
+    inner, steps : (q, 3) int32 array
+        As (x, y, z).
+    depth : int
+    found : (q,) bool array
+        Result.
+    start, stop : int
+        Voxels to work on.
+    """
+    for f in range(start, stop):
+        found[f] = False
+        for n in range(1, depth + 1):
+            x, y, z = inner[f, 0] - n * steps[f, 0], inner[f, 1] - n * steps[f, 1], inner[f, 2] - n * steps[f, 2]
+            within = 0 <= x < mask.shape[2] and 0 <= y < mask.shape[1] and 0 <= z < mask.shape[0]
+            if not within or not mask[z, y, x]:
+                found[f] = True
+                break

@@ -173,16 +173,17 @@ def list_faces(
             f += 1
 
 
-@kernel("void(u1[::1], i4[:,::1], i8[::1], i4[:,::1], i8, i8)")
+@kernel("void(u1[::1], i4[:,::1], i8[::1], i4[:,::1], i4[:,::1], i8, i8)")
 def list_fans(
     cases: NDArray[np.uint8],
     table: NDArray[np.int32],
     first: NDArray[np.int64],
     fans: NDArray[np.int32],
+    twins: NDArray[np.int32],
     start: int,
     stop: int,
 ) -> None:
-    """List the faces around every cell.
+    """List the faces around every cell, and those beyond their sides.
 
     Parameters
     ----------
@@ -190,11 +191,16 @@ def list_fans(
         As in `list_faces`.
     fans : (n, 6) int32 array
         Result: the faces that have the cell as a corner, then -1.
+    twins : (q, 4) int32 array
+        Result: the face beyond each side, times four, plus the number of its own side there. Side n is that from corner
+        n to the next.
 
     Notes
     -----
-    In a well-composed set a cell has six faces at most.
+    In a well-composed set a cell has six faces at most. Of the two that share a side, one runs from the cell to its
+    neighbor there, and the other back; each side is written by the cell in which it begins.
     """
+    leaving, coming = np.zeros(6, np.int64), np.zeros(6, np.int64)
     for v in range(start, stop):
         n = 0
         for edge in range(12):
@@ -202,7 +208,8 @@ def list_fans(
             b, c = (axis + 1) % 3, (axis + 2) % 3
             up, on = edge & 1, edge >> 1 & 1
             corner = up << b | on << c
-            if cases[v] >> corner & 1 == cases[v] >> (corner | 1 << axis) & 1:
+            low = cases[v] >> corner & 1
+            if low == cases[v] >> (corner | 1 << axis) & 1:
                 continue
             owner = table[v, 2 * b + 1] if up else v
             owner = table[owner, 2 * c + 1] if on else owner
@@ -211,40 +218,15 @@ def list_fans(
                 rank += (cases[owner] ^ cases[owner] >> (1 << earlier)) & 1
             fans[v, n] = rank
             n += 1
+            place = 2 * on + (up ^ on) if low else 2 * up + (up ^ on)
+            along_b = (up ^ on) != low
+            leaving[2 * b + up if along_b else 2 * c + on] = 4 * rank + place
+            coming[2 * c + on if along_b else 2 * b + up] = 4 * rank + (place - 1 & 3)
         fans[v, n:] = -1
-
-
-@kernel("void(b1[:,:,::1], i4[:,::1], i4[:,::1], i8, b1[::1], i8, i8)")
-def end_soon(
-    mask: NDArray[np.bool_],
-    inner: NDArray[np.int32],
-    steps: NDArray[np.int32],
-    depth: int,
-    found: NDArray[np.bool_],
-    start: int,
-    stop: int,
-) -> None:
-    """Tell which voxels (q, 3) have one outside, or the mask's end, within so many steps (q, 3) back.
-
-    Parameters
-    ----------
-    mask : (K, J, I) bool array
-    inner, steps : (q, 3) int32 array
-        As (x, y, z).
-    depth : int
-    found : (q,) bool array
-        Result.
-    start, stop : int
-        Voxels to work on.
-    """
-    for f in range(start, stop):
-        found[f] = False
-        for n in range(1, depth + 1):
-            x, y, z = inner[f, 0] - n * steps[f, 0], inner[f, 1] - n * steps[f, 1], inner[f, 2] - n * steps[f, 2]
-            within = 0 <= x < mask.shape[2] and 0 <= y < mask.shape[1] and 0 <= z < mask.shape[0]
-            if not within or not mask[z, y, x]:
-                found[f] = True
-                break
+        for direction in range(6):
+            if table[v, direction] >= 0:
+                side = leaving[direction]
+                twins[side >> 2, side & 3] = coming[direction]
 
 
 @kernel("void(f8[:,::1], f8[:,::1], f8[::1], f8[::1], b1, f8[::1], i8, i8)")
