@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebinterpolate
 
 from ..kernels.isosurface.surface_nets import add_term, lean, list_rings
 from ..kernels.threads import in_blocks
@@ -58,7 +57,7 @@ class Rings:
         Squares and springs together are  1 - l + b l^2  there, l as an operator that takes a mean from what it is of:
         its inverse is a Chebyshev series. What it is more than 1 is a multiple of l, so that planes stay as they are.
         """
-        coefficients = chebinterpolate(
+        coefficients = np.polynomial.chebyshev.chebinterpolate(
             lambda mean: (1 / resistance(1 - mean, bending) - 1) / (mean - 1), TERMS,
         )  # fmt: skip
         last = self.lean(values)
