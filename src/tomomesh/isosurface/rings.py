@@ -61,7 +61,8 @@ class Rings:
             lambda mean: (1 / resistance(1 - mean, bending) - 1) / (mean - 1), TERMS,
         )  # fmt: skip
         last = self.lean(values)
-        total, before = values + coefficients[0] * last, last.copy()
+        total: Floats = values + coefficients[0] * last
+        before = last.copy()
         for n, coefficient in enumerate(coefficients[1:]):
             self._add(last, before, 2.0 if n else 1.0, coefficient, total)
             last, before = before, last
