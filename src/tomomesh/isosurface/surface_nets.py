@@ -200,6 +200,14 @@ class _NetSteps:
         """How stiff the springs are against bends; 0 where they resist being stretched."""
         return self.crossings.bending * self.settings.stiffness
 
+    @property
+    def of_mask(self) -> bool:
+        """Whether the net resists bends as one around a mask does, and rests far from where it starts.
+
+        Around parts of thick voxels that hold levels a net rests after few steps, and 1 % nearer to a CT's levels.
+        """
+        return self.crossings.stepped and self.bending > 0
+
     def init(self) -> _NetState:
         """Return the net where it starts."""
         return _NetState(self.start.copy(), self.start.copy(), self.start)
@@ -211,7 +219,7 @@ class _NetSteps:
     def step(self, state: _NetState, count: int) -> tuple[_NetState, Motion]:
         """Move every vertex by the forces on it; where they were is overwritten."""
         bends = self.bending > 0
-        state = self._evened(state) if bends and count == 0 else state
+        state = self._evened(state) if self.of_mask and count == 0 else state
         values = self.rings.lean(state.position) if bends else state.position
         moved, sums = state.before, np.zeros((-(-len(state.position) // BLOCK), 3))
         stiff = -self.bending if bends else TENSION * self.settings.stiffness
@@ -231,11 +239,12 @@ class _NetSteps:
         """Return what part of the forces a vertex goes at each step, and of its last move.
 
         A vertex is drawn by at most 1 + r times its distance from rest, r from the springs, and no step up to twice
-        the inverse overshoots. Against bends r is large, and the net goes on by momentum (Golub & Varga 1961).
+        the inverse overshoots. Around a mask r is large, and the net goes on by momentum (Golub & Varga 1961).
         """
-        if not self.bending:
-            return min(1.0, SAFE * 2 / (1 + 2 * TENSION * self.settings.stiffness)), 0.0
-        most, least = 1 + 4 * self.bending, float(resistance(np.linspace(0, 2, 201), self.bending).min())
+        springs = 4 * self.bending if self.bending else 2 * TENSION * self.settings.stiffness
+        if not self.of_mask:
+            return min(1.0, SAFE * 2 / (1 + springs)), 0.0
+        most, least = 1 + springs, float(resistance(np.linspace(0, 2, 201), self.bending).min())
         over = 2 / (1 + np.sqrt(1 - ((most - least) / (most + least)) ** 2))
         return over * 2 / (most + least), over - 1
 
