@@ -61,7 +61,7 @@ def bare() -> Iterator[tuple[str, Volume, float]]:
     if LABELS.exists():
         whole = read_volume(LABELS)
         chosen = np.isin(whole.voxels, SKULL).astype(np.uint8)
-        yield "skull of a label map", Volume.from_stored(chosen.transpose(2, 1, 0), whole.affine), 0.5
+        yield "skull of a label map", Volume.from_stored(chosen, whole.affine), 0.5
     if not (CT.exists() and LABELS.exists()):
         note("studies without a network", "some are not measured: the shared data are not beside the project")
 

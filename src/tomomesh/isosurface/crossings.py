@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..kernels.isosurface.voxels import leave_window
+from ..kernels.threads import in_blocks
 from ..model.columns import any_of
 from ..model.points import ADDED, BORDER, CROSSING
+from .means import BLOCK
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -78,20 +81,20 @@ class Levels:
         beyond = np.nan_to_num(np.maximum(self.lower - levels, levels - self.upper), nan=np.inf)
         return np.asarray(beyond.max(axis=1) if self.layers == "all" else beyond.min(axis=1))
 
-    def crossed(self, inner: NDArray[np.int32], outer: NDArray[np.int32]) -> NDArray[np.float64]:
+    def crossed(self, inner: NDArray[np.int32], outer: NDArray[np.int32], threads: int = 0) -> NDArray[np.float64]:
         """Return the share of the way from voxels inside to their neighbors outside where a bound is crossed, (n,).
 
         Levels are interpolated linearly. Of several layers the first to leave its window counts; where one inside is
         enough, the last of those that were. Where a level is not known the border is half way.
         """
         inside, outside = self.at(inner), self.at(outer)
-        bound = np.where(outside > self.upper, self.upper, self.lower)
-        with np.errstate(divide="ignore", invalid="ignore"):  # a voxel that was added may be no brighter than outside
-            share = (inside - bound) / (inside - outside)
-        if self.layers == "all":
-            leaves = np.minimum.reduce(np.where(self.kept(outside), np.inf, share).T)
-        else:
-            leaves = np.maximum.reduce(np.where(self.kept(inside), share, -np.inf).T)
+        lower, upper = (np.full(inside.shape[1], bound, np.float64) for bound in (self.lower, self.upper))
+        leaves = np.empty(len(inside))
+        in_blocks(
+            lambda start, stop: leave_window(
+                inside, outside, lower, upper, self.layers == "all", leaves, start, stop
+            ), len(leaves), block=BLOCK, threads=threads,
+        )  # fmt: skip
         return np.where(np.abs(leaves) <= 1, np.clip(leaves, CLOSEST, 1 - CLOSEST), 0.5)
 
     def stepped(self, inner: NDArray[np.int32], steps: NDArray[np.int32]) -> bool:
@@ -157,7 +160,7 @@ class LevelCrossings:
 
 def crossings(
     levels: Levels, inner: NDArray[np.int32], steps: NDArray[np.int32], added: NDArray[np.bool_],
-    thin: Thinned | None = None,
+    thin: Thinned | None = None, threads: int = 0,
 ) -> LevelCrossings:  # fmt: skip
     """Find where the boundary of a window crosses the lines between voxels.
 
@@ -172,13 +175,14 @@ def crossings(
         Inner voxels that are not in the window.
     thin : Thinned, optional
         What the levels are of, where the voxels are parts of thick ones.
+    threads : int
 
     Returns
     -------
     LevelCrossings
     """
     outer, even = inner + steps, thin is None and levels.stepped(inner, steps)
-    share = np.full(len(inner), 0.5) if even else np.where(added, BARELY, levels.crossed(inner, outer))
+    share = np.full(len(inner), 0.5) if even else np.where(added, BARELY, levels.crossed(inner, outer, threads))
     beyond = any_of(levels.nearest(outer) != outer)
     kinds = np.where(added, ADDED, np.where(beyond, BORDER, CROSSING)).astype(np.uint8)
     positions = inner + share[:, None] * steps

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.isosurface.diagonals import NEITHER, OPEN, allow_diagonals, choose_diagonals, split_squares
+from ..kernels.isosurface.diagonals import NEITHER, OPEN, allow_diagonals, choose_diagonals, list_normals, split_squares
 from ..kernels.threads import in_blocks
 from ..model.mesh import TriMesh
 from .means import BLOCK
@@ -70,9 +70,14 @@ def _diagonals(
         allow_diagonals(made.positions, net.quads, crossings.positions, net.directions, allowed, start, stop)
 
     in_blocks(allow, len(allowed), block=BLOCK, threads=threads)
-    choice, odd = np.where(allowed > 0, OPEN, NEITHER).astype(np.uint8), _is_odd(net)
+    choice, odd = np.where(allowed > 0, np.uint8(OPEN), np.uint8(NEITHER)), _is_odd(net)
+    normals = np.empty((len(allowed), 4, 3), np.float32)
+    in_blocks(
+        lambda start, stop: list_normals(after, net.quads, normals, start, stop), len(normals), block=BLOCK,
+        threads=threads,
+    )  # fmt: skip
     for count, parity in enumerate(ROUNDS):
-        choice = _chosen(net, after, allowed, choice, odd == parity, threads, alone=count == 0)
+        choice = _chosen(net, normals, allowed, choice, odd == parity, threads, alone=count == 0)
     return choice
 
 
@@ -83,7 +88,7 @@ def _is_odd(net: Net) -> NDArray[np.bool_]:
 
 def _chosen(
     net: Net,
-    after: NDArray[np.float64],
+    normals: NDArray[np.float32],
     allowed: NDArray[np.uint8],
     choice: NDArray[np.uint8],
     turns: NDArray[np.bool_],
@@ -95,7 +100,7 @@ def _chosen(
     chosen = np.empty_like(choice)
 
     def work(start: int, stop: int) -> None:
-        choose_diagonals(after, net.quads, net.fans, allowed, choice, turns, alone, chosen, start, stop)
+        choose_diagonals(normals, net.twins, allowed, choice, turns, alone, chosen, start, stop)
 
     in_blocks(work, len(choice), block=BLOCK, threads=threads)
     return chosen

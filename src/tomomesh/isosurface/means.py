@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.isosurface.surface_nets import mean_of
+from ..kernels.isosurface.surface_nets import mean_of, mean_of_numbers
 from ..kernels.threads import in_blocks
 
 if TYPE_CHECKING:
@@ -19,10 +19,9 @@ BLOCK = 40_000
 
 
 def means(values: Floats, members: NDArray[np.int32], threads: int) -> Floats:
-    """Average rows (n, 3) of an array over lists of them (m, s): (m, 3)."""
-    found = np.empty((len(members), 3))
-
+    """Average numbers (n,) or rows (n, 3) over lists of them (m, s): (m,) or (m, 3)."""
+    found, mean = np.empty((len(members), *values.shape[1:])), mean_of if values.ndim > 1 else mean_of_numbers
     in_blocks(
-        lambda start, stop: mean_of(values, members, found, start, stop), len(members), block=BLOCK, threads=threads
+        lambda start, stop: mean(values, members, found, start, stop), len(members), block=BLOCK, threads=threads
     )  # fmt: skip
     return found

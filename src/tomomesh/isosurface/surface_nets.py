@@ -9,13 +9,14 @@ import numpy as np
 
 from ..cuberille.neighbors import DIRECTIONS
 from ..dynamics.iterate import iterate
-from ..kernels.isosurface.surface_nets import lean, move_in_cells, pull_squares
+from ..kernels.isosurface.surface_nets import draw_out, move_in_cells
 from ..kernels.isosurface.voxels import link_cells, list_faces, list_fans
 from ..kernels.threads import in_blocks
 from ..model.trace import Motion
 from ..progress import Progress, silent
 from .means import BLOCK, means
-from .thin import AFTER, given_back
+from .rings import Rings, resistance
+from .thin import GIVEN_BACK, given_back
 from .well_composed import CORNERS, surface_cells
 
 if TYPE_CHECKING:
@@ -69,6 +70,8 @@ class Net:
         The squares around each vertex, then -1.
     quads : (q, 4) int32 array
         The squares, counter-clockwise from outside in the space of the indices.
+    twins : (q, 4) int32 array
+        The square beyond the side from each corner to the next, times four, plus the number of its own side there.
     inner : (q, 3) int32 array
         The voxel behind each.
     directions : (q,) uint8 array
@@ -79,13 +82,14 @@ class Net:
     links: NDArray[np.int32]
     fans: NDArray[np.int32]
     quads: NDArray[np.int32]
+    twins: NDArray[np.int32]
     inner: NDArray[np.int32]
     directions: NDArray[np.uint8]
 
     @property
     def steps(self) -> NDArray[np.int32]:
         """Steps from the voxels inside to those outside, (q, 3)."""
-        return np.array(DIRECTIONS, np.int32)[self.directions]
+        return np.take(np.array(DIRECTIONS, np.int32), self.directions, axis=0)
 
 
 def net_around(
@@ -114,17 +118,16 @@ def net_around(
     owned = OWNED[cases]
     first = np.cumsum(owned) - owned
     total = int(owned.sum())
-    quads, directions = np.empty((total, 4), np.int32), np.empty(total, np.uint8)
-    fans = np.empty((len(cells), 6), np.int32)
+    quads, twins, inner = (np.empty((total, count), np.int32) for count in (4, 4, 3))
+    fans, directions = np.empty((len(cells), 6), np.int32), np.empty(total, np.uint8)
+    low = cells + lowest
 
     def work(start: int, stop: int) -> None:
-        list_faces(cases, table, first, quads, directions, start, stop)
-        list_fans(cases, table, first, fans, start, stop)
+        list_faces(low, cases, table, first, quads, inner, directions, start, stop)
+        list_fans(cases, table, first, fans, twins, start, stop)
 
     in_blocks(work, len(cells), block=BLOCK, threads=threads)
-    low = cells + lowest
-    backward = np.maximum(-np.array(DIRECTIONS, np.int32), 0)[directions]
-    return Net(low.astype(np.float64), table, fans, quads, np.repeat(low, owned, axis=0) + backward, directions)
+    return Net(low.astype(np.float64), table, fans, quads, twins, inner, directions)
 
 
 @dataclass(frozen=True)
@@ -167,18 +170,18 @@ def settle(
     NetFit
     """
     start = means(crossings.positions, net.fans, threads)
-    steps = _NetSteps(net, crossings, start, settings, threads)
+    steps = _NetSteps(net, Rings.of(net, threads), crossings, start, settings, threads)
     state, trace = iterate(steps, settings.max_steps, progress)
     return NetFit(start, state.position, trace)
 
 
 @dataclass(frozen=True)
 class _NetState:
-    """Where the vertices are and how far each moved last, (n, 3), and where the squares are drawn to, (q, 3)."""
+    """Where the vertices are and were before, and the means of where their squares are drawn to, (n, 3)."""
 
     position: Floats
-    moves: Floats
-    pulls: Floats
+    before: Floats
+    goals: Floats
 
 
 @dataclass(frozen=True)
@@ -186,67 +189,81 @@ class _NetSteps:
     """The steps of a net without masses; each reads one state and writes the next, block by block."""
 
     net: Net
+    rings: Rings
     crossings: LevelCrossings
     start: Floats
     settings: FitSettings
     threads: int
 
+    @property
+    def bending(self) -> float:
+        """How stiff the springs are against bends; 0 where they resist being stretched."""
+        return self.crossings.bending * self.settings.stiffness
+
+    @property
+    def of_mask(self) -> bool:
+        """Whether the net resists bends as one around a mask does, and rests far from where it starts.
+
+        Around parts of thick voxels that hold levels a net rests after few steps, and 1 % nearer to a CT's levels.
+        """
+        return self.crossings.stepped and self.bending > 0
+
     def init(self) -> _NetState:
         """Return the net where it starts."""
-        return _NetState(self.start, np.zeros_like(self.start), self.crossings.positions)
+        return _NetState(self.start.copy(), self.start.copy(), self.start)
 
     def rested(self, motion: Motion, count: int) -> bool:
         """Tell whether all moves, and their changes from step to step, have fallen below the tolerance."""
-        return motion.rests(self.settings.tolerance) and not (count < AFTER[-1] and self.crossings.thin.any())
+        return motion.rests(self.settings.tolerance)
 
     def step(self, state: _NetState, count: int) -> tuple[_NetState, Motion]:
-        """Move every vertex by the forces on it; how far each moved last is changed in place."""
-        pulls = self._pulls(state) if count in AFTER else state.pulls
-        drawn = self._drawn(state.position, pulls)
-        values, stiff, most = self._resisted(state.position)
-        share = min(1.0, SAFE * 2 / (1 + most))
-        moved, sums = np.empty_like(state.position), np.zeros((-(-len(state.position) // BLOCK), 3))
+        """Move every vertex by the forces on it; where they were is overwritten."""
+        bends = self.bending > 0
+        state = self._evened(state) if self.of_mask and count == 0 else state
+        values = self.rings.lean(state.position) if bends else state.position
+        moved, sums = state.before, np.zeros((-(-len(state.position) // BLOCK), 3))
+        stiff = -self.bending if bends else TENSION * self.settings.stiffness
+        share, momentum = self._pace()
 
         def work(start: int, stop: int) -> None:
             move_in_cells(
-                state.position, drawn, self.net.fans, values, self.net.links, stiff, share, self.net.low, MARGIN,
-                state.moves, moved, sums[start // BLOCK], start, stop,
+                state.position, state.goals, self.rings.beside, self.rings.aslant, self.rings.shares, values, bends,
+                stiff, share, momentum, MARGIN, moved, sums[start // BLOCK], start, stop,
             )  # fmt: skip
 
         in_blocks(work, len(moved), block=BLOCK, threads=self.threads)
         speed, change = sums[:, :2].max(axis=0)
-        return _NetState(moved, state.moves, pulls), Motion(speed, change, sums[:, 2].sum())
+        return _NetState(moved, state.position, state.goals), Motion(speed, change, sums[:, 2].sum())
 
-    def _pulls(self, state: _NetState) -> Floats:
-        """Draw squares out where the mask is thin."""
-        thin, places = self.crossings.thin, self.crossings.positions
-        if not thin.any():
-            return state.pulls
-        middles = means(state.position, self.net.quads, self.threads)
-        return given_back(self.net, thin, places, state.pulls, middles, self.threads)
+    def _pace(self) -> tuple[float, float]:
+        """Return what part of the forces a vertex goes at each step, and of its last move.
 
-    def _drawn(self, position: Floats, pulls: Floats) -> Floats:
-        """Return how far each square is from where it is drawn to, (q, 3)."""
-        quads, drawn = self.net.quads, np.empty_like(pulls)
-
-        def work(start: int, stop: int) -> None:
-            pull_squares(position, quads, pulls, drawn, start, stop)
-
-        in_blocks(work, len(quads), block=BLOCK, threads=self.threads)
-        return drawn
-
-    def _resisted(self, position: Floats) -> tuple[Floats, float, float]:
-        """Return what springs resist, see `move_in_cells`: values, how stiff, and the most it is of a vertex' distance.
-
-        They resist being stretched by  s l,  or bends by  b (l - mean l_j).  A vertex is drawn by at most 1 + r times
-        its distance from rest, r from the springs, and no step up to twice the inverse overshoots.
+        A vertex is drawn by at most 1 + r times its distance from rest, r from the springs, and no step up to twice
+        the inverse overshoots. Around a mask r is large, and the net goes on by momentum (Golub & Varga 1961).
         """
-        bending = self.crossings.bending * self.settings.stiffness
-        if not bending:
-            return position, TENSION * self.settings.stiffness, 2 * TENSION * self.settings.stiffness
-        leaning = np.empty_like(position)
+        springs = 4 * self.bending if self.bending else 2 * TENSION * self.settings.stiffness
+        if not self.of_mask:
+            return min(1.0, SAFE * 2 / (1 + springs)), 0.0
+        most, least = 1 + springs, float(resistance(np.linspace(0, 2, 201), self.bending).min())
+        over = 2 / (1 + np.sqrt(1 - ((most - least) / (most + least)) ** 2))
+        return over * 2 / (most + least), over - 1
+
+    def _evened(self, state: _NetState) -> _NetState:
+        """Let the net begin where it would rest but for its cells, drawn out where the mask is thin."""
+        place, goals = self._within(state.goals), state.goals.copy()
+        for _ in range(GIVEN_BACK if self.crossings.thin.any() else 0):
+            self._draw_out(goals, given_back(self.net, self.crossings, place, self.threads))
+            place = self._within(goals)
+        return _NetState(place, place.copy(), goals)
+
+    def _draw_out(self, goals: Floats, lengths: Floats) -> None:
+        net, shares = self.net, self.rings.shares
         in_blocks(
-            lambda start, stop: lean(position, self.net.links, leaning, start, stop),
-            len(position), block=BLOCK, threads=self.threads,
+            lambda start, stop: draw_out(lengths, net.directions, net.fans, shares, goals, start, stop),
+            len(goals), block=BLOCK, threads=self.threads,
         )  # fmt: skip
-        return leaning, -bending, 4 * bending
+
+    def _within(self, goals: Floats) -> Floats:
+        """Return where the net would rest that is drawn to goals (n, 3), in its cells."""
+        place = self.rings.evened(goals, self.bending)
+        return np.clip(place, self.net.low + MARGIN, self.net.low + (1 - MARGIN), out=place)

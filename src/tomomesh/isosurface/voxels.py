@@ -130,9 +130,9 @@ def boundary(
     whole = _filled(joined) if surface == "outer" else joined
     net = net_around(whole, threads, low, cells if whole is held else None)
     x, y, z = net.inner.T
-    found = crossings(levels, net.inner, net.steps, ~mask[z, y, x], thin)
+    found = crossings(levels, net.inner, net.steps, ~mask[z, y, x], thin, threads)
     if found.stepped:  # gray levels say themselves where their border is
-        found = replace(found, thin=thin_squares(joined, net.inner - low, net.steps))
+        found = replace(found, thin=thin_squares(joined, net.inner - low, net.steps, threads))
     added = int(np.count_nonzero(joined) - np.count_nonzero(held))
     return Boundary(affine, net, found, added, 1 if thin is None else thin.parts)
 

@@ -82,34 +82,41 @@ def allow_diagonals(
                 allowed[f] += 1 << turn
 
 
-@kernel("i8(i4[:,::1], i4[:,::1], i8, i8)")
-def across(quads: NDArray[np.int32], fans: NDArray[np.int32], f: int, side: int) -> int:
-    """Return the square beyond a side of square f times four, plus the number of its own side there."""
-    a, b = quads[f, side], quads[f, (side + 1) % 4]
-    for n in range(fans.shape[1]):
-        g = fans[a, n]
-        for other in range(4):
-            if g >= 0 and quads[g, other] == b and quads[g, (other + 1) % 4] == a:
-                return int(4 * g + other)
-    return -1
+@kernel("void(f8[:,::1], i4[:,::1], f4[:,:,::1], i8, i8)")
+def list_normals(
+    placed: NDArray[np.float64], quads: NDArray[np.int32], normals: NDArray[np.float32], start: int, stop: int
+) -> None:
+    """Find the unit normals of the halves of squares, two by the diagonal from corner 0 and two by that from corner 1.
+
+    Parameters
+    ----------
+    placed : (n, 3) float array
+        The vertices in space.
+    quads : (q, 4) int32 array
+    normals : (q, 4, 3) float32 array
+        Result.
+    start, stop : int
+        Squares to work on.
+    """
+    own = np.empty(3)
+    for f in range(start, stop):
+        for n in range(4):
+            half_normal(placed, quads, f, n >> 1, n & 1, own)
+            share = 1.0 / np.sqrt(max(own[0] * own[0] + own[1] * own[1] + own[2] * own[2], 1e-300))
+            normals[f, n, 0], normals[f, n, 1], normals[f, n, 2] = share * own[0], share * own[1], share * own[2]
 
 
-@kernel("f8(f8[::1], f8[::1])")
-def bend(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Return 1 - cos of the angle between two vectors."""
-    dot = square = length = 0.0
-    for axis in range(3):
-        dot += one[axis] * other[axis]
-        square += one[axis] * one[axis]
-        length += other[axis] * other[axis]
-    return float(1.0 - dot / np.sqrt(max(square * length, 1e-300)))
+@kernel("f8(f4[:,:,::1], i8, i8, i8, i8)")
+def bend(normals: NDArray[np.float32], f: int, half: int, g: int, other: int) -> float:
+    """Return 1 - cos of the angle between two halves of squares, see `list_normals`."""
+    one, two = normals[f, half], normals[g, other]
+    return float(1.0 - (one[0] * two[0] + one[1] * two[1] + one[2] * two[2]))
 
 
-@kernel("void(f8[:,::1], i4[:,::1], i4[:,::1], u1[::1], u1[::1], b1[::1], b1, u1[::1], i8, i8)")
+@kernel("void(f4[:,:,::1], i4[:,::1], u1[::1], u1[::1], b1[::1], b1, u1[::1], i8, i8)")
 def choose_diagonals(
-    placed: NDArray[np.float64],
-    quads: NDArray[np.int32],
-    fans: NDArray[np.int32],
+    normals: NDArray[np.float32],
+    twins: NDArray[np.int32],
     allowed: NDArray[np.uint8],
     choice: NDArray[np.uint8],
     turns: NDArray[np.bool_],
@@ -122,11 +129,10 @@ def choose_diagonals(
 
     Parameters
     ----------
-    placed : (n, 3) float array
-        The vertices in space.
-    quads : (q, 4) int32 array
-    fans : (n, 6) int32 array
-        The squares around each vertex, then -1.
+    normals : (q, 4, 3) float32 array
+        Of `list_normals`.
+    twins : (q, 4) int32 array
+        What is beyond each side, see `tomomesh.kernels.isosurface.voxels.list_fans`.
     allowed : (q,) uint8 array
         See `allow_diagonals`.
     choice : (q,) uint8 array
@@ -141,24 +147,20 @@ def choose_diagonals(
     start, stop : int
         Squares to work on.
     """
-    own, other, bends = np.empty((2, 2, 3)), np.empty(3), np.empty(2)
     for f in range(start, stop):
         chosen[f] = choice[f]
         if not turns[f] or allowed[f] == 0:
             continue
-        for turn in range(2):
-            for half in range(2):
-                half_normal(placed, quads, f, turn, half, own[turn, half])
-            bends[turn] = bend(own[turn, 0], own[turn, 1]) if allowed[f] >> turn & 1 else np.inf
+        first = bend(normals, f, 0, f, 1) if allowed[f] & 1 else np.inf
+        second = bend(normals, f, 2, f, 3) if allowed[f] & 2 else np.inf
         for side in range(0 if alone else 4):
-            beyond = across(quads, fans, f, side)
-            turned = int(choice[beyond >> 2])
-            if turned >= NEITHER:
-                continue
-            half_normal(placed, quads, beyond >> 2, turned, (beyond - turned & 3) >> 1, other)
-            for turn in range(2):
-                bends[turn] += bend(own[turn, (side - turn & 3) >> 1], other)
-        chosen[f] = bends[1] < bends[0]
+            beyond, there = twins[f, side] >> 2, twins[f, side] & 3
+            turned = int(choice[beyond])
+            if turned < NEITHER:
+                other = 2 * turned + ((there - turned & 3) >> 1)
+                first += bend(normals, f, side >> 1, beyond, other)
+                second += bend(normals, f, 2 + ((side - 1 & 3) >> 1), beyond, other)
+        chosen[f] = second < first
 
 
 @kernel("void(i4[:,::1], u1[::1], b1, i8[:,:,::1], i8, i8)")

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..compile import kernel
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 
@@ -118,12 +119,14 @@ def link_cells(
         latest[z & 1, y, x] = v
 
 
-@kernel("void(u1[::1], i4[:,::1], i8[::1], i4[:,::1], u1[::1], i8, i8)")
+@kernel("void(i4[:,::1], u1[::1], i4[:,::1], i8[::1], i4[:,::1], i4[:,::1], u1[::1], i8, i8)")
 def list_faces(
+    cells: NDArray[np.int32],
     cases: NDArray[np.uint8],
     table: NDArray[np.int32],
     first: NDArray[np.int64],
     quads: NDArray[np.int32],
+    inner: NDArray[np.int32],
     directions: NDArray[np.uint8],
     start: int,
     stop: int,
@@ -135,6 +138,8 @@ def list_faces(
 
     Parameters
     ----------
+    cells : (n, 3) int32 array
+        The voxel (x, y, z) in the lowest corner of each cell.
     cases : (n,) uint8 array
     table : (n, 6) int32 array
         Neighboring cells by direction.
@@ -142,6 +147,8 @@ def list_faces(
         Faces of the cells before.
     quads : (q, 4) int32 array
         Result: the cells around, counter-clockwise seen from outside where the axes are right-handed.
+    inner : (q, 3) int32 array
+        Result: the voxel inside.
     directions : (q,) uint8 array
         Result: the direction from inside to outside.
     start, stop : int
@@ -160,20 +167,23 @@ def list_faces(
             quads[f, 1] = before if low else beside
             quads[f, 2] = table[before, 2 * c]
             quads[f, 3] = beside if low else before
+            inner[f, 0], inner[f, 1], inner[f, 2] = cells[v, 0], cells[v, 1], cells[v, 2]
+            inner[f, axis] += 1 - low
             directions[f] = 2 * axis + low
             f += 1
 
 
-@kernel("void(u1[::1], i4[:,::1], i8[::1], i4[:,::1], i8, i8)")
+@kernel("void(u1[::1], i4[:,::1], i8[::1], i4[:,::1], i4[:,::1], i8, i8)")
 def list_fans(
     cases: NDArray[np.uint8],
     table: NDArray[np.int32],
     first: NDArray[np.int64],
     fans: NDArray[np.int32],
+    twins: NDArray[np.int32],
     start: int,
     stop: int,
 ) -> None:
-    """List the faces around every cell.
+    """List the faces around every cell, and those beyond their sides.
 
     Parameters
     ----------
@@ -181,11 +191,16 @@ def list_fans(
         As in `list_faces`.
     fans : (n, 6) int32 array
         Result: the faces that have the cell as a corner, then -1.
+    twins : (q, 4) int32 array
+        Result: the face beyond each side, times four, plus the number of its own side there. Side n is that from corner
+        n to the next.
 
     Notes
     -----
-    In a well-composed set a cell has six faces at most.
+    In a well-composed set a cell has six faces at most. Of the two that share a side, one runs from the cell to its
+    neighbor there, and the other back; each side is written by the cell in which it begins.
     """
+    leaving, coming = np.zeros(6, np.int64), np.zeros(6, np.int64)
     for v in range(start, stop):
         n = 0
         for edge in range(12):
@@ -193,7 +208,8 @@ def list_fans(
             b, c = (axis + 1) % 3, (axis + 2) % 3
             up, on = edge & 1, edge >> 1 & 1
             corner = up << b | on << c
-            if cases[v] >> corner & 1 == cases[v] >> (corner | 1 << axis) & 1:
+            low = cases[v] >> corner & 1
+            if low == cases[v] >> (corner | 1 << axis) & 1:
                 continue
             owner = table[v, 2 * b + 1] if up else v
             owner = table[owner, 2 * c + 1] if on else owner
@@ -202,4 +218,53 @@ def list_fans(
                 rank += (cases[owner] ^ cases[owner] >> (1 << earlier)) & 1
             fans[v, n] = rank
             n += 1
+            place = 2 * on + (up ^ on) if low else 2 * up + (up ^ on)
+            along_b = (up ^ on) != low
+            leaving[2 * b + up if along_b else 2 * c + on] = 4 * rank + place
+            coming[2 * c + on if along_b else 2 * b + up] = 4 * rank + (place - 1 & 3)
         fans[v, n:] = -1
+        for direction in range(6):
+            if table[v, direction] >= 0:
+                side = leaving[direction]
+                twins[side >> 2, side & 3] = coming[direction]
+
+
+@kernel("void(f8[:,::1], f8[:,::1], f8[::1], f8[::1], b1, f8[::1], i8, i8)")
+def leave_window(
+    inside: NDArray[np.float64],
+    outside: NDArray[np.float64],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    first: bool,
+    shares: NDArray[np.float64],
+    start: int,
+    stop: int,
+) -> None:
+    """Find the share of the way from voxels inside to those outside where levels leave their layers' windows.
+
+    Parameters
+    ----------
+    inside, outside : (q, L) float array
+        NaN where a level is not known.
+    lower, upper : (L,) float array
+    first : bool
+        Whether the first layer counts that is not in its window any more; else the last of those that were.
+    shares : (q,) float array
+        Result; infinite where no layer counts, NaN where one is not known.
+    start, stop : int
+        Ways to work on.
+    """
+    for f in range(start, stop):
+        share = np.inf if first else -np.inf
+        for n in range(len(lower)):
+            a, b = inside[f, n], outside[f, n]
+            level = b if first else a
+            counts = not lower[n] < level <= upper[n] if first else lower[n] < level <= upper[n]
+            if counts:
+                bound = upper[n] if b > upper[n] else lower[n]
+                part = (a - bound) / (a - b)
+                if np.isnan(part):
+                    share = part
+                    break
+                share = min(share, part) if first else max(share, part)
+        shares[f] = share
