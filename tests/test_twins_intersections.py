@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds, size
+from tomomesh.kernels.measure.beside import only_touch
 from tomomesh.measure.intersections import intersecting_pairs, self_intersections
 from tomomesh.measure.topology import welded
 from tomomesh.model.mesh import TriMesh
@@ -125,6 +126,33 @@ def tangles(draw: st.DrawFn) -> TriMesh:
     elif draw(st.booleans()):
         vertices *= 10 ** rng.uniform(-3, 0, (n, 1))
     return short(TriMesh(vertices, np.array([rng.choice(n, 3, replace=False) for _ in range(m)], np.int64)))
+
+
+def surely_touch(mesh: TriMesh) -> list[tuple[int, int]]:
+    """Return the pairs of faces that are told to have only corners in common without a closer look."""
+    faces, rows = mesh.faces.astype(np.int32), np.ascontiguousarray(mesh.corners.reshape(-1, 3))
+    pairs = combinations(range(len(faces)), 2)
+    return [(i, j) for i, j in pairs if only_touch(faces, i, j, rows, 3 * i, 3 * j)]
+
+
+class TestSharedCorners:
+    @law(100)
+    @given(mesh=tangles())
+    def test_faces_that_surely_touch_do_not_cross(self, mesh: TriMesh) -> None:
+        assert not set(surely_touch(mesh)) & set(pairs_exactly(mesh))
+
+    def test_neighbors_on_a_ball_need_no_closer_look(self) -> None:
+        mesh = ball(2)
+        shared = [
+            (i, j) for i, j in combinations(range(len(mesh.faces)), 2) if {*mesh.faces[i]} & {*mesh.faces[j]}
+        ]  # fmt: skip
+        assert surely_touch(mesh) == shared
+
+    def test_a_face_folded_onto_its_neighbor_does(self) -> None:
+        corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 3, 0], [3, 0, 1]], float)
+        folded = TriMesh(corners, np.array([[0, 1, 2], [1, 0, 3]]))
+        assert surely_touch(folded) == []
+        assert intersecting_pairs(folded).tolist() == [[0, 1]]
 
 
 class TestAgainstFractions:

@@ -4,7 +4,8 @@ Everything follows from the signs of volumes, so sharing a vertex or an edge nee
 shared side is on the border of both triangles, and only a point that is inside of one of them counts.
 
 Triangle n has seven rows of three numbers: its corners from row 7 n on, the least and greatest coordinates of its
-box from row 7 n + BOX on, and its normal with the sizes of the normal's terms from row 7 n + PLANE on.
+box from row 7 n + BOX on, and its normal with the sizes of the normal's terms from row 7 n + PLANE on. The last are
+found where two triangles are to be compared, for nearly all pairs need not be (see `beside`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..compile import kernel
+from .beside import only_touch
 from .bvh import depth_of
 
 if TYPE_CHECKING:
@@ -71,14 +73,13 @@ def boxes_meet(rows: Rows, i: int, others: Rows, j: int) -> bool:
 
 @kernel("void(f8[:,::1], i4[:,::1], i8, f8[:,::1], i8)")
 def take_face(vertices: NDArray[np.float64], faces: NDArray[np.int32], face: int, rows: Rows, i: int) -> None:
-    """Put a face's corners, box and plane into the seven rows from i on."""
+    """Put a face's corners and box into the rows from i on."""
     for axis in range(3):
         a, b, c = vertices[faces[face, 0], axis], vertices[faces[face, 1], axis], vertices[faces[face, 2], axis]
         rows[i, axis], rows[i + 1, axis], rows[i + 2, axis] = a, b, c
         least, most = (a, b) if a < b else (b, a)
         rows[i + BOX, axis] = c if c < least else least
         rows[i + BOX + 1, axis] = c if c > most else most
-    take_plane(rows, i, i + 1, i + 2, i + PLANE)
 
 
 @kernel("i8(f8[:,::1], i8, i8, i8[::1])")
@@ -88,6 +89,8 @@ def meeting_of(rows: Rows, one: int, other: int, sides: NDArray[np.int64]) -> in
     The sides go into (6,): first those of the one. The result is `APART` where one lies on one side of the other's
     plane or both stop at it, `COPLANAR` where one lies in the other's plane, and `THROUGH` else.
     """
+    take_plane(rows, one, one + 1, one + 2, one + PLANE)
+    take_plane(rows, other, other + 1, other + 2, other + PLANE)
     for k in range(3):
         sides[k] = side_of(rows, other + PLANE, other, one + k)
         sides[3 + k] = side_of(rows, one + PLANE, one, other + k)
@@ -251,6 +254,8 @@ def mark_intersections(
                     if not boxes_meet(rows, there + BOX, rows, here + BOX):
                         continue
                     if len(pairs) == 0 and marked[one] and marked[other]:
+                        continue
+                    if only_touch(faces, one, other, rows, here, there):
                         continue
                     meeting = meeting_of(rows, here, there, sides)
                     if meeting == APART:
