@@ -41,6 +41,9 @@ class Ground:
         The faces around vertex v are ``fans[first[v]:first[v + 1]]``.
     pieces : (m,) int32 array
         The connected piece of each face.
+    areas : (m,) float array
+    volumes : (p,) float array
+        Signed volume of each piece.
     sizes : (n,) float array
         Length that edges should have at each vertex.
     creases : (3 m,) bool array
@@ -56,6 +59,8 @@ class Ground:
     first: Ints
     fans: Ints
     pieces: Ints
+    areas: Floats
+    volumes: Floats
     sizes: Floats
     creases: NDArray[np.bool_]
     kinds: NDArray[np.uint8]
@@ -77,10 +82,13 @@ class Ground:
             lambda start, stop: face_normals(mesh.vertices, faces, normals, start, stop),
             len(faces), block=BLOCK, threads=threads,
         )  # fmt: skip
-        areas, _ = areas_and_volumes(links, threads=threads)
+        areas, under = areas_and_volumes(links, threads=threads)
+        volumes = np.bincount(links.face_pieces, under)
         creases, kinds = find_creases(mesh, twins, normals, edge)
         sizes = wanted_sizes(mesh.vertices, faces, normals, areas, edge)
-        return cls(mesh, faces, twins, valence, first, fans, links.face_pieces, sizes, creases, kinds)
+        return cls(
+            mesh, faces, twins, valence, first, fans, links.face_pieces, areas, volumes, sizes, creases, kinds
+        )  # fmt: skip
 
     def scaled(self, share: float) -> Ground:
         """Return the same with other lengths of edges."""
@@ -92,13 +100,12 @@ class Ground:
         sizes[np.unique(self.faces[faces])] *= share
         return replace(self, sizes=sizes)
 
-    def with_specks(self, few: int, least: float, threads: int = 0) -> Ground:
+    def with_specks(self, few: int, least: float) -> Ground:
         """Return the same with shorter edges where a component would have fewer faces, about.
 
         Such a component is kept as it is where it is less round than `least`: 36 pi V^2 / A^3, which is 1 for a ball.
         """
-        sizes = areas_and_volumes(Links(self.mesh), threads=threads)
-        area, volume = (np.bincount(self.pieces, each) for each in sizes)
+        area, volume = np.bincount(self.pieces, self.areas), self.volumes
         short = np.sqrt(area / (EVEN * few))
         if short.min() >= self.sizes.max():
             return self
@@ -108,10 +115,9 @@ class Ground:
         kinds = np.where(flat, np.uint8(KEPT), self.kinds)
         return replace(self, sizes=np.minimum(self.sizes, short[piece]), kinds=kinds)
 
-    def forecast(self, threads: int = 0) -> float:
+    def forecast(self) -> float:
         """Return about how many faces a mesh of even triangles has with these lengths of edges."""
-        areas, _ = areas_and_volumes(Links(self.mesh), threads=threads)
-        return float((areas / mean_over(self.sizes, self.faces) ** 2).sum()) / (EVEN * LONGER**2)
+        return float((self.areas / mean_over(self.sizes, self.faces) ** 2).sum()) / (EVEN * LONGER**2)
 
 
 BLOCK = 20_000

@@ -222,10 +222,10 @@ def _ground(mesh: TriMesh, edge: float | None, most: int | None, threads: int) -
     usual = edge or even_edge(area, min(len(mesh.faces), most or len(mesh.faces)))
     ground = Ground.of(mesh, usual, threads)
     if edge is not None and most is None:
-        return ground.scaled(edge / even_edge(area, ground.forecast(threads))).with_specks(SPECK, ROUND, threads)
+        return ground.scaled(edge / even_edge(area, ground.forecast())).with_specks(SPECK, ROUND)
     fewest = min(len(mesh.faces), AIM * (most or np.inf))
-    ground = ground.scaled((ground.forecast(threads) / fewest) ** 0.5)
-    return ground if most is not None else ground.with_specks(SPECK, ROUND, threads)
+    ground = ground.scaled((ground.forecast() / fewest) ** 0.5)
+    return ground if most is not None else ground.with_specks(SPECK, ROUND)
 
 
 def _under(ground: Ground, made: TriMesh, under: NDArray[np.int32], marked: Marks) -> Marks:
