@@ -83,7 +83,7 @@ class Ground:
             len(faces), block=BLOCK, threads=threads,
         )  # fmt: skip
         areas, under = areas_and_volumes(links, threads=threads)
-        volumes = np.bincount(links.face_pieces, under)
+        volumes = np.asarray(np.bincount(links.face_pieces, under), np.float64)
         creases, kinds = find_creases(mesh, twins, normals, edge)
         sizes = wanted_sizes(mesh.vertices, faces, normals, areas, edge)
         return cls(

@@ -96,9 +96,11 @@ def crossings_around(plane: NDArray[np.bool_], levels: Levels, k: int) -> NDArra
     if len(inner) == 0:
         return np.empty((0, 2))
     inner = inner - margin
-    places = [np.column_stack([pixels, np.full(len(pixels), k)]).astype(np.int32) for pixels in (inner, inner + steps)]
-    inside, outside = (levels.inside(levels.at(one)) for one in places)
-    share = np.where(inside & ~outside, levels.crossed(*places), 0.5)
+    near, far = (
+        np.column_stack([pixels, np.full(len(pixels), k)]).astype(np.int32) for pixels in (inner, inner + steps)
+    )
+    inside, outside = (levels.inside(levels.at(one)) for one in (near, far))
+    share = np.where(inside & ~outside, levels.crossed(near, far), 0.5)
     return np.asarray(inner + share[:, None] * steps)
 
 
