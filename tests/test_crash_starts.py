@@ -105,7 +105,7 @@ def test_eight_cold_starts_at_once(tmp_path: Path) -> None:
 STOPPED = """
 import os, signal, subprocess, threading
 from tomomesh.kernels.native import workers
-from tomomesh.kernels.remeshing.surface import mix_normals
+from tomomesh.kernels.dynamics.projections import renew_projections
 from tomomesh.kernels.threads import in_blocks
 
 processes = []
@@ -117,7 +117,7 @@ class Noted(subprocess.Popen):
         threading.Timer(0.2, os.kill, [os.getpid(), signal.SIGINT]).start()
 
 workers.subprocess.Popen = Noted
-in_blocks(lambda start, stop: mix_normals(), 8, block=1, threads=2)
+in_blocks(lambda start, stop: renew_projections(), 8, block=1, threads=2)
 """
 
 
