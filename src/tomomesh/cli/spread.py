@@ -1,0 +1,168 @@
+"""Studies of a batch among Dask workers: what each needs, what is shown of them, and which paths they are told."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .. import io
+from ..errors import ResourceError, TomomeshError, UsageError, printable
+from .bars import Bars
+from .records import row_of_fault
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from contextlib import AbstractContextManager
+
+    from ..scale.cluster import Cluster
+    from ..scale.tasks import Told
+    from ..settings import Settings
+    from .records import Row
+
+    Done = Callable[[io.Study, Namespace, Settings, Path], Row]
+
+SMALL_BYTES = 280e6
+"""What a small run takes, as docs/ways.md states."""
+A_BYTE = 3.0
+"""Bytes for each of the stored study's, as docs/ways.md states of the way that takes most."""
+A_FACE = 450
+"""Bytes for each triangle, as `tests/test_memory.py` holds."""
+FACES = 12.0
+"""Triangles over the square of the study's extent, of a voxel of 16 bits each."""
+NAMED = 4
+"""Most studies that a line of progress names."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Many studies, and what is done with each.
+
+    Attributes
+    ----------
+    studies : sequence of Study
+    chosen : Namespace
+    settings : Settings
+    folder : Path
+        Of the results.
+    done : callable
+        Makes the row of one study: the same wherever it is done.
+    """
+
+    studies: Sequence[io.Study]
+    chosen: Namespace
+    settings: Settings
+    folder: Path
+    done: Done
+
+    def place(self, number: int) -> str:
+        """Say which study has a number, from 0."""
+        return printable(f"{number + 1}/{len(self.studies)} {self.studies[number].name}")
+
+
+def spread_rows(batch: Batch) -> Iterator[tuple[int, Row]]:
+    """Yield the number of each study, from 0, and its row, as workers have done them.
+
+    Raises
+    ------
+    TomomeshError
+        Where there are no workers, and none any more.
+    """
+    from ..scale.tasks import Tasks
+
+    studies, chosen = batch.studies, batch.chosen
+    with _workers(chosen, len(studies)) as cluster, Bars(quiet=chosen.quiet) as bars:
+        shown = _Shown(batch, bars)
+        plain = Namespace(**vars(chosen) | {"study": None, "output": None, "settings": None})
+        given = {"chosen": plain, "settings": batch.settings, "folder": batch.folder.absolute(), "done": batch.done}
+        work = partial(_on_worker, made_by=version("tomomesh"), **given)
+        need = partial(_need, settings=batch.settings)
+        for number, result in Tasks(work, [*map(_absolute, studies)], need, shown.hear, shown.warn).done_on(cluster):
+            shown.over(number)
+            with bars.aside():
+                yield number, _row(result, studies[number].name, chosen)
+
+
+def _workers(chosen: Namespace, count: int) -> AbstractContextManager[Cluster]:
+    from ..scale import cluster
+
+    if not chosen.quiet:
+        print("waiting for workers", file=sys.stderr)
+    return cluster.connected(chosen.scheduler) if chosen.scheduler else cluster.local(min(chosen.workers, count))
+
+
+def _need(study: io.Study, settings: Settings) -> float:
+    """Return how many bytes a study takes, about; see `SMALL_BYTES` and what follows it."""
+    try:
+        stored = io.voxel_bytes(study, settings.read)
+    except TomomeshError:
+        return SMALL_BYTES  # it cannot be read, which its row will tell
+    return SMALL_BYTES + A_BYTE * stored + A_FACE * FACES * (stored / 2) ** (2 / 3)
+
+
+def _row(result: Any, name: str, chosen: Namespace) -> Row:
+    """Return a study's row, where files are named as they were typed, not by the full paths that workers are given."""
+    row: Row = row_of_fault(name, result) if isinstance(result, TomomeshError) else result
+    relative = not any(Path(path).is_absolute() for path in (chosen.study, chosen.output))
+    return row | {"error": row["error"].replace(printable(f"{Path.cwd()}/"), "")} if relative else row
+
+
+def check_workers(chosen: Namespace) -> None:
+    """Refuse numbers of workers that there cannot be, and two kinds of them.
+
+    Raises
+    ------
+    UsageError
+    """
+    if chosen.workers is not None and chosen.scheduler:
+        raise UsageError("a cluster has its own workers", found="--workers and --scheduler", expected="one of them")
+    if chosen.workers is not None and chosen.workers < 1:
+        raise UsageError("there must be a worker", found=f"--workers {chosen.workers}", expected="at least 1")
+
+
+def _absolute(study: io.Study) -> io.Study:
+    return replace(study, path=study.path.absolute(), files=tuple(file.absolute() for file in study.files))
+
+
+def _on_worker(
+    study: io.Study, told: Told, *, chosen: Namespace, settings: Settings, folder: Path, done: Done, made_by: str
+) -> Row:
+    """Do a study on a worker, which must be of the same version."""
+    if version("tomomesh") != made_by:
+        return row_of_fault(study.name, ResourceError("a worker is of another version", expected=f"tomomesh {made_by}"))
+    return done(study, Namespace(**vars(chosen) | {"told": told}), settings, folder)
+
+
+class _Shown:
+    """What is shown of studies that are worked on at once."""
+
+    def __init__(self, batch: Batch, bars: Bars) -> None:
+        self._batch, self._bars, self._done = batch, bars, 0
+        self._underway: dict[int, str] = {}
+        bars("studies", 0, len(batch.studies))
+
+    def hear(self, number: int, stage: str, done: int, total: int) -> None:
+        """Take note of where a study is; called from a thread of Dask's."""
+        self._underway[number] = f"{printable(self._batch.studies[number].name)} {stage} {done}/{total}"
+        self._tell()
+
+    def warn(self, number: int, why: str) -> None:
+        """Say why a study is done by itself."""
+        if not self._batch.chosen.quiet:
+            with self._bars.aside():
+                print(f"{self._batch.place(number)}: by itself, as {why}", file=sys.stderr)
+
+    def over(self, number: int) -> None:
+        """Count a study that is over."""
+        self._underway.pop(number, None)
+        self._done += 1
+        self._tell()
+        self._bars("studies", self._done, len(self._batch.studies))
+
+    def _tell(self) -> None:
+        words = [words for _, words in sorted(self._underway.copy().items())]
+        self._bars.beside("; ".join(words[:NAMED] + [f"{len(words) - NAMED} more"] * (len(words) > NAMED)))

@@ -1,0 +1,227 @@
+"""Dask workers: our own on this machine, or those of a cluster that is there."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import os
+import signal
+import sys
+import warnings
+from collections import Counter
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ResourceError, UnreadableError, UsageError
+from ..io.files.private import private_folder
+from ..kernels.threads import cores
+from ..pointcloud.forecast import free_memory
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+LOOPBACK = "127.0.0.1"
+ANSWER_S = 10.0
+"""How long a scheduler may take to answer: Dask's own clients give it 30, in which a user would think that we hang."""
+START_S = 120.0
+"""How long the first of our own workers may take to start. Measured: 2 to 5 s on two busy cores."""
+AGAIN = 1
+"""How often Dask gives a task whose worker died to another one, before we run it by itself."""
+LOGGERS = ("distributed", "distributed.client", "tornado", "tornado.application")
+"""Those that Dask gives handlers of their own."""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Workers that tasks can be given to.
+
+    Attributes
+    ----------
+    client : distributed.Client
+    share : float
+        Bytes that a task may take beside as many others as there are at once.
+    most : float
+        Bytes that a task may take by itself.
+    at_once : dict
+        How many tasks each machine works on at once, by its host.
+    """
+
+    client: Any
+    share: float
+    most: float
+    at_once: dict[str, int]
+
+
+@contextmanager
+def local(workers: int) -> Iterator[Cluster]:
+    """Start workers on this machine, each a process with one task at a time, and end them however the block ends.
+
+    They listen on loopback alone, for who has the keys that are made for this run. A worker that dies is replaced.
+    None is killed for what memory it takes: a task's share is what is free at the start over the workers, and one
+    that needs more has to run by itself, where it may take what there is.
+
+    Raises
+    ------
+    UsageError
+        Where Dask is not installed.
+    ResourceError
+        Where no worker starts.
+    """
+    required()
+    from distributed import Client, LocalCluster
+
+    threads = max(cores() // workers, 1)
+    with ExitStack() as stack:
+        stack.enter_context(_unheard())
+        stack.enter_context(_configured(threads))
+        folder = stack.enter_context(private_folder())
+        with _deaf_children():
+            here = LocalCluster(
+                n_workers=0, threads_per_worker=1, host=LOOPBACK, security=True, memory_limit=0,
+                local_directory=str(folder), silence_logs=logging.CRITICAL,
+                dashboard_address=f"{LOOPBACK}:0", scheduler_kwargs={"dashboard": False},
+            )  # fmt: skip
+        stack.callback(_end, here)
+        here.scale(workers)
+        client = stack.enter_context(Client(here, set_as_default=False))
+        _require_one(client)
+        yield Cluster(client, free_memory() / workers, math.inf, {LOOPBACK: workers})
+
+
+@contextmanager
+def connected(scheduler: str) -> Iterator[Cluster]:
+    """Connect to a cluster that is there; its workers stay as they are.
+
+    Parameters
+    ----------
+    scheduler : str
+        The address of its scheduler, as ``tcp://host:8786``, or the path of its scheduler file.
+
+    Raises
+    ------
+    UsageError
+        Where Dask is not installed.
+    UnreadableError
+        Where no scheduler answers.
+    """
+    required()
+    with _unheard():
+        client = _client(scheduler)
+        try:
+            client.wait_for_workers(1)  # those of a queue may come in hours
+            workers = client.scheduler_info(n_workers=-1)["workers"].values()
+            limits = [(one["memory_limit"] or math.inf, one["nthreads"]) for one in workers]
+            at_once = Counter[str]()
+            for one in workers:
+                at_once[one["host"]] += one["nthreads"]
+            share, most = min(limit / tasks for limit, tasks in limits), max(limit for limit, _ in limits)
+            yield Cluster(client, share, most, dict(at_once))
+        finally:
+            with suppress(OSError):
+                client.close(timeout=1)
+
+
+def required() -> None:
+    """Refuse to go on without Dask, in one line that says what to install.
+
+    Raises
+    ------
+    UsageError
+    """
+    try:
+        for package in ("dask", "distributed", "cryptography"):
+            import_module(package)
+    except ImportError:
+        raise UsageError(
+            "several processes and clusters need a package that is not installed", found=f"{package} = not installed",
+            hint='pip install "tomomesh[scale]"',
+        ) from None  # fmt: skip
+
+
+def _client(scheduler: str) -> Any:
+    from distributed import Client
+
+    path = Path(scheduler)
+    place = {"scheduler_file": scheduler} if path.is_file() else {"address": scheduler}
+    try:
+        if path.is_file():
+            json.loads(path.read_bytes())["address"]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of versions that differ
+            return Client(**place, timeout=ANSWER_S, set_as_default=False)
+    except (OSError, ValueError, LookupError, TypeError) as fault:
+        raise UnreadableError(
+            "no scheduler answers there", file=scheduler, found=type(fault).__name__,
+            expected="a running scheduler's address, as tcp://host:8786, or the file that it wrote",
+        ) from None  # fmt: skip
+
+
+def _require_one(client: Any) -> None:
+    try:
+        client.wait_for_workers(1, timeout=START_S)
+    except TimeoutError:
+        raise ResourceError("no worker could be started", hint="fewer --workers, or none") from None
+
+
+def _end(here: Any) -> None:
+    """Kill our own workers: what they write is whole or not there, and to wait for them would take a study's time."""
+    for nanny in here.workers.values():
+        nanny.close_gracefully()
+        if nanny.pid:
+            with suppress(ProcessLookupError):
+                os.kill(nanny.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+    here.close()
+
+
+@contextmanager
+def _configured(threads: int) -> Iterator[None]:
+    """Set Dask up for workers of ours; what it puts into the environment for them is taken out again."""
+    import dask
+
+    alone = {name: str(threads) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+    settings = {
+        "distributed.scheduler.allowed-failures": AGAIN,
+        "distributed.scheduler.worker-saturation": 1.0,  # no task waits on a worker, and dies with it
+        "distributed.scheduler.http.routes": [],
+        "distributed.worker.http.routes": [],
+        "distributed.nanny.pre-spawn-environ": alone | {"PYTHONWARNINGS": "ignore"},
+    }
+    before = dict(os.environ)
+    try:
+        with dask.config.set(settings):
+            yield
+    finally:
+        for name in os.environ.keys() - before:
+            del os.environ[name]
+        os.environ.update(before)
+
+
+@contextmanager
+def _unheard() -> Iterator[None]:
+    """Keep what Dask logs from stderr: what matters of it is told in our own words."""
+    handlers = [handler for name in LOGGERS for handler in logging.getLogger(name).handlers]
+    before = [handler.level for handler in handlers]
+    for handler in handlers:
+        handler.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for handler, level in zip(handlers, before, strict=True):
+            handler.setLevel(level)
+
+
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Let threads that are made here, and all processes that they start, not hear Ctrl-C: this process ends them."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,204 @@
+"""Tasks that know nothing of one another, each done once, whatever becomes of the workers."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from uuid import uuid4
+
+from ..errors import BatchError, ResourceError
+from ..kernels.native.code import folder as kernels
+from ..kernels.threads import share_cores
+from ..pointcloud.forecast import bytes_in_words
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from .cluster import Cluster
+
+Item = TypeVar("Item")
+Key = tuple[str, int, int]
+EVERY_S = 0.5
+"""Seconds from one word of a stage to the next: what is shown of it is drawn once a second."""
+
+
+class GivenUpError(Exception):
+    """Nobody wants the result any more."""
+
+
+class Told:
+    """The progress of a task (see `tomomesh.progress`), told to whoever listens, and the end of it when it is given up.
+
+    Parameters
+    ----------
+    worker : distributed.Worker
+    key : tuple
+        Of the task: the topic under which it is told, and its number; no name goes into the scheduler's log.
+    """
+
+    def __init__(self, worker: Any, key: Key) -> None:
+        self._worker, self._key = worker, key
+        self._topic, self._number, _ = key
+        self._stage, self._said = "", 0.0
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        """Tell where the task is.
+
+        Raises
+        ------
+        GivenUpError
+        """
+        task = self._worker.state.tasks.get(self._key)
+        if task is None or task.state == "cancelled":
+            raise GivenUpError
+        now = time.monotonic()
+        if stage != self._stage or now - self._said >= EVERY_S:
+            self._stage, self._said = stage, now
+            self._worker.log_event(self._topic, [self._number, stage, done, total])
+
+
+@dataclass(frozen=True)
+class Tasks(Generic[Item]):
+    """What is to be done with each of some items.
+
+    Attributes
+    ----------
+    work : callable
+        Called as ``work(item, progress)`` on a worker; a function that can be imported there, or a part of one.
+    items : sequence
+        What can be pickled.
+    need : callable
+        How many bytes an item will take, about.
+    hear : callable
+        Called as ``hear(number, stage, done, total)``, from another thread.
+    warn : callable
+        Called as ``warn(number, why)`` for a task that is run by itself.
+    """
+
+    work: Callable[[Item, Told], Any]
+    items: Sequence[Item]
+    need: Callable[[Item], float]
+    hear: Callable[[int, str, int, int], None]
+    warn: Callable[[int, str], None]
+
+    def done_on(self, cluster: Cluster) -> Iterator[tuple[int, Any]]:
+        """Yield the number of each item and its result, or the error that it never will have one, as they come.
+
+        Where no kernel is compiled yet, the first task is done before the others, or all would compile the same.
+
+        Raises
+        ------
+        BatchError
+            Where the scheduler is gone.
+        """
+        beside, alone = list[int](), dict[int, str]()
+        for number, item in enumerate(self.items):
+            size = self.need(item)
+            if size > cluster.most:
+                yield number, _too_large(size, cluster.most)
+            elif size > cluster.share:
+                alone[number] = (
+                    f"it needs about {bytes_in_words(size)}, and a worker's share is {bytes_in_words(cluster.share)}"
+                )
+            else:
+                beside.append(number)
+        running = _Running(cluster, self)
+        try:
+            first = 0 if kernels().exists() else 1
+            for some, by_itself in ((beside[:first], True), (beside[first:], False)):
+                for number, result in running.results(some, by_itself=by_itself):
+                    if isinstance(result, _Died):
+                        alone[number] = "its worker died"
+                    else:
+                        yield number, result
+            for number, why in sorted(alone.items()):
+                self.warn(number, why)
+                for _, result in running.results([number], by_itself=True):
+                    yield number, result.error if isinstance(result, _Died) else result
+        finally:
+            running.end()
+
+
+class _Running:
+    """The tasks that a cluster has been given."""
+
+    def __init__(self, cluster: Cluster, tasks: Tasks[Any]) -> None:
+        self._cluster, self._tasks, self._topic = cluster, tasks, f"tomomesh-{uuid4().hex}"
+        self._pending: dict[Any, int] = {}
+        cluster.client.subscribe_topic(self._topic, lambda event: tasks.hear(*event[1]))
+
+    def results(self, numbers: Sequence[int], *, by_itself: bool) -> Iterator[tuple[int, Any]]:
+        """Yield the number and the result of each as it is done."""
+        from distributed import CancelledError, as_completed
+
+        try:
+            for number in numbers:
+                self._pending[self._submitted(number, by_itself)] = number
+            for future in as_completed([*self._pending], loop=self._cluster.client.loop):
+                number = self._pending.pop(future)
+                if future.cancelled():
+                    raise _gone()
+                yield number, _result(future)
+        except (OSError, CancelledError):
+            raise _gone() from None
+
+    def _submitted(self, number: int, by_itself: bool) -> Any:
+        key = self._topic, number, int(by_itself)
+        at_once = dict.fromkeys(self._cluster.at_once, 1) if by_itself else self._cluster.at_once
+        given = self._tasks.work, self._tasks.items[number], at_once, *key
+        return self._cluster.client.submit(_run, *given, key=key, pure=False)
+
+    def end(self) -> None:
+        """Give up what is not done."""
+        client = self._cluster.client
+        if client.status == "running":
+            client.cancel([*self._pending])
+            client.unsubscribe_topic(self._topic)
+
+
+@dataclass(frozen=True)
+class _Died:
+    """A task has lost as many workers as Dask gives it."""
+
+    error: ResourceError
+
+
+def _result(future: Any) -> Any:
+    """Return what became of a task that is over; work itself raises nothing."""
+    from distributed import KilledWorker
+
+    fault = future.exception()
+    if fault is None:
+        return future.result()
+    if isinstance(fault, KilledWorker):
+        lost = ResourceError(
+            f"every worker that took it died, also by itself ({2 * (fault.allowed_failures + 1)} in all)",
+            hint="a machine with more memory, for want of which processes are killed most often",
+        )
+        return _Died(lost)
+    return ResourceError(
+        "a worker could not take it", found=type(fault).__name__, expected="the same tomomesh on every worker"
+    )
+
+
+def _gone() -> BatchError:
+    return BatchError("the scheduler is gone", hint="the same command again, which passes over what is finished")
+
+
+def _too_large(size: float, most: float) -> ResourceError:
+    return ResourceError(
+        "it would not fit into the memory of any worker", found=f"about {bytes_in_words(size)}",
+        expected=f"at most {bytes_in_words(most)}", hint="workers with more memory, or without a cluster",
+    )  # fmt: skip
+
+
+def _run(work: Callable[[Any, Told], Any], item: Any, at_once: dict[str, int], *key: Any) -> Any:
+    """Do a task on a worker, with the cores of its machine that others there leave to it."""
+    from dask.system import CPU_COUNT
+    from distributed import get_worker
+    from distributed.comm import get_address_host
+
+    worker = get_worker()
+    share_cores(max(CPU_COUNT // at_once.get(get_address_host(worker.address), worker.state.nthreads), 1))
+    return work(item, Told(worker, (key[0], key[1], key[2])))
