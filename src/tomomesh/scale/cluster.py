@@ -77,12 +77,11 @@ def local(workers: int) -> Iterator[Cluster]:
     threads = max(cores() // workers, 1)
     with ExitStack() as stack:
         stack.enter_context(_unheard())
-        stack.enter_context(_configured(threads))
-        folder = stack.enter_context(private_folder())
+        stack.enter_context(_configured(threads, stack.enter_context(private_folder())))
         with _deaf_children():
             here = LocalCluster(
                 n_workers=0, threads_per_worker=1, host=LOOPBACK, security=True, memory_limit=0,
-                local_directory=str(folder), silence_logs=logging.CRITICAL,
+                silence_logs=logging.CRITICAL,
                 dashboard_address=f"{LOOPBACK}:0", scheduler_kwargs={"dashboard": False},
             )  # fmt: skip
         stack.callback(_end, here)
@@ -178,12 +177,13 @@ def _end(here: Any) -> None:
 
 
 @contextmanager
-def _configured(threads: int) -> Iterator[None]:
+def _configured(threads: int, folder: Path) -> Iterator[None]:
     """Set Dask up for workers of ours; what it puts into the environment for them is taken out again."""
     import dask
 
     alone = {name: str(threads) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
     settings = {
+        "temporary-directory": str(folder),
         "distributed.scheduler.allowed-failures": AGAIN,
         "distributed.scheduler.worker-saturation": 1.0,  # no task waits on a worker, and dies with it
         "distributed.scheduler.http.routes": [],

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from .cluster import Cluster
 
 Item = TypeVar("Item")
-Key = tuple[str, int, int]
 EVERY_S = 0.5
 """Seconds from one word of a stage to the next: what is shown of it is drawn once a second."""
 
@@ -33,13 +32,16 @@ class Told:
     Parameters
     ----------
     worker : distributed.Worker
-    key : tuple
-        Of the task: the topic under which it is told, and its number; no name goes into the scheduler's log.
+    key : str
+        Of the task.
+    topic : str
+        Under which it is told.
+    number : int
+        Of the item: no name goes into the scheduler's log.
     """
 
-    def __init__(self, worker: Any, key: Key) -> None:
-        self._worker, self._key = worker, key
-        self._topic, self._number, _ = key
+    def __init__(self, worker: Any, key: str, topic: str, number: int) -> None:
+        self._worker, self._key, self._topic, self._number = worker, key, topic, number
         self._stage, self._said = "", 0.0
 
     def __call__(self, stage: str, done: int, total: int) -> None:
@@ -144,9 +146,14 @@ class _Running:
             raise _gone() from None
 
     def _submitted(self, number: int, by_itself: bool) -> Any:
-        key = self._topic, number, int(by_itself)
+        key = f"{self._topic}-{number}-{int(by_itself)}"
         at_once = dict.fromkeys(self._cluster.at_once, 1) if by_itself else self._cluster.at_once
-        given = self._tasks.work, self._tasks.items[number], at_once, *key
+        given = (
+            self._tasks.work,
+            self._tasks.items[number],
+            at_once,
+            {"key": key, "topic": self._topic, "number": number},
+        )
         return self._cluster.client.submit(_run, *given, key=key, pure=False)
 
     def end(self) -> None:
@@ -193,7 +200,7 @@ def _too_large(size: float, most: float) -> ResourceError:
     )  # fmt: skip
 
 
-def _run(work: Callable[[Any, Told], Any], item: Any, at_once: dict[str, int], *key: Any) -> Any:
+def _run(work: Callable[[Any, Told], Any], item: Any, at_once: dict[str, int], told: dict[str, Any]) -> Any:
     """Do a task on a worker, with the cores of its machine that others there leave to it."""
     from dask.system import CPU_COUNT
     from distributed import get_worker
@@ -201,4 +208,4 @@ def _run(work: Callable[[Any, Told], Any], item: Any, at_once: dict[str, int], *
 
     worker = get_worker()
     share_cores(max(CPU_COUNT // at_once.get(get_address_host(worker.address), worker.state.nthreads), 1))
-    return work(item, Told(worker, (key[0], key[1], key[2])))
+    return work(item, Told(worker, **told))
