@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -158,8 +159,8 @@ def _killed_once(marker: Path) -> None:
         del os.O_TMPFILE
     synced = os.fsync
 
-    def fsync(handle: int) -> None:
-        synced(handle)
+    def fsync(fd: Any) -> None:
+        synced(fd)
         if not marker.exists():
             marker.touch()
             os.kill(os.getpid(), signal.SIGKILL)
@@ -167,17 +168,16 @@ def _killed_once(marker: Path) -> None:
     os.fsync = fsync
 
 
-class Poison(distributed.WorkerPlugin):  # type: ignore[misc]
+class Poison(distributed.WorkerPlugin):  # type: ignore[misc, name-defined]
     """One study kills whichever worker takes it, the new ones too."""
 
     def __init__(self, name: str) -> None:
         self.study = name
 
     def setup(self, worker: Any) -> None:
-        from tomomesh.cli import commands
-
-        self.read = commands.read_study
-        commands.read_study = self.poisoned
+        commands = vars(import_module("tomomesh.cli.commands"))
+        self.read = commands["read_study"]
+        commands["read_study"] = self.poisoned
 
     def poisoned(self, chosen: Any, *given: Any) -> Any:
         if Path(chosen.study).name == self.study:
@@ -185,9 +185,7 @@ class Poison(distributed.WorkerPlugin):  # type: ignore[misc]
         return self.read(chosen, *given)
 
     def teardown(self, worker: Any) -> None:
-        from tomomesh.cli import commands
-
-        commands.read_study = self.read
+        vars(import_module("tomomesh.cli.commands"))["read_study"] = self.read
 
 
 def _files_of(most: int) -> None:

@@ -21,7 +21,7 @@ from .records import COLUMNS, finished, record_of, row_of, row_of_fault
 from .spread import Batch, check_workers, spread_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Generator
 
     from ..results import Surface
     from ..settings import Settings
@@ -105,7 +105,7 @@ def _checked(chosen: Namespace, settings: Settings) -> Path:
     return check_folder(chosen.output)
 
 
-def _rows_in_turn(batch: Batch) -> Iterator[tuple[int, Row]]:
+def _rows_in_turn(batch: Batch) -> Generator[tuple[int, Row]]:
     """Yield the number of each study, from 0, and its row, one after the other."""
     for number, study in enumerate(batch.studies):
         if not batch.chosen.quiet:

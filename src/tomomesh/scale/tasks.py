@@ -13,13 +13,17 @@ from ..kernels.threads import share_cores
 from ..pointcloud.forecast import bytes_in_words
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Generator, Sequence
 
     from .cluster import Cluster
 
 Item = TypeVar("Item")
 EVERY_S = 0.5
 """Seconds from one word of a stage to the next: what is shown of it is drawn once a second."""
+
+
+class DiedError(ResourceError):
+    """A task has lost as many workers as Dask gives it."""
 
 
 class GivenUpError(Exception):
@@ -84,42 +88,43 @@ class Tasks(Generic[Item]):
     hear: Callable[[int, str, int, int], None]
     warn: Callable[[int, str], None]
 
-    def done_on(self, cluster: Cluster) -> Iterator[tuple[int, Any]]:
+    def done_on(self, cluster: Cluster) -> Generator[tuple[int, Any]]:
         """Yield the number of each item and its result, or the error that it never will have one, as they come.
 
-        Where no kernel is compiled yet, the first task is done before the others, or all would compile the same.
+        What does not fit beside others, and whatever lost its worker, is done by itself after all others.
 
         Raises
         ------
         BatchError
             Where the scheduler is gone.
         """
-        beside, alone = list[int](), dict[int, str]()
-        for number, item in enumerate(self.items):
-            size = self.need(item)
-            if size > cluster.most:
-                yield number, _too_large(size, cluster.most)
-            elif size > cluster.share:
-                alone[number] = (
-                    f"it needs about {bytes_in_words(size)}, and a worker's share is {bytes_in_words(cluster.share)}"
-                )
-            else:
-                beside.append(number)
+        beside, alone, refused = self._by_size(cluster)
+        yield from refused.items()
         running = _Running(cluster, self)
         try:
-            first = 0 if kernels().exists() else 1
-            for some, by_itself in ((beside[:first], True), (beside[first:], False)):
-                for number, result in running.results(some, by_itself=by_itself):
-                    if isinstance(result, _Died):
-                        alone[number] = "its worker died"
-                    else:
-                        yield number, result
+            for number, result in running.first_tries(beside):
+                if isinstance(result, DiedError):
+                    alone[number] = "its worker died"
+                else:
+                    yield number, result
             for number, why in sorted(alone.items()):
                 self.warn(number, why)
-                for _, result in running.results([number], by_itself=True):
-                    yield number, result.error if isinstance(result, _Died) else result
+                yield from running.results([number], by_itself=True)
         finally:
             running.end()
+
+    def _by_size(self, cluster: Cluster) -> tuple[list[int], dict[int, str], dict[int, ResourceError]]:
+        """Tell which items fit beside others, which by themselves, and which nowhere, and why."""
+        beside, alone, refused = list[int](), dict[int, str](), dict[int, ResourceError]()
+        for number, size in enumerate(map(self.need, self.items)):
+            if size > cluster.most:
+                refused[number] = _too_large(size, cluster.most)
+            elif size > cluster.share:
+                needs, share = bytes_in_words(size), bytes_in_words(cluster.share)
+                alone[number] = f"it needs about {needs}, and a worker's share is {share}"
+            else:
+                beside.append(number)
+        return beside, alone, refused
 
 
 class _Running:
@@ -130,7 +135,13 @@ class _Running:
         self._pending: dict[Any, int] = {}
         cluster.client.subscribe_topic(self._topic, lambda event: tasks.hear(*event[1]))
 
-    def results(self, numbers: Sequence[int], *, by_itself: bool) -> Iterator[tuple[int, Any]]:
+    def first_tries(self, numbers: Sequence[int]) -> Generator[tuple[int, Any]]:
+        """Do many at once; where no kernel is compiled yet, one before, or all would compile the same."""
+        first = 0 if kernels().exists() else 1
+        yield from self.results(numbers[:first], by_itself=True)
+        yield from self.results(numbers[first:], by_itself=False)
+
+    def results(self, numbers: Sequence[int], *, by_itself: bool) -> Generator[tuple[int, Any]]:
         """Yield the number and the result of each as it is done."""
         from distributed import CancelledError, as_completed
 
@@ -164,13 +175,6 @@ class _Running:
             client.unsubscribe_topic(self._topic)
 
 
-@dataclass(frozen=True)
-class _Died:
-    """A task has lost as many workers as Dask gives it."""
-
-    error: ResourceError
-
-
 def _result(future: Any) -> Any:
     """Return what became of a task that is over; work itself raises nothing."""
     from distributed import KilledWorker
@@ -179,11 +183,10 @@ def _result(future: Any) -> Any:
     if fault is None:
         return future.result()
     if isinstance(fault, KilledWorker):
-        lost = ResourceError(
-            f"every worker that took it died, also by itself ({2 * (fault.allowed_failures + 1)} in all)",
+        return DiedError(
+            "every worker that took it died, in the end by itself",
             hint="a machine with more memory, for want of which processes are killed most often",
         )
-        return _Died(lost)
     return ResourceError(
         "a worker could not take it", found=type(fault).__name__, expected="the same tomomesh on every worker"
     )

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def voxel_bytes(study: Study, settings: ReadSettings) -> int:
-    """Return the bytes of a study's voxels as they will be in memory, from its headers alone.
+    """Return the bytes of a study's voxels as they will be in memory, from its headers alone; some count these too.
 
     Slices count as many times their first. What tells nothing, as a study that is broken, counts as its files.
     """
