@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import logging
+import math
 import os
 import resource
 import signal
@@ -17,7 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from conftest import law
 from studies import write_nifti
 from tomomesh.cli import main
 
@@ -308,28 +312,39 @@ def _echo(number: int, told: Told) -> tuple[int, int]:
 
 
 class TestTasks:
-    def test_large_ones_are_done_by_themselves_and_too_large_ones_not(self, client: Any) -> None:
-        cluster = Cluster(client, share=10, most=100, at_once={"127.0.0.1": 2})
+    @pytest.mark.parametrize("pooled", [True, False])
+    def test_large_ones_are_done_by_themselves_and_too_large_ones_not(self, client: Any, pooled: bool) -> None:
+        cluster = Cluster(client, {"127.0.0.1": 2}, share=10, most=100, pooled=pooled)
         heard: list[int] = []
-        alone: list[int] = []
+        warned: dict[int, str] = {}
         tasks = Tasks(
-            _echo, [50, 5, 200, 7], float, lambda number, *stage: heard.append(number),
-            lambda number, why: alone.append(number),
-        )  # fmt: skip
+            _echo, [50, 5, 200, 7, 60], float, lambda number, *stage: heard.append(number), warned.__setitem__
+        )
         found = list(tasks.done_on(cluster))
-        assert [number for number, _ in found] in ([2, 1, 3, 0], [2, 3, 1, 0])
+        order = [number for number, _ in found]
+        assert (order[0], sorted(order[1:3]), order[3:]) == (2, [1, 3], [0, 4])
         by_number = dict(found)
         assert by_number[2].exit_code == 7
         assert "Expected: at most 100 bytes" in str(by_number[2])
-        assert alone == [0]
-        until(lambda: sorted(heard) == [0, 1, 3])
+        assert warned.keys() == {0, 4}
+        assert warned[0] == "by itself, as it needs about 50 bytes, and a worker's share is 10 bytes"
+        until(lambda: sorted(heard) == [0, 1, 3, 4])
         half, whole = max(dask.system.CPU_COUNT // 2, 1), dask.system.CPU_COUNT
         assert by_number[1] == (5, half)
         assert by_number[3] == (7, half)
         assert by_number[0] == (50, whole)
 
+    @law(100)
+    @given(st.integers(1, 100), st.floats(1, 100), st.floats(1, 1e4))
+    def test_as_many_as_fit_are_done_at_once(self, slots: int, share: float, size: float) -> None:
+        """Of one memory; were there twice as many, they would not fit."""
+        count = Cluster(None, {"a": slots}, share, math.inf, pooled=True).fitting(size)
+        assert 1 <= count <= slots
+        assert count == 1 or count * size <= slots * share * (1 + 1e-12)
+        assert count == slots or (2 * count + 1) * size > slots * share
+
     def test_nothing_is_left_on_the_scheduler(self, client: Any) -> None:
-        cluster = Cluster(client, share=10, most=100, at_once={})
+        cluster = Cluster(client, {"127.0.0.1": 2}, share=10, most=100, pooled=True)
         tasks = Tasks(_forever, [0, 1], float, lambda *stage: None, lambda *why: None)
         coming = tasks.done_on(cluster)
         assert next(coming) == (0, "done")

@@ -151,10 +151,10 @@ class _Shown:
         self._tell()
 
     def warn(self, number: int, why: str) -> None:
-        """Say why a study is done by itself."""
+        """Say why fewer studies are done beside one."""
         if not self._batch.chosen.quiet:
             with self._bars.aside():
-                print(f"{self._batch.place(number)}: by itself, as {why}", file=sys.stderr)
+                print(f"{self._batch.place(number)}: {why}", file=sys.stderr)
 
     def over(self, number: int) -> None:
         """Count a study that is over."""

@@ -42,18 +42,35 @@ class Cluster:
     Attributes
     ----------
     client : distributed.Client
-    share : float
-        Bytes that a task may take beside as many others as there are at once.
-    most : float
-        Bytes that a task may take by itself.
     at_once : dict
         How many tasks each machine works on at once, by its host.
+    share : float
+        Bytes that a task may take beside as many others.
+    most : float
+        Bytes that a task may take by itself.
+    pooled : bool
+        Whether all take from the same memory, so that fewer at once may take more each.
     """
 
     client: Any
+    at_once: dict[str, int]
     share: float
     most: float
-    at_once: dict[str, int]
+    pooled: bool
+
+    @property
+    def slots(self) -> int:
+        """How many tasks are worked on at once."""
+        return sum(self.at_once.values())
+
+    def fitting(self, size: float) -> int:
+        """Return how many tasks of so many bytes may be worked on at once: `slots`, its halves, and at last 1, or 0."""
+        if size > self.most:
+            return 0
+        count = self.slots
+        while count > 1 and size > self.share * (self.slots / count if self.pooled else 1):
+            count = count // 2 if self.pooled else 1
+        return count
 
 
 @contextmanager
@@ -61,8 +78,8 @@ def local(workers: int) -> Iterator[Cluster]:
     """Start workers on this machine, each a process with one task at a time, and end them however the block ends.
 
     They listen on loopback alone, for who has the keys that are made for this run. A worker that dies is replaced.
-    None is killed for what memory it takes: a task's share is what is free at the start over the workers, and one
-    that needs more has to run by itself, where it may take what there is.
+    None is killed for what memory it takes: a task's share is what is free at the start over the workers, and of
+    those that need more fewer are worked on at once.
 
     Raises
     ------
@@ -88,7 +105,7 @@ def local(workers: int) -> Iterator[Cluster]:
         here.scale(workers)
         client = stack.enter_context(Client(here, set_as_default=False))
         _require_one(client)
-        yield Cluster(client, free_memory() / workers, math.inf, {LOOPBACK: workers})
+        yield Cluster(client, {LOOPBACK: workers}, free_memory() / workers, math.inf, pooled=True)
 
 
 @contextmanager
@@ -118,7 +135,7 @@ def connected(scheduler: str) -> Iterator[Cluster]:
             for one in workers:
                 at_once[one["host"]] += one["nthreads"]
             share, most = min(limit / tasks for limit, tasks in limits), max(limit for limit, _ in limits)
-            yield Cluster(client, share, most, dict(at_once))
+            yield Cluster(client, dict(at_once), share, most, pooled=False)
         finally:
             with suppress(OSError):
                 client.close(timeout=1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from itertools import islice
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from uuid import uuid4
 
@@ -79,7 +80,7 @@ class Tasks(Generic[Item]):
     hear : callable
         Called as ``hear(number, stage, done, total)``, from another thread.
     warn : callable
-        Called as ``warn(number, why)`` for a task that is run by itself.
+        Called as ``warn(number, why)`` for a task that fewer others, or none, are done beside.
     """
 
     work: Callable[[Item, Told], Any]
@@ -91,40 +92,45 @@ class Tasks(Generic[Item]):
     def done_on(self, cluster: Cluster) -> Generator[tuple[int, Any]]:
         """Yield the number of each item and its result, or the error that it never will have one, as they come.
 
-        What does not fit beside others, and whatever lost its worker, is done by itself after all others.
+        Of those that need more than a worker's share fewer are worked on at once, after the others; what lost its
+        worker is done by itself, at the end.
 
         Raises
         ------
         BatchError
             Where the scheduler is gone.
         """
-        beside, alone, refused = self._by_size(cluster)
-        yield from refused.items()
-        running = _Running(cluster, self)
+        groups = self._by_size(cluster)
+        for number, size in groups.pop(0, {}).items():
+            yield number, _too_large(size, cluster.most)
+        running, lost = _Running(cluster, self), list[int]()
         try:
-            for number, result in running.first_tries(beside):
-                if isinstance(result, DiedError):
-                    alone[number] = "its worker died"
-                else:
-                    yield number, result
-            for number, why in sorted(alone.items()):
-                self.warn(number, why)
-                yield from running.results([number], by_itself=True)
+            for at_once, group in sorted(groups.items(), reverse=True):
+                self._explain(group, at_once, cluster)
+                for number, result in running.first_tries([*group], at_once):
+                    if isinstance(result, DiedError):
+                        lost.append(number)
+                    else:
+                        yield number, result
+            for number in sorted(lost):
+                self.warn(number, "by itself, as its worker died")
+                yield from running.results([number], 1)
         finally:
             running.end()
 
-    def _by_size(self, cluster: Cluster) -> tuple[list[int], dict[int, str], dict[int, ResourceError]]:
-        """Tell which items fit beside others, which by themselves, and which nowhere, and why."""
-        beside, alone, refused = list[int](), dict[int, str](), dict[int, ResourceError]()
+    def _by_size(self, cluster: Cluster) -> dict[int, dict[int, float]]:
+        """Return the sizes of the items by their numbers, in groups by how many of such a size fit at once."""
+        groups: dict[int, dict[int, float]] = {}
         for number, size in enumerate(map(self.need, self.items)):
-            if size > cluster.most:
-                refused[number] = _too_large(size, cluster.most)
-            elif size > cluster.share:
-                needs, share = bytes_in_words(size), bytes_in_words(cluster.share)
-                alone[number] = f"it needs about {needs}, and a worker's share is {share}"
-            else:
-                beside.append(number)
-        return beside, alone, refused
+            groups.setdefault(cluster.fitting(size), {})[number] = size
+        return groups
+
+    def _explain(self, group: dict[int, float], at_once: int, cluster: Cluster) -> None:
+        """Say of which items fewer are worked on at once, and why."""
+        beside = f"beside {at_once - 1} more at most" if at_once > 1 else "by itself"
+        for number, size in group.items() if at_once < cluster.slots else ():
+            share = bytes_in_words(cluster.share)
+            self.warn(number, f"{beside}, as it needs about {bytes_in_words(size)}, and a worker's share is {share}")
 
 
 class _Running:
@@ -135,37 +141,39 @@ class _Running:
         self._pending: dict[Any, int] = {}
         cluster.client.subscribe_topic(self._topic, lambda event: tasks.hear(*event[1]))
 
-    def first_tries(self, numbers: Sequence[int]) -> Generator[tuple[int, Any]]:
-        """Do many at once; where no kernel is compiled yet, one before, or all would compile the same."""
+    def first_tries(self, numbers: Sequence[int], at_once: int) -> Generator[tuple[int, Any]]:
+        """Do many; where no kernel is compiled yet, one before the others, or all would compile the same."""
         first = 0 if kernels().exists() else 1
-        yield from self.results(numbers[:first], by_itself=True)
-        yield from self.results(numbers[first:], by_itself=False)
+        yield from self.results(numbers[:first], 1)
+        yield from self.results(numbers[first:], at_once)
 
-    def results(self, numbers: Sequence[int], *, by_itself: bool) -> Generator[tuple[int, Any]]:
-        """Yield the number and the result of each as it is done."""
+    def results(self, numbers: Sequence[int], at_once: int) -> Generator[tuple[int, Any]]:
+        """Yield the number and the result of each as it is done; the whole cluster's number at once is up to Dask."""
         from distributed import CancelledError, as_completed
 
+        client, slots = self._cluster.client, self._cluster.slots
+        first = len(numbers) if at_once == slots else at_once
+        waiting = iter(numbers[first:])
         try:
-            for number in numbers:
-                self._pending[self._submitted(number, by_itself)] = number
-            for future in as_completed([*self._pending], loop=self._cluster.client.loop):
+            coming = as_completed([self._submitted(number, at_once) for number in numbers[:first]], loop=client.loop)
+            for future in coming:
                 number = self._pending.pop(future)
                 if future.cancelled():
                     raise _gone()
+                for another in islice(waiting, 1):
+                    coming.add(self._submitted(another, at_once))
                 yield number, _result(future)
         except (OSError, CancelledError):
             raise _gone() from None
 
-    def _submitted(self, number: int, by_itself: bool) -> Any:
-        key = f"{self._topic}-{number}-{int(by_itself)}"
-        at_once = dict.fromkeys(self._cluster.at_once, 1) if by_itself else self._cluster.at_once
-        given = (
-            self._tasks.work,
-            self._tasks.items[number],
-            at_once,
-            {"key": key, "topic": self._topic, "number": number},
-        )
-        return self._cluster.client.submit(_run, *given, key=key, pure=False)
+    def _submitted(self, number: int, at_once: int) -> Any:
+        whole = at_once == self._cluster.slots
+        sharing = self._cluster.at_once if whole else dict.fromkeys(self._cluster.at_once, at_once)
+        told = {"key": f"{self._topic}-{number}-{at_once}", "topic": self._topic, "number": number}
+        given = self._tasks.work, self._tasks.items[number], sharing, told
+        future = self._cluster.client.submit(_run, *given, key=told["key"], pure=False)
+        self._pending[future] = number
+        return future
 
     def end(self) -> None:
         """Give up what is not done."""
@@ -203,12 +211,12 @@ def _too_large(size: float, most: float) -> ResourceError:
     )  # fmt: skip
 
 
-def _run(work: Callable[[Any, Told], Any], item: Any, at_once: dict[str, int], told: dict[str, Any]) -> Any:
+def _run(work: Callable[[Any, Told], Any], item: Any, sharing: dict[str, int], told: dict[str, Any]) -> Any:
     """Do a task on a worker, with the cores of its machine that others there leave to it."""
     from dask.system import CPU_COUNT
     from distributed import get_worker
     from distributed.comm import get_address_host
 
     worker = get_worker()
-    share_cores(max(CPU_COUNT // at_once.get(get_address_host(worker.address), worker.state.nthreads), 1))
+    share_cores(max(CPU_COUNT // sharing.get(get_address_host(worker.address), worker.state.nthreads), 1))
     return work(item, Told(worker, **told))
