@@ -99,7 +99,7 @@ class TestBars:
             monkeypatch.setattr(sys, "stderr", screen)
             with Bars() as progress:
                 progress("studies", 0, 1)
-                progress.beside("head fit 3/30")
+                progress.beside = "head fit 3/30"
                 progress("studies", 1, 1)
             assert screen.getvalue().rstrip().endswith(", head fit 3/30")
 

@@ -240,6 +240,13 @@ class TestFaults:
             client.run(_blind, "")
         assert codes(folder, "out") == {"broken": "4", "s0": "0", "s1": "3", "s2": "0"}
 
+    def test_the_table_stays_where_no_worker_comes(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        batch(folder, "out", "--quiet")
+        before = table(folder, "out")
+        monkeypatch.setattr("tomomesh.scale.cluster.ANSWER_S", 0.5)
+        assert batch(folder, "out", "--quiet", "--scheduler", "tcp://127.0.0.1:1") == 3
+        assert table(folder, "out") == before
+
     def test_a_scheduler_that_goes_away(
         self, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: CaptureFixture[str]
     ) -> None:
@@ -465,6 +472,7 @@ class TestUsage:
         assert main(["reconstruct", str(folder), "-o", str(folder.parent / "out"), "--quiet", *options]) == code
         (line,) = capsys.readouterr().err.splitlines()
         assert said in line
+        assert not (folder.parent / "out").exists()
 
     @pytest.mark.parametrize("options", [["--workers", "2"], ["--scheduler", "tcp://127.0.0.1:1"]])
     def test_without_dask_a_line_says_what_to_install(

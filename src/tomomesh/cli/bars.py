@@ -33,7 +33,8 @@ class Bars:
         self._stage = ""
         self._since = self._said = 0.0
         self._done = self._total = 0
-        self._beside = ""
+        self.beside = ""
+        """A text that is shown behind the clock, from the next look at it on; any thread may set it."""
         self._bar: tqdm[NoReturn] | None = None
         self._drawing, self._left = Lock(), Event()
 
@@ -57,13 +58,6 @@ class Bars:
         with self._drawing:
             self._show(stage, done, total)
 
-    def beside(self, text: str) -> None:
-        """Show a text behind the clock, from the next look at it on."""
-        with self._drawing:
-            self._beside = text
-            if self._bar is not None:
-                self._bar.set_postfix_str(text, refresh=False)
-
     @contextmanager
     def aside(self) -> Iterator[None]:
         """Put the bar away while something else is printed."""
@@ -82,6 +76,7 @@ class Bars:
         while not self._left.wait(TICK):
             with self._drawing:
                 if self._bar is not None:
+                    self._bar.set_postfix_str(self.beside, refresh=False)
                     self._bar.refresh(nolock=True)
                 elif self._done < self._total and time.perf_counter() - self._said >= EVERY:
                     self._say()
@@ -95,13 +90,14 @@ class Bars:
         self._done, self._total = done, total
         if self._bar is not None:
             self._bar.total = total
+            self._bar.set_postfix_str(self.beside, refresh=False)
             self._bar.update(done - self._bar.n)
         elif done == total:
             self._say()
 
     def _say(self) -> None:
         self._said = time.perf_counter()
-        beside = f", {self._beside}" if self._beside else ""
+        beside = f", {self.beside}" if self.beside else ""
         line = f"{self._stage:10s} {self._done}/{self._total} {self._said - self._since:.1f} s{beside}"
         print(line, file=sys.stderr, flush=True)
 

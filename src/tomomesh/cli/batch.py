@@ -56,10 +56,19 @@ def reconstruct_each(chosen: Namespace, settings: Settings, work: Work) -> None:
     """
     folder = _checked(chosen, settings)
     studies = io.find_studies(chosen.study, without=[folder], series=settings.read.series)
-    make_folder(folder)
     batch = Batch(studies, chosen, settings, folder, partial(_done, work=work))
+    rows = _rows(batch)
+    if chosen.save_settings:
+        io.write_settings(settings, chosen.save_settings)
+    if chosen.json:
+        print(json.dumps(rows, indent=2))
+    _tell_failures(chosen, rows)
+
+
+def _rows(batch: Batch) -> list[Row]:
+    """Do all studies, and write the table of those that were done, whatever ends the work."""
+    chosen = batch.chosen
     found: dict[int, Row] = {}
-    rows: list[Row] = []
     try:
         with closing(spread_rows(batch) if chosen.workers or chosen.scheduler else _rows_in_turn(batch)) as coming:
             for number, row in coming:
@@ -67,13 +76,10 @@ def reconstruct_each(chosen: Namespace, settings: Settings, work: Work) -> None:
                 if not (chosen.quiet or chosen.json):
                     print(summary.of_row(batch.place(number), row), flush=True)
     finally:
-        rows += [found[number] for number in sorted(found)]
-        io.write_table(rows, COLUMNS, folder / TABLE)
-    if chosen.save_settings:
-        io.write_settings(settings, chosen.save_settings)
-    if chosen.json:
-        print(json.dumps(rows, indent=2))
-    _tell_failures(chosen, rows)
+        rows = [found[number] for number in sorted(found)]
+        if rows:
+            io.write_table(rows, COLUMNS, batch.folder / TABLE)
+    return rows
 
 
 def refuse_for_one(chosen: Namespace) -> None:
@@ -107,6 +113,7 @@ def _checked(chosen: Namespace, settings: Settings) -> Path:
 
 def _rows_in_turn(batch: Batch) -> Generator[tuple[int, Row]]:
     """Yield the number of each study, from 0, and its row, one after the other."""
+    make_folder(batch.folder)
     for number, study in enumerate(batch.studies):
         if not batch.chosen.quiet:
             print(batch.place(number), file=sys.stderr)

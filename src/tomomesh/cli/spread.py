@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from .. import io
 from ..errors import ResourceError, TomomeshError, UsageError, printable
 from .bars import Bars
+from .outputs.checks import make_folder
 from .records import row_of_fault
 
 if TYPE_CHECKING:
@@ -77,6 +78,7 @@ def spread_rows(batch: Batch) -> Generator[tuple[int, Row]]:
 
     studies, chosen = batch.studies, batch.chosen
     with _workers(chosen, len(studies)) as cluster, Bars(quiet=chosen.quiet) as bars:
+        make_folder(batch.folder)
         shown = _Shown(batch, bars)
         plain = Namespace(**vars(chosen) | {"study": None, "output": None, "settings": None})
         sent = replace(batch, studies=(), chosen=plain, folder=batch.folder.absolute())
@@ -108,8 +110,12 @@ def _need(study: io.Study, settings: Settings) -> float:
 def _row(result: Any, name: str, chosen: Namespace) -> Row:
     """Return a study's row, where files are named as they were typed, not by the full paths that workers are given."""
     row: Row = row_of_fault(name, result) if isinstance(result, TomomeshError) else result
-    relative = not any(Path(path).is_absolute() for path in (chosen.study, chosen.output))
-    return row | {"error": row["error"].replace(printable(f"{Path.cwd()}/"), "")} if relative else row
+    for path in map(Path, (chosen.study, chosen.output)):
+        if not path.is_absolute():
+            full, typed = (printable(str(one)) for one in (Path.cwd() / path, path))
+            error = row["error"].replace(f"{full}/", "" if path == Path() else f"{typed}/")
+            row = row | {"error": error.replace(full, typed)}
+    return row
 
 
 def check_workers(chosen: Namespace) -> None:
@@ -141,12 +147,13 @@ class _Shown:
     """What is shown of studies that are worked on at once."""
 
     def __init__(self, batch: Batch, bars: Bars) -> None:
-        self._batch, self._bars, self._done = batch, bars, 0
+        self._batch, self._bars = batch, bars
         self._underway: dict[int, str] = {}
+        self._over: set[int] = set()
         bars("studies", 0, len(batch.studies))
 
     def hear(self, number: int, stage: str, done: int, total: int) -> None:
-        """Take note of where a study is; called from a thread of Dask's."""
+        """Take note of where a study is; called from a thread of Dask's, also when the study is over."""
         self._underway[number] = f"{printable(self._batch.studies[number].name)} {stage} {done}/{total}"
         self._tell()
 
@@ -158,11 +165,10 @@ class _Shown:
 
     def over(self, number: int) -> None:
         """Count a study that is over."""
-        self._underway.pop(number, None)
-        self._done += 1
+        self._over.add(number)
         self._tell()
-        self._bars("studies", self._done, len(self._batch.studies))
+        self._bars("studies", len(self._over), len(self._batch.studies))
 
     def _tell(self) -> None:
-        words = [words for _, words in sorted(self._underway.copy().items())]
-        self._bars.beside("; ".join(words[:NAMED] + [f"{len(words) - NAMED} more"] * (len(words) > NAMED)))
+        words = [words for number, words in sorted(self._underway.copy().items()) if number not in self._over]
+        self._bars.beside = "; ".join(words[:NAMED] + [f"{len(words) - NAMED} more"] * (len(words) > NAMED))

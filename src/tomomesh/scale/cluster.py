@@ -95,16 +95,17 @@ def local(workers: int) -> Iterator[Cluster]:
     with ExitStack() as stack:
         stack.enter_context(_unheard())
         stack.enter_context(_configured(threads, stack.enter_context(private_folder())))
-        with _deaf_children():
+        with _deaf_children(), _starting():
             here = LocalCluster(
                 n_workers=0, threads_per_worker=1, host=LOOPBACK, security=True, memory_limit=0,
                 silence_logs=logging.CRITICAL,
                 dashboard_address=f"{LOOPBACK}:0", scheduler_kwargs={"dashboard": False},
             )  # fmt: skip
         stack.callback(_end, here)
-        here.scale(workers)
-        client = stack.enter_context(Client(here, set_as_default=False))
-        _require_one(client)
+        with _starting():
+            here.scale(workers)
+            client = stack.enter_context(Client(here, set_as_default=False))
+            client.wait_for_workers(1, timeout=START_S)
         yield Cluster(client, {LOOPBACK: workers}, free_memory() / workers, math.inf, pooled=True)
 
 
@@ -128,17 +129,25 @@ def connected(scheduler: str) -> Iterator[Cluster]:
     with _unheard():
         client = _client(scheduler)
         try:
-            client.wait_for_workers(1)  # those of a queue may come in hours
-            workers = client.scheduler_info(n_workers=-1)["workers"].values()
-            limits = [(one["memory_limit"] or math.inf, one["nthreads"]) for one in workers]
-            at_once = Counter[str]()
-            for one in workers:
-                at_once[one["host"]] += one["nthreads"]
-            share, most = min(limit / tasks for limit, tasks in limits), max(limit for limit, _ in limits)
-            yield Cluster(client, dict(at_once), share, most, pooled=False)
+            yield _cluster_of(client, scheduler)
         finally:
             with suppress(OSError):
                 client.close(timeout=1)
+
+
+def _cluster_of(client: Any, scheduler: str) -> Cluster:
+    """Return the workers of a scheduler; the first may come in hours, where there is a queue."""
+    try:
+        client.wait_for_workers(1)
+        workers = client.scheduler_info(n_workers=-1)["workers"].values()
+    except OSError:
+        raise UnreadableError("the scheduler is gone", file=scheduler) from None
+    limits = [(one["memory_limit"] or math.inf, one["nthreads"]) for one in workers]
+    at_once = Counter[str]()
+    for one in workers:
+        at_once[one["host"]] += one["nthreads"]
+    share, most = min(limit / tasks for limit, tasks in limits), max(limit for limit, _ in limits)
+    return Cluster(client, dict(at_once), share, most, pooled=False)
 
 
 def required() -> None:
@@ -176,10 +185,11 @@ def _client(scheduler: str) -> Any:
         ) from None  # fmt: skip
 
 
-def _require_one(client: Any) -> None:
+@contextmanager
+def _starting() -> Iterator[None]:
     try:
-        client.wait_for_workers(1, timeout=START_S)
-    except TimeoutError:
+        yield
+    except (OSError, RuntimeError):  # no time, no room for processes, no place to listen at
         raise ResourceError("no worker could be started", hint="fewer --workers, or none") from None
 
 
