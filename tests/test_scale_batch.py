@@ -7,7 +7,6 @@ import json
 import logging
 import math
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -24,15 +23,9 @@ from hypothesis import strategies as st
 from conftest import law
 from studies import write_nifti
 from tomomesh.cli import main
-
-dask = pytest.importorskip("dask", reason="the extra `scale` is not installed")
-distributed = pytest.importorskip("distributed", reason="the extra `scale` is not installed")
-pytest.importorskip("cryptography", reason="the extra `scale` is not installed")
-psutil = pytest.importorskip("psutil", reason="it comes with distributed")
-
-from tomomesh.kernels.threads import cores  # noqa: E402
-from tomomesh.scale.cluster import Cluster  # noqa: E402
-from tomomesh.scale.tasks import Tasks  # noqa: E402
+from tomomesh.kernels.threads import cores
+from tomomesh.scale.cluster import Cluster
+from tomomesh.scale.tasks import Tasks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -41,10 +34,14 @@ if TYPE_CHECKING:
 
     from tomomesh.scale.tasks import Told
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are killed by signals")
+dask = pytest.importorskip("dask", reason="the extra `scale` is not installed")
+distributed = pytest.importorskip("distributed", reason="the extra `scale` is not installed")
+pytest.importorskip("cryptography", reason="the extra `scale` is not installed")
+psutil = pytest.importorskip("psutil", reason="it comes with distributed")
+resource = pytest.importorskip("resource", reason="workers are killed by signals, which this system lacks")
 
 OPTIONS = ["--each", "--lower", "50", "--format", "ply"]
-STUDIES = 3
+STUDIES, MANY = 3, 20
 WAIT_S = 60.0
 """Most that processes may take to end on a busy machine."""
 
@@ -52,11 +49,15 @@ WAIT_S = 60.0
 @pytest.fixture(scope="module")
 def here(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """Two worker processes on loopback; one death is enough for Dask to hand a task back."""
-    scratch = str(tmp_path_factory.mktemp("scratch"))
+    settings = {
+        "distributed.scheduler.allowed-failures": 0,
+        "distributed.scheduler.worker-saturation": 1.0,
+        "temporary-directory": str(tmp_path_factory.mktemp("scratch")),
+    }
     with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-saturation": 1.0}),
+        dask.config.set(settings),
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, host="127.0.0.1", memory_limit=0, local_directory=scratch,
+            n_workers=2, threads_per_worker=1, host="127.0.0.1", memory_limit=0,
             silence_logs=logging.CRITICAL, dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},
         ) as made,
     ):  # fmt: skip
@@ -252,6 +253,8 @@ class TestFaults:
     ) -> None:
         from tomomesh.cli import summary
 
+        for number in range(MANY):
+            write_nifti(folder / f"t{number}.nii", ball(14), np.eye(4))
         with scheduler_and_worker(tmp_path) as (scheduler, file):
             told = summary.of_row
 
@@ -264,7 +267,7 @@ class TestFaults:
         said = capsys.readouterr().err.splitlines()
         assert said[-1].startswith("error: the scheduler is gone. Try: the same command again")
         assert "distributed" not in "".join(said)
-        assert 1 <= len(table(folder, "out")) < STUDIES + 1
+        assert 1 <= len(table(folder, "out")) < MANY
 
 
 def _blind(name: str) -> None:
@@ -282,19 +285,19 @@ class scheduler_and_worker:  # noqa: N801
     """A scheduler and a worker of its own, in processes that can be killed."""
 
     def __init__(self, folder: Path) -> None:
-        self._file = folder / "scheduler.json"
+        self._file, self._env = folder / "scheduler.json", {**os.environ, "TMPDIR": str(folder)}
         common = ["--scheduler-file", str(self._file), "--no-dashboard"]
         self._lines = (
             ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", *common],
-            ["distributed.cli.dask_worker", "--host", "127.0.0.1", "--nthreads", "1", "--no-nanny",
-             "--local-directory", str(folder / "scratch"), *common],
+            ["distributed.cli.dask_worker", "--host", "127.0.0.1", "--nthreads", "1", "--no-nanny", *common],
         )  # fmt: skip
 
     def __enter__(self) -> tuple[subprocess.Popen[bytes], Path]:
         self._processes = []
         for module, *options in self._lines:
             line = [sys.executable, "-m", module, *options]
-            self._processes.append(subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+            unheard = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+            self._processes.append(subprocess.Popen(line, env=self._env, **unheard))
             until(self._file.exists)
         return self._processes[0], self._file
 
@@ -424,7 +427,8 @@ class TestOwnWorkers:
         said, heard = started.communicate(timeout=WAIT_S)
         assert started.returncode == 0, heard
         assert heard.splitlines()[0] == "waiting for workers"
-        assert all(line.startswith("studies ") for line in heard.splitlines()[1:])
+        assert heard.splitlines()[1].startswith("headers    12/12")
+        assert all(line.startswith("studies ") for line in heard.splitlines()[2:])
         assert said.count("sound") == 11
         assert self.nothing_left(many, workers)
         assert batch(many, "alone", "--quiet") == 0

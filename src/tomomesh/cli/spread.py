@@ -83,8 +83,8 @@ def spread_rows(batch: Batch) -> Generator[tuple[int, Row]]:
         plain = Namespace(**vars(chosen) | {"study": None, "output": None, "settings": None})
         sent = replace(batch, studies=(), chosen=plain, folder=batch.folder.absolute())
         work = partial(_on_worker, batch=sent, made_by=version("tomomesh"))
-        need = partial(_need, settings=batch.settings)
-        for number, result in Tasks(work, [*map(_absolute, studies)], need, shown.hear, shown.warn).done_on(cluster):
+        tasks = Tasks(work, [*map(_absolute, studies)], shown.need, shown.hear, shown.warn)
+        for number, result in tasks.done_on(cluster):
             shown.over(number)
             with bars.aside():
                 yield number, _row(result, studies[number].name, chosen)
@@ -150,7 +150,15 @@ class _Shown:
         self._batch, self._bars = batch, bars
         self._underway: dict[int, str] = {}
         self._over: set[int] = set()
-        bars("studies", 0, len(batch.studies))
+        self._sized = 0
+
+    def need(self, study: io.Study) -> float:
+        """Return how many bytes a study takes; thousands of headers on a far disk take their time."""
+        size, self._sized = _need(study, self._batch.settings), self._sized + 1
+        self._bars("headers", self._sized, len(self._batch.studies))
+        if self._sized == len(self._batch.studies):
+            self._bars("studies", 0, self._sized)
+        return size
 
     def hear(self, number: int, stage: str, done: int, total: int) -> None:
         """Take note of where a study is; called from a thread of Dask's, also when the study is over."""
