@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -381,6 +382,12 @@ def children_of(process: subprocess.Popen[str]) -> list[Any]:
     return list(psutil.Process(process.pid).children(recursive=True))
 
 
+def line_of(process: Any) -> str:
+    with suppress(psutil.Error):
+        return " ".join(process.cmdline())
+    return ""
+
+
 def addresses(processes: list[Any]) -> set[str]:
     """Return where processes listen."""
     found = (one for process in processes for one in process.net_connections("inet"))
@@ -401,18 +408,22 @@ class TestOwnWorkers:
         return made
 
     @pytest.fixture
-    def started(self, many: Path) -> Iterator[subprocess.Popen[str]]:
-        """Start it, and hand it over when the first study is done."""
-        options = [*OPTIONS, "--workers", "2"]
-        line = [sys.executable, "-m", "tomomesh", "reconstruct", str(many), "-o", str(many.parent / "out"), *options]
+    def starting(self, many: Path) -> Iterator[subprocess.Popen[str]]:
+        line = [sys.executable, "-m", "tomomesh", "reconstruct", str(many), "-o", str(many.parent / "out")]
         with subprocess.Popen(
-            line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=many.parent / "current",
-            env={**os.environ, "TMPDIR": str(many.parent / "temporary")}, start_new_session=True,
+            [*line, *OPTIONS, "--workers", "2"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            cwd=many.parent / "current", env={**os.environ, "TMPDIR": str(many.parent / "temporary")},
+            start_new_session=True,
         ) as process:  # fmt: skip
-            assert process.stdout is not None
-            assert "sound" in process.stdout.readline()
             yield process
             process.kill()
+
+    @pytest.fixture
+    def started(self, starting: subprocess.Popen[str]) -> subprocess.Popen[str]:
+        """Hand it over when the first study is done."""
+        assert starting.stdout is not None
+        assert "sound" in starting.stdout.readline()
+        return starting
 
     def nothing_left(self, many: Path, processes: list[Any]) -> bool:
         """Tell whether processes are gone, and no file is left but whole results."""
@@ -448,6 +459,16 @@ class TestOwnWorkers:
         assert self.nothing_left(many, workers)
         assert 1 <= len(table(many, "out")) < 12
         assert set(codes(many, "out").values()) == {"0"}
+
+    def test_stopped_while_workers_start(self, many: Path, starting: subprocess.Popen[str]) -> None:
+        until(lambda: any("spawn_main" in line_of(child) for child in children_of(starting)))
+        workers = children_of(starting)
+        os.killpg(starting.pid, signal.SIGINT)
+        _, heard = starting.communicate(timeout=WAIT_S)
+        assert starting.returncode == 130
+        assert heard.splitlines() == ["waiting for workers", "", "interrupted; no unfinished file is left"]
+        (many.parent / "out").mkdir()  # it has not been made
+        assert self.nothing_left(many, workers)
 
     def test_killed(self, many: Path, started: subprocess.Popen[str]) -> None:
         workers = children_of(started)

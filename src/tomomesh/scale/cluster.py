@@ -8,11 +8,13 @@ import math
 import os
 import signal
 import sys
+import threading
 import warnings
 from collections import Counter
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,25 +90,32 @@ def local(workers: int) -> Iterator[Cluster]:
     ResourceError
         Where no worker starts.
     """
-    required()
+    with ExitStack() as stack:
+        with _unbroken():
+            required()
+            stack.enter_context(_unheard())
+            stack.enter_context(_configured(max(cores() // workers, 1), stack.enter_context(private_folder())))
+            try:
+                client = _started(workers, stack)
+            except (OSError, RuntimeError):  # no time, no room for processes, no place to listen at
+                raise ResourceError("no worker could be started", hint="fewer --workers, or none") from None
+        yield Cluster(client, {LOOPBACK: workers}, free_memory() / workers, math.inf, pooled=True)
+
+
+def _started(workers: int, stack: ExitStack) -> Any:
+    """Start workers and return their client, as soon as one of them is there."""
     from distributed import Client, LocalCluster
 
-    threads = max(cores() // workers, 1)
-    with ExitStack() as stack:
-        stack.enter_context(_unheard())
-        stack.enter_context(_configured(threads, stack.enter_context(private_folder())))
-        with _deaf_children(), _starting():
-            here = LocalCluster(
-                n_workers=0, threads_per_worker=1, host=LOOPBACK, security=True, memory_limit=0,
-                silence_logs=logging.CRITICAL,
-                dashboard_address=f"{LOOPBACK}:0", scheduler_kwargs={"dashboard": False},
-            )  # fmt: skip
-        stack.callback(_end, here)
-        with _starting():
-            here.scale(workers)
-            client = stack.enter_context(Client(here, set_as_default=False))
-            client.wait_for_workers(1, timeout=START_S)
-        yield Cluster(client, {LOOPBACK: workers}, free_memory() / workers, math.inf, pooled=True)
+    with _deaf_children():
+        here = LocalCluster(
+            n_workers=0, threads_per_worker=1, host=LOOPBACK, security=True, memory_limit=0,
+            silence_logs=logging.CRITICAL, dashboard_address=f"{LOOPBACK}:0", scheduler_kwargs={"dashboard": False},
+        )  # fmt: skip
+    stack.callback(_end, here)
+    here.scale(workers)
+    client = stack.enter_context(Client(here, set_as_default=False))
+    client.wait_for_workers(1, timeout=START_S)
+    return client
 
 
 @contextmanager
@@ -185,22 +194,15 @@ def _client(scheduler: str) -> Any:
         ) from None  # fmt: skip
 
 
-@contextmanager
-def _starting() -> Iterator[None]:
-    try:
-        yield
-    except (OSError, RuntimeError):  # no time, no room for processes, no place to listen at
-        raise ResourceError("no worker could be started", hint="fewer --workers, or none") from None
-
-
 def _end(here: Any) -> None:
     """Kill our own workers: what they write is whole or not there, and to wait for them would take a study's time."""
-    for nanny in here.workers.values():
-        nanny.close_gracefully()
-        if nanny.pid:
-            with suppress(ProcessLookupError):
-                os.kill(nanny.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
-    here.close()
+    with _unbroken():
+        for nanny in here.workers.values():
+            nanny.close_gracefully()
+            if nanny.pid:
+                with suppress(ProcessLookupError):
+                    os.kill(nanny.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+        here.close()
 
 
 @contextmanager
@@ -247,8 +249,28 @@ def _deaf_children() -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return
+    resource_tracker.ensure_running()  # the thread that starts it hears signals again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _unbroken() -> Iterator[None]:
+    """Answer Ctrl-C and SIGTERM at the end of the block: half-started workers cannot be ended, Dask waits for them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in before:
+        signal.signal(number, lambda number, frame: came.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+    for number in came[:1]:
+        signal.raise_signal(number)
