@@ -297,8 +297,8 @@ class scheduler_and_worker:  # noqa: N801
         self._processes = []
         for module, *options in self._lines:
             line = [sys.executable, "-m", module, *options]
-            unheard = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-            self._processes.append(subprocess.Popen(line, env=self._env, **unheard))
+            nowhere = subprocess.DEVNULL
+            self._processes.append(subprocess.Popen(line, env=self._env, stdout=nowhere, stderr=nowhere))
             until(self._file.exists)
         return self._processes[0], self._file
 
