@@ -117,6 +117,7 @@ class Noted(subprocess.Popen):
         threading.Timer(0.2, os.kill, [os.getpid(), signal.SIGINT]).start()
 
 workers.subprocess.Popen = Noted
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 in_blocks(lambda start, stop: renew_projections(), 8, block=1, threads=2)
 """
 

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -409,11 +410,12 @@ class TestOwnWorkers:
 
     @pytest.fixture
     def starting(self, many: Path) -> Iterator[subprocess.Popen[str]]:
+        """Start a batch that SIGINT reaches: a shell's background jobs ignore it."""
         line = [sys.executable, "-m", "tomomesh", "reconstruct", str(many), "-o", str(many.parent / "out")]
         with subprocess.Popen(
             [*line, *OPTIONS, "--workers", "2"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
             cwd=many.parent / "current", env={**os.environ, "TMPDIR": str(many.parent / "temporary")},
-            start_new_session=True,
+            start_new_session=True, preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
         ) as process:  # fmt: skip
             yield process
             process.kill()
