@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law
+from tomomesh.errors import FormatError
 from tomomesh.io import read_mesh
+from tomomesh.io.files.markup import parsed_until, parsed_xml
 from tomomesh.io.meshes.cells import weld
 from tomomesh.io.meshes.frame import frame_of_file
 from tomomesh.io.meshes.obj import read_obj_mesh
@@ -84,3 +86,20 @@ def test_carried_equals_a_product_of_matrices(points: list[tuple[float, float, f
     places, matrix, shift = np.reshape(points, (-1, 3)), rng.normal(size=(3, 3)), rng.normal(size=3)
     np.testing.assert_allclose(carried(places, matrix, shift), places @ matrix + shift, rtol=1e-12, atol=1e-8)
     np.testing.assert_array_equal(carried(places, np.eye(3), np.zeros(3)), places)
+
+
+@pytest.mark.parametrize("number", ["1.0", "1.9", "1e0", "nan", f"{9**30}", f"-{9**30}"])
+def test_a_corner_that_is_no_whole_number_is_refused(number: str) -> None:
+    corners = "1 0 0\n0 1 0\n0 0 1\n"
+    with pytest.raises(FormatError):  # NumPy before 2.4 rounds it
+        read_off(f"OFF\n3 1 0\n{corners}3 0 {number} 2\n".encode(), "m.off")
+    with pytest.raises(FormatError):
+        read_obj_mesh(("v " + corners.replace("\n", "\nv ") + f"0 0 0\nf 1 {number}/2 3\n").encode(), "m.obj")
+
+
+@pytest.mark.parametrize("code", ["utf-8", "utf-16", "utf-16-le", "utf-16-be"])
+def test_a_document_type_is_refused_in_whatever_letters(code: str) -> None:
+    text = f'<?xml version="1.0" encoding="{code[:6].rstrip("-")}"?><!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'
+    for parsed in (parsed_xml, lambda text, file: parsed_until("a", text, file)):
+        with pytest.raises(FormatError, match="document type"):
+            parsed(text.encode(code), "m")

@@ -26,10 +26,13 @@ def places() -> NDArray[np.float64]:
     return np.asarray(np.moveaxis(np.indices((SIDE, SIDE, SIDE)), 0, -1) - np.array([19.6, 19.3, 19.9]))
 
 
-def kept(mask: NDArray[np.bool_]) -> float:
+def kept(mask: NDArray[np.bool_], stiffness: float = 0.25) -> float:
     """Return the share of its voxels' volume that a mask keeps."""
-    mesh = reconstruct(Volume.from_stored(mask.astype(np.uint8), np.eye(4)), select=(1,), way="voxels").mesh
+    volume = Volume.from_stored(mask.astype(np.uint8), np.eye(4))
+    found = reconstruct(volume, select=(1,), way="voxels", stiffness=stiffness)
+    mesh = found.mesh
     check_promise(mesh)
+    assert found.report["fit"]["converged"]
     return float(mesh.face_volumes.sum()) / np.count_nonzero(mask)
 
 
@@ -38,6 +41,14 @@ def test_rods_along_an_axis(wide: int) -> None:
     mask = np.zeros((SIDE, SIDE, SIDE), bool)
     mask[6:34, 20 : 20 + wide, 20 : 20 + wide] = True
     assert 0.88 <= kept(mask) <= 1.02
+
+
+@pytest.mark.parametrize("stiffness", [0, 1e-300, 1e-12, 1e-4, 0.003, 0.01, 0.02])
+def test_soft_nets_keep_what_is_one_voxel_thin(stiffness: float) -> None:
+    rod, leaf = np.zeros((2, 20, 20, 20), bool)
+    rod[3:17, 9, 9] = leaf[9, 3:17, 3:17] = True
+    assert 0.85 <= kept(rod, stiffness) <= 1.1
+    assert 0.98 <= kept(leaf, stiffness) <= 1.02
 
 
 @given(direction=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda d: np.linalg.norm(d) > 0.3), radius=st.floats(1.2, 3))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
+import warnings
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -164,7 +165,9 @@ def numbers_of(lines: Sequence[str], columns: Sequence[int], kind: type) -> NDAr
     """
     if not lines:
         return np.empty((0, len(columns)), kind)
-    return np.loadtxt(lines, kind, comments=None, usecols=columns, ndmin=2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)  # NumPy before 2.4 takes 1.9 for the whole number 1
+        return np.loadtxt(lines, kind, comments=None, usecols=columns, ndmin=2)
 
 
 def lists_of(lines: Sequence[str], sizes: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -15,7 +15,7 @@ from ..kernels.threads import in_blocks
 from ..model.trace import Motion
 from ..progress import Progress, silent
 from .means import BLOCK, means
-from .rings import Rings, resistance
+from .rings import SOFTEST, Rings, resistance
 from .thin import GIVEN_BACK, given_back
 from .well_composed import CORNERS, surface_cells
 
@@ -244,15 +244,15 @@ class _NetSteps:
         springs = 4 * self.bending if self.bending else 2 * TENSION * self.settings.stiffness
         if not self.of_mask:
             return min(1.0, SAFE * 2 / (1 + springs)), 0.0
-        most, least = 1 + springs, float(resistance(np.linspace(0, 2, 201), self.bending).min())
+        most, least = 1 + springs, float(resistance(np.linspace(0, 2, 201), max(self.bending, SOFTEST)).min())
         over = 2 / (1 + np.sqrt(1 - ((most - least) / (most + least)) ** 2))
         return over * 2 / (most + least), over - 1
 
     def _evened(self, state: _NetState) -> _NetState:
         """Let the net begin where it would rest but for its cells, drawn out where the mask is thin."""
-        place, goals = self._within(state.goals), state.goals.copy()
+        place, goals, weak = self._within(state.goals), state.goals.copy(), min(self.bending / SOFTEST, 1.0)
         for _ in range(GIVEN_BACK if self.crossings.thin.any() else 0):
-            self._draw_out(goals, given_back(self.net, self.crossings, place, self.threads))
+            self._draw_out(goals, weak * given_back(self.net, self.crossings, place, self.threads))
             place = self._within(goals)
         return _NetState(place, place.copy(), goals)
 
@@ -265,5 +265,5 @@ class _NetSteps:
 
     def _within(self, goals: Floats) -> Floats:
         """Return where the net would rest that is drawn to goals (n, 3), in its cells."""
-        place = self.rings.evened(goals, self.bending)
+        place = self.rings.evened(goals, max(self.bending, SOFTEST))
         return np.clip(place, self.net.low + MARGIN, self.net.low + (1 - MARGIN), out=place)

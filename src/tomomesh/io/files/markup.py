@@ -45,5 +45,7 @@ def parsed_until(tag: str, text: bytes, file: str) -> Any:
 
 
 def _check_types(text: bytes, file: str) -> None:
+    if b"\0" in text[:4]:  # UTF-16, which has a zero beside each letter
+        text = text.replace(b"\0", b"")
     if b"<!DOCTYPE" in text[:LONGEST_PROLOG] or b"<!ENTITY" in text:
         raise FormatError("the XML declares a document type", file=file, expected="none, as the format has it")
