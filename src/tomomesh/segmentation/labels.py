@@ -7,17 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import EmptyError, UsageError
+from ..errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from ..model.volume import Volume
 
-NAMED = 24
-"""Labels that are named where one is missing, at most. So that an error stays a line."""
 MOST = 4096
 """Labels over which a label map is doubted. A warning's threshold, chosen: maps at hand have 2 to 54."""
 HIGHEST_LABEL = 2**16
@@ -65,44 +61,12 @@ def _no_labels(found: str) -> UsageError:
     return UsageError("the labels are no whole numbers", found=found, expected="a label map of one layer")
 
 
-def select(labels: Volume, wanted: Sequence[int]) -> NDArray[np.bool_]:
-    """Keep the voxels of some labels.
-
-    Parameters
-    ----------
-    labels : Volume
-        Of `whole`.
-    wanted : sequence of int
-
-    Returns
-    -------
-    (K, J, I) bool array
-
-    Raises
-    ------
-    EmptyError
-        Where it lacks a label; names those that it has.
-    """
-    voxels = labels.voxels
-    present = np.unique(voxels).astype(np.int64)
-    missing = np.setdiff1d(wanted, present)
-    if len(missing):
-        named = ", ".join(map(str, present[:NAMED])) + (", ..." if len(present) > NAMED else "")
-        raise EmptyError(
-            "the label map has no such label", found=f"--select = {', '.join(map(str, missing))}",
-            expected=f"labels among {named}",
-        )  # fmt: skip
-    return np.ascontiguousarray(np.isin(voxels, wanted))
-
-
-def doubted(labels: Volume) -> str:
-    """Say why a volume may be no label map: a study's gray levels can be taken for labels."""
-    voxels = labels.voxels
+def doubted(labels: Volume, count: int) -> str:
+    """Say why a volume of so many labels may be no label map: a study's gray levels can be taken for labels."""
     if labels.unit == "HU":
         return "labels were chosen in a study in Hounsfield units: --lower and --upper choose gray levels"
-    if voxels.dtype.kind == "f":
-        return f"the label map holds {voxels.dtype} numbers: it may be a study of gray levels"
-    count = len(np.unique(voxels))
+    if labels.voxels.dtype.kind == "f":
+        return f"the label map holds {labels.voxels.dtype} numbers: it may be a study of gray levels"
     return f"the label map has {count} labels: it may be a study of gray levels" if count > MOST else ""
 
 
