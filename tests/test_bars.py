@@ -93,3 +93,25 @@ class TestBars:
             for done in range(100):
                 progress("fit", done, 100)
             assert lines.getvalue() == ""
+
+    def test_what_stands_beside_is_said_with_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        for screen in (Terminal(), io.StringIO()):
+            monkeypatch.setattr(sys, "stderr", screen)
+            with Bars() as progress:
+                progress("studies", 0, 1)
+                progress.beside = "head fit 3/30"
+                progress("studies", 1, 1)
+            assert screen.getvalue().rstrip().endswith(", head fit 3/30")
+
+    def test_it_is_put_away_while_something_else_is_printed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        screen = Terminal()
+        monkeypatch.setattr(sys, "stderr", screen)
+        with Bars() as progress:
+            progress("studies", 0, 2)
+            with progress.aside():
+                before = screen.getvalue()
+                screen.write("a line\n")
+            _, _, after = screen.getvalue().partition("a line\n")
+        assert before.endswith("\r")
+        assert before.split("\r")[-2].strip() == ""
+        assert "studies" in after

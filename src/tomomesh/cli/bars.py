@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import sys
 import time
+from contextlib import contextmanager, nullcontext
 from threading import Event, Lock, Thread
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Iterator
+    from contextlib import AbstractContextManager
     from types import TracebackType
     from typing import NoReturn
 
     from tqdm import tqdm
 
-FORMAT = "{desc} {bar:30} {n_fmt}/{total_fmt} {elapsed}"
+FORMAT = "{desc} {bar:30} {n_fmt}/{total_fmt} {elapsed}{postfix}"
 TICK = 1.0
 """Seconds from one look at the clock to the next: it counts in whole seconds."""
 EVERY = 10.0
@@ -29,6 +33,8 @@ class Bars:
         self._stage = ""
         self._since = self._said = 0.0
         self._done = self._total = 0
+        self.beside = ""
+        """A text that is shown behind the clock, from the next look at it on; any thread may set it."""
         self._bar: tqdm[NoReturn] | None = None
         self._drawing, self._left = Lock(), Event()
 
@@ -52,6 +58,16 @@ class Bars:
         with self._drawing:
             self._show(stage, done, total)
 
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """Put the bar away while something else is printed."""
+        with self._drawing:
+            if self._bar is not None:
+                self._bar.clear(nolock=True)
+            yield
+            if self._bar is not None:
+                self._bar.refresh(nolock=True)
+
     def _tick(self) -> None:
         """Let the clock go on while a stage reports nothing.
 
@@ -60,6 +76,7 @@ class Bars:
         while not self._left.wait(TICK):
             with self._drawing:
                 if self._bar is not None:
+                    self._bar.set_postfix_str(self.beside, refresh=False)
                     self._bar.refresh(nolock=True)
                 elif self._done < self._total and time.perf_counter() - self._said >= EVERY:
                     self._say()
@@ -73,13 +90,15 @@ class Bars:
         self._done, self._total = done, total
         if self._bar is not None:
             self._bar.total = total
+            self._bar.set_postfix_str(self.beside, refresh=False)
             self._bar.update(done - self._bar.n)
         elif done == total:
             self._say()
 
     def _say(self) -> None:
         self._said = time.perf_counter()
-        line = f"{self._stage:10s} {self._done}/{self._total} {self._said - self._since:.1f} s"
+        beside = f", {self.beside}" if self.beside else ""
+        line = f"{self._stage:10s} {self._done}/{self._total} {self._said - self._since:.1f} s{beside}"
         print(line, file=sys.stderr, flush=True)
 
     def _close(self) -> None:
@@ -93,3 +112,9 @@ def _bar_of(stage: str, total: int) -> tqdm[NoReturn]:
     from tqdm import tqdm
 
     return tqdm(total=total, desc=f"{stage:10s}", bar_format=FORMAT)
+
+
+def bars_of(chosen: Namespace) -> AbstractContextManager[Any]:
+    """Return what shows the progress of a study: bars here, or whatever tells it to another process."""
+    told = getattr(chosen, "told", None)
+    return Bars(quiet=chosen.quiet) if told is None else nullcontext(told)

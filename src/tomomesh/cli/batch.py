@@ -1,4 +1,4 @@
-"""Many studies, one after the other, with the same settings."""
+"""Many studies with the same settings: one after the other, or several at once."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import os
 import sys
 import time
 from argparse import Namespace
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +17,15 @@ from ..errors import BatchError, UsageError, printable
 from . import summary
 from .faults import as_error
 from .outputs.checks import check_files, check_folder, check_frame, make_folder
-from .records import COLUMNS, finished, record_of, row_of
+from .records import COLUMNS, finished, record_of, row_of, row_of_fault
+from .spread import Batch, check_workers, spread_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Generator
 
     from ..results import Surface
     from ..settings import Settings
+    from .records import Row
 
     Work = Callable[[Namespace, Settings], Surface]
 
@@ -52,23 +56,42 @@ def reconstruct_each(chosen: Namespace, settings: Settings, work: Work) -> None:
     """
     folder = _checked(chosen, settings)
     studies = io.find_studies(chosen.study, without=[folder], series=settings.read.series)
-    make_folder(folder)
-    rows: list[dict[str, Any]] = []
-    try:
-        for number, study in enumerate(studies, 1):
-            place = printable(f"{number}/{len(studies)} {study.name}")
-            if not chosen.quiet:
-                print(place, file=sys.stderr)
-            rows.append(_done(study, chosen, settings, folder, work))
-            if not (chosen.quiet or chosen.json):
-                print(summary.of_row(place, rows[-1]), flush=True)
-    finally:
-        io.write_table(rows, COLUMNS, folder / TABLE)
+    batch = Batch(studies, chosen, settings, folder, partial(_done, work=work))
+    rows = _rows(batch)
     if chosen.save_settings:
         io.write_settings(settings, chosen.save_settings)
     if chosen.json:
         print(json.dumps(rows, indent=2))
     _tell_failures(chosen, rows)
+
+
+def _rows(batch: Batch) -> list[Row]:
+    """Do all studies, and write the table of those that were done, whatever ends the work."""
+    chosen = batch.chosen
+    found: dict[int, Row] = {}
+    try:
+        with closing(spread_rows(batch) if chosen.workers or chosen.scheduler else _rows_in_turn(batch)) as coming:
+            for number, row in coming:
+                found[number] = row
+                if not (chosen.quiet or chosen.json):
+                    print(summary.of_row(batch.place(number), row), flush=True)
+    finally:
+        rows = [found[number] for number in sorted(found)]
+        if rows:
+            io.write_table(rows, COLUMNS, batch.folder / TABLE)
+    return rows
+
+
+def refuse_for_one(chosen: Namespace) -> None:
+    """Refuse what is for many studies, where there is one.
+
+    Raises
+    ------
+    UsageError
+    """
+    given = [name for name in ("force", "workers", "scheduler") if getattr(chosen, name) not in (None, False)]
+    if given:
+        raise UsageError("this option is for many studies", found=f"--{given[0]} without --each", hint="--each")
 
 
 def _checked(chosen: Namespace, settings: Settings) -> Path:
@@ -78,6 +101,7 @@ def _checked(chosen: Namespace, settings: Settings) -> Path:
         raise UsageError("this option is for one study", found=f"{single[0]} with --each", hint="no --each")
     if not isinstance(chosen.study, str):
         raise UsageError("there is no folder of studies", expected="one STUDY, with --each")
+    check_workers(chosen)
     if chosen.output == "-" or os.path.realpath(chosen.output) == os.path.realpath(chosen.study):
         raise UsageError("--each writes into a folder of its own", file=chosen.output, hint="another folder")
     if Path(chosen.output).is_file():
@@ -87,7 +111,16 @@ def _checked(chosen: Namespace, settings: Settings) -> Path:
     return check_folder(chosen.output)
 
 
-def _done(study: io.Study, chosen: Namespace, settings: Settings, folder: Path, work: Work) -> dict[str, Any]:
+def _rows_in_turn(batch: Batch) -> Generator[tuple[int, Row]]:
+    """Yield the number of each study, from 0, and its row, one after the other."""
+    make_folder(batch.folder)
+    for number, study in enumerate(batch.studies):
+        if not batch.chosen.quiet:
+            print(batch.place(number), file=sys.stderr)
+        yield number, batch.done(study, batch.chosen, batch.settings, batch.folder)
+
+
+def _done(study: io.Study, chosen: Namespace, settings: Settings, folder: Path, work: Work) -> Row:
     """Return a study's row: of its report, or of its fault; of a fault only words are kept, not what it holds on to."""
     try:
         asked = settings if study.series is None else settings.replace(series=study.series)
@@ -100,8 +133,7 @@ def _done(study: io.Study, chosen: Namespace, settings: Settings, folder: Path, 
     except BrokenPipeError:
         raise
     except Exception as fault:
-        error = as_error(fault)
-        return {"name": study.name, "exit_code": error.exit_code, "error": str(error)}
+        return row_of_fault(study.name, as_error(fault))
 
 
 def _worked(
@@ -117,7 +149,7 @@ def _worked(
     return report
 
 
-def _tell_failures(chosen: Namespace, rows: list[dict[str, Any]]) -> None:
+def _tell_failures(chosen: Namespace, rows: list[Row]) -> None:
     failed = [row for row in rows if row["exit_code"]]
     if not (chosen.quiet or chosen.json):
         print(printable(summary.of_batch(rows, chosen.output)))

@@ -13,8 +13,8 @@ from ..errors import UsageError, printable
 from ..settings import Settings, option_of, parameters
 from . import summary
 from .against import compared, is_mesh
-from .bars import Bars
-from .batch import reconstruct_each
+from .bars import Bars, bars_of
+from .batch import reconstruct_each, refuse_for_one
 from .options.likely import require_kind
 from .outputs.checks import (
     OF_STUDIES,
@@ -94,8 +94,7 @@ def _reconstruct(chosen: Namespace) -> None:
     if chosen.each:
         reconstruct_each(chosen, settings, _reconstruct_one)
         return
-    if chosen.force:
-        raise UsageError("--force is for a batch", found="--force without --each")
+    refuse_for_one(chosen)
     surface = _reconstruct_one(chosen, settings)
     _tell(chosen, surface.report, summary.of_surface(surface.report, _shown(chosen)))
 
@@ -110,7 +109,7 @@ def _reconstruct_one(chosen: Namespace, settings: Settings) -> Surface:
         check_archive(chosen, volume)
         return volume, labels
 
-    with Bars(quiet=chosen.quiet) as progress:
+    with bars_of(chosen) as progress:
         if chosen.figures or chosen.labels or chosen.mask_out:
             volume, labels = read()
             surface = reconstruct(volume, settings, labels=labels, progress=progress, **given_of(chosen))

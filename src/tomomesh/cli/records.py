@@ -11,7 +11,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from ..errors import TomomeshError
     from ..settings import Settings
+
+    Row = dict[str, Any]
 
 COLUMNS = (
     "name", "exit_code", "error", "seconds", "vertices", "faces", "components", "cavities", "genus", "sound",
@@ -50,7 +53,12 @@ def _digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def row_of(name: str, report: Mapping[str, Any]) -> dict[str, Any]:
+def row_of_fault(name: str, error: TomomeshError) -> Row:
+    """Return the row of a study that has no mesh; only words are kept of a fault, not what it holds on to."""
+    return {"name": name, "exit_code": error.exit_code, "error": str(error)}
+
+
+def row_of(name: str, report: Mapping[str, Any]) -> Row:
     """Return the row of a study that was reconstructed."""
     return {
         **{column: report["quality"].get(column) for column in COLUMNS},

@@ -20,6 +20,7 @@ from .studies.folder import Study, find_studies
 from .studies.label_names import label_names
 from .studies.listing import list_series
 from .studies.read import VOLUME_READERS, read_volume
+from .studies.size import voxel_bytes
 from .volumes.images import read_picture
 from .volumes.labels import LABEL_WRITERS, write_labels
 
@@ -54,6 +55,7 @@ __all__ = [
     "read_settings",
     "read_volume",
     "replacing",
+    "voxel_bytes",
     "write_document",
     "write_encapsulated",
     "write_labels",

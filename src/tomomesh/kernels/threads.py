@@ -13,8 +13,20 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+_share = 0
 _working = threading.local()
 """Knows the threads of a pool: what they share out themselves they do alone, or all would wait for each other."""
+
+
+def cores() -> int:
+    """Return how many cores the work of this process is for: all, or its share of them."""
+    return _share or os.cpu_count() or 1
+
+
+def share_cores(count: int) -> None:
+    """Leave the other cores to other processes that work beside this one; 0 takes them back."""
+    global _share
+    _share = count
 
 
 def in_blocks(
@@ -34,12 +46,12 @@ def in_blocks(
     total, block : int
         Amount of work, and how much of it one call takes: at most 100 ms, so that Ctrl-C answers at once.
     threads : int
-        0 is one a core.
+        0 is one for each of our `cores`.
     done : callable
         Told how much is finished after each block, from the calling thread; may raise to stop the work.
     """
     starts = range(0, total, max(block, 1))
-    workers = min(threads or os.cpu_count() or 1, len(starts))
+    workers = min(threads or cores(), len(starts))
     if workers <= 1 or getattr(_working, "here", False):
         for start in starts:
             work(start, min(start + block, total))

@@ -48,8 +48,8 @@ def require_room_for_points(count: int, *, each: int = SETTLED) -> None:
     if each * count >= room:
         raise ResourceError(
             "the points would not fit into the memory",
-            found=f"{count} points need {_size(each * count)}",
-            expected=f"at most {_size(room)}",
+            found=f"{count} points need {bytes_in_words(each * count)}",
+            expected=f"at most {bytes_in_words(room)}",
             hint="fewer points, or a machine with more memory",
         )
 
@@ -81,8 +81,8 @@ def require_room(count: int, samples: Samples, cell: NDArray[np.float64]) -> Non
     need = MEASURED * count + min(math.sqrt(FACE * faces) / edge, MOST) ** 2
     raise ResourceError(
         "the surface would not fit into the memory",
-        found=f"cell = {edge:.4g} needs {_size(need)}",
-        expected=f"at most {_size(room)}, so a cell of at least {_rounded_up(least)}",
+        found=f"cell = {edge:.4g} needs {bytes_in_words(need)}",
+        expected=f"at most {bytes_in_words(room)}, so a cell of at least {_rounded_up(least)}",
         hint="a larger --cell, or a machine with more memory",
     )
 
@@ -160,7 +160,7 @@ def _lines(path: Path) -> list[str]:
         return []
 
 
-def _size(size: float) -> str:
+def bytes_in_words(size: float) -> str:
     """Put a number of bytes into words."""
     power = min(int(math.log2(max(size, 1.0)) // 10), len(UNITS) - 1)
     return f"{size / 1024**power:.3g} {UNITS[power]}"

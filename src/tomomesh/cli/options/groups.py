@@ -55,6 +55,15 @@ def add_each(parser: argparse.ArgumentParser) -> None:
         "report NAME.json, and all in reports.csv; what is finished is passed over",
     )
     group.add_argument("--force", action="store_true", help="reconstruct again what is finished")
+    group.add_argument(
+        "--workers", type=int, metavar="N", help="work on N studies at once, each in a process of its own, with Dask"
+    )
+    group.add_argument(
+        "--scheduler",
+        metavar="ADDRESS|FILE",
+        help="work on as many studies at once as a Dask cluster has threads: its scheduler's address, or the file that "
+        "the scheduler wrote; its machines see the same folders",
+    )
 
 
 def add_outputs(parser: argparse.ArgumentParser, *files: str) -> Any:

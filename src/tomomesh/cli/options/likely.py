@@ -40,7 +40,7 @@ USUAL = {
     "keep": ("keep-largest", "largest-component", "lcc", "remove-islands", "islands", "min-size"),
     "fill-holes": ("close-holes", "hole-size", "fill"),
     "edge": ("edge-length", "mesh-size", "max-edge"),
-    "threads": ("jobs", "cores", "workers", "n-jobs"),
+    "threads": ("jobs", "cores", "n-jobs"),
     "neurons": ("nodes", "n-neurons"),
     "epochs": ("iter", "n-iter"),
     "seed": ("random-state", "random-seed"),

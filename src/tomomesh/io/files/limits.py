@@ -3,11 +3,42 @@
 from __future__ import annotations
 
 import os
+from contextvars import ContextVar
+from typing import TYPE_CHECKING
 
-from ...errors import FormatError, ResourceError
+from ...errors import FormatError, ResourceError, TomomeshError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 FALLBACK_BYTES = 16 * 2**30
 """The limit where the machine does not say how much memory it has, as Windows does not: that of a usual workstation."""
+
+_asked = ContextVar("_asked", default=False)
+
+
+class _Promise(BaseException):
+    """Ends the reading of what was only to tell its size; no reader takes it for a fault of the file."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+
+
+def promised_by(read: Callable[[], object]) -> int:
+    """Return how many bytes the data take that are read, as their header promises: none of them is read.
+
+    0 where nothing is promised, or the header is at fault, which is told when they are read.
+    """
+    asked = _asked.set(True)
+    try:
+        read()
+    except _Promise as promise:
+        return promise.size
+    except TomomeshError:
+        return 0
+    finally:
+        _asked.reset(asked)
+    return 0
 
 
 def require_memory(promised: int, *, file: str) -> None:
@@ -18,6 +49,8 @@ def require_memory(promised: int, *, file: str) -> None:
     ResourceError
         Where `promised` bytes are more than the physical memory.
     """
+    if _asked.get():
+        raise _Promise(promised)
     memory = physical_memory()
     if promised > memory:
         raise ResourceError(

@@ -11,6 +11,7 @@ from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..threads import cores
 from .code import Code, keep
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def _can_start() -> bool:
 
 
 def _hire() -> None:
-    for _ in range(min(os.cpu_count() or 1, len(_waiting)) - len(_threads)):
+    for _ in range(min(cores(), len(_waiting)) - len(_threads)):
         thread = threading.Thread(target=_work, daemon=True)
         _threads.add(thread)
         thread.start()

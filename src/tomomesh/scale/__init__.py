@@ -1,0 +1,1 @@
+"""Work for many processes and machines, on Dask: no scheduler, queue or wire of our own."""
