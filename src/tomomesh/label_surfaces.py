@@ -37,8 +37,7 @@ class LabelSurfaces(Mapping[int, "Surface"]):
         self, read: Callable[[], tuple[Volume, Volume | None]], settings: Settings, progress: Progress = silent,
         given: Mapping[str, Any] | None = None, *, kept: bool = True,
     ) -> None:  # fmt: skip
-        self._settings, self._given, self._kept = settings, given or {}, kept
-        self.progress = progress
+        self._settings, self._given, self._kept, self._progress = settings, given or {}, kept, progress
         self._study = laid_out(*read(), settings, progress, labelled=True)
         self._numbers = settings.window.select or self._all()
 
@@ -57,8 +56,12 @@ class LabelSurfaces(Mapping[int, "Surface"]):
 
     def __getitem__(self, number: int) -> Surface:
         """Return the surface that `tomomesh.reconstruct` makes with ``select=(number,)``; raises as it does."""
+        return self.surface(number, self._progress)
+
+    def surface(self, number: int, progress: Progress) -> Surface:
+        """Return the same, with a progress of its own."""
         settings = self._settings.replace(select=(number,))
-        return reconstructed(lambda: self._study, settings, self._given, self.progress, kept=self._kept)
+        return reconstructed(lambda: self._study, settings, self._given, progress, kept=self._kept)
 
 
 def reconstruct_labels(
