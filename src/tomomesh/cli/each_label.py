@@ -60,7 +60,7 @@ def reconstruct_each_label(chosen: Namespace, settings: Settings, given: Mapping
     sources = sources_of(chosen, settings)
     folder = check_results(OPTION, chosen, settings)
     names = names_of(chosen.label_names, chosen.labels_in or chosen.study)
-    numbers, make = _labels(chosen, settings, given, work, names)
+    numbers, make = _labels(chosen, settings, given, work)
     files = tuple(file for source in sources for file in io.files_of(Path(source)))
     studies = [io.Study(_file_name(number, names), Path(sources[0]), None, files) for number in numbers]
     labels = {study.name: number for study, number in zip(studies, numbers, strict=True)}
@@ -91,9 +91,7 @@ class _Done:
         return done(study, chosen, settings, folder, lambda *asked: self.make(number, *asked)) | label
 
 
-def _labels(
-    chosen: Namespace, settings: Settings, given: Mapping[str, Any], work: Work, names: Mapping[int, str]
-) -> Made:
+def _labels(chosen: Namespace, settings: Settings, given: Mapping[str, Any], work: Work) -> Made:
     """Return the labels, and what makes the surface of one."""
     try:
         return _in_one_pass(chosen, settings, given)
@@ -101,7 +99,7 @@ def _labels(
         if "--select" not in fault.flags:
             raise
     # segments overlap: no one label map holds them, and each is read alone
-    numbers = settings.window.select or tuple(sorted(names))
+    numbers = settings.window.select or tuple(sorted(names_of(None, chosen.labels_in or chosen.study)))
     return numbers, lambda _number, asked, own: work(Namespace(**vars(asked) | {"study": chosen.study}), own)
 
 
