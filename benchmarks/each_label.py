@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 MARK = 0.1
 """Most of the CPU time of a run a label that one pass may take."""
 RADIUS = 0.06
-"""Of a ball, in sides of the map: at 256^3 and 1 mm a hundred of them are 1.5 l, as a brain and its parts in an atlas."""
+"""Of a ball, in sides of the map: at 256^3 and 1 mm a hundred of them are 1.5 l, as the parts of a brain are."""
 
 
 def label_map(side: int, count: int) -> np.ndarray:

@@ -20,7 +20,7 @@ from test_io_nrrd import BALL, CORE, layered, segment
 from tomomesh import TomomeshError, Volume, io, reconstruct, reconstruct_labels
 from tomomesh.cli import main
 from tomomesh.cli.each_label import SINGLE
-from tomomesh.segmentation.labelled import Labelled
+from tomomesh.segmentation.labels import Labelled
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -129,7 +129,7 @@ def table(folder: Path) -> list[dict[str, str]]:
 
 
 class TestCommand:
-    @pytest.mark.parametrize("options", [[], ["--way", "voxels", "--format", "ply"], ["--smooth", "1", "--edge", "0.4"]])
+    @pytest.mark.parametrize("options", [[], ["--way", "voxels", "--format", "ply"], ["--smooth", "1"]])
     def test_files_are_those_of_runs_for_one_label(self, tmp_path: Path, options: list[str]) -> None:
         path = written(tmp_path)
         assert each(path, "--quiet", *options) == 0

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from .model.mesh import TriMesh
     from .model.volume import Volume
     from .results import Segmentation, Surface
-    from .segmentation.study import Study
+    from .segmentation.study import LaidOut
     from .ways.way import Way
 
 
@@ -171,7 +171,7 @@ def reconstruct_points(
 
 
 def reconstructed(
-    lay: Callable[[], Study], settings: Settings, given: Collection[str], progress: Progress,
+    lay: Callable[[], LaidOut], settings: Settings, given: Collection[str], progress: Progress,
     *, truth: TriMesh | None = None, kept: bool = True,
 ) -> Surface:  # fmt: skip
     """Take a study that was laid out to a surface; see `reconstruct` and `reconstruct_once`.
@@ -230,11 +230,13 @@ def _begin(settings: Settings, given: Collection[str], *, input: str) -> Stage[W
     return Stage(way, {"way": section}, tuple(without_effect(settings, given, input=input)))
 
 
-def _laid_out(volume: Volume, labels: Volume | None, settings: Settings, progress: Progress) -> Study:
+def _laid_out(volume: Volume, labels: Volume | None, settings: Settings, progress: Progress) -> LaidOut:
     return laid_out(volume, labels, settings, progress, labelled=settings.window.select is not None)
 
 
-def laid_out(volume: Volume, labels: Volume | None, settings: Settings, progress: Progress, *, labelled: bool) -> Study:
+def laid_out(
+    volume: Volume, labels: Volume | None, settings: Settings, progress: Progress, *, labelled: bool
+) -> LaidOut:
     """Lay out a study (`lay_out`), once no way refuses the settings."""
     way_of(choose_way(settings, _input_of(volume))).require(settings)
     progress("window", 0, 2)
@@ -242,7 +244,7 @@ def laid_out(volume: Volume, labels: Volume | None, settings: Settings, progress
 
 
 def _segmented(
-    study: Study, settings: Settings, given: Collection[str], progress: Progress
+    study: LaidOut, settings: Settings, given: Collection[str], progress: Progress
 ) -> tuple[Segmentation[Any], Way, Settings]:
     """Run stage one; return also the way that it takes, and the settings with nothing about that left open."""
     kept = select_in(study, settings)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..model.volume import Volume
     from ..settings import Settings, WindowSettings
     from .body import Components
-    from .labelled import Labelled
+    from .labels import Labelled
     from .window import Limit
 
 

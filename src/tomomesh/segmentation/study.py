@@ -13,8 +13,7 @@ from ..stage import Stage, folded, timed
 from .body import Cleaned
 from .crop import crop, inside_roi
 from .grid import onto_grid
-from .labelled import Labelled
-from .labels import doubted, labels_in, whole
+from .labels import Labelled, doubted, labels_in, whole
 from .selection import Chosen, choose
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ class Selected:
 
 
 @dataclass(frozen=True)
-class Study:
+class LaidOut:
     """A study as it is looked at, before any voxel is chosen: the same for all of its labels.
 
     Attributes
@@ -66,11 +65,10 @@ class Study:
     plane : str
         Of the slices: axial, coronal or sagittal.
     labels : Labelled or None
-        The label map on its grid, where labels choose: itself, or one beside it.
+        Where labels choose: the label map on its grid, itself or one beside it.
     inside : (K, J, I) bool array or None
         The voxels that may be chosen, where not all may.
     cropped : dict or None
-        What is left of a study of which a part is asked for.
     """
 
     volume: Volume
@@ -82,11 +80,11 @@ class Study:
     @property
     def notes(self) -> tuple[str, ...]:
         """What its readers, and those of the label map, have decided."""
-        beside = self.labels is not None and self.labels.volume is not self.volume
-        return self.volume.notes + (self.labels.volume.notes if self.labels is not None and beside else ())
+        beside = () if self.labels is None or self.labels.volume is self.volume else self.labels.volume.notes
+        return self.volume.notes + beside
 
 
-def lay_out(volume: Volume, labels: Volume | None, settings: Settings, *, labelled: bool) -> Study:
+def lay_out(volume: Volume, labels: Volume | None, settings: Settings, *, labelled: bool) -> LaidOut:
     """Turn the slices of a study the way they are asked for, crop them, and lay a label map over them.
 
     Parameters
@@ -105,10 +103,9 @@ def lay_out(volume: Volume, labels: Volume | None, settings: Settings, *, labell
     """
     if not isinstance(volume, Volume):
         raise UsageError(
-            "a study is a Volume",
-            found=type(volume).__name__,
+            "a study is a Volume", found=type(volume).__name__,
             expected="read_volume(path) or Volume.from_stored(array, affine)",
-        )
+        )  # fmt: skip
     _check_labelled(labels, settings, labelled=labelled)
     volume = whole(volume) if labelled and labels is None else volume
     axis = _slice_axis(volume, settings.network.slices)
@@ -117,7 +114,7 @@ def lay_out(volume: Volume, labels: Volume | None, settings: Settings, *, labell
     laid = study if labels is None else _fitting(labels, volume).cropped(box).along(axis)
     cropped = _cropped(tuple(box[n] for n in order_along(axis)), volume.along(axis).shape)
     found = Labelled.of(laid) if labelled else None
-    return Study(study, AXES[axis], found, inside_roi(study, settings.crop.roi), cropped)
+    return LaidOut(study, AXES[axis], found, inside_roi(study, settings.crop.roi), cropped)
 
 
 def _check_labelled(labels: Volume | None, settings: Settings, *, labelled: bool) -> None:
@@ -128,7 +125,7 @@ def _check_labelled(labels: Volume | None, settings: Settings, *, labelled: bool
         raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
 
 
-def select_in(study: Study, settings: Settings) -> Stage[Selected]:
+def select_in(study: LaidOut, settings: Settings) -> Stage[Selected]:
     """Choose voxels of a study by gray level or label.
 
     Raises
@@ -139,8 +136,8 @@ def select_in(study: Study, settings: Settings) -> Stage[Selected]:
     chosen = _choose(study, settings)
     notes = study.notes + _dropped(chosen, settings) + _sparse(chosen) + _cut_off(chosen.value)
     section = _section(study.volume, study.plane, study.cropped, notes)
-    doubt = "" if study.labels is None else doubted(study.labels.volume, len(study.labels.numbers))
-    warnings = (*_doubts(chosen.value, settings), *((doubt,) if doubt else ()))
+    doubt = () if study.labels is None else doubted(study.labels)
+    warnings = (*_doubts(chosen.value, settings), *doubt)
     window = {"window": _window(chosen.value, settings)}
     selected = Selected(study.volume, study.plane, chosen.value)
     return folded(selected, Stage(None, {"study": section}), chosen, Stage(None, window, warnings))
@@ -171,7 +168,7 @@ def _fitting(labels: Volume, volume: Volume) -> Volume:
 
 
 @timed("window")
-def _choose(study: Study, settings: Settings) -> Stage[Chosen]:
+def _choose(study: LaidOut, settings: Settings) -> Stage[Chosen]:
     return Stage(choose(study.volume, study.labels, settings, study.inside))
 
 
