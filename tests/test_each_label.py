@@ -20,6 +20,7 @@ from test_io_nrrd import BALL, CORE, layered, segment
 from tomomesh import TomomeshError, Volume, io, reconstruct, reconstruct_labels
 from tomomesh.cli import main
 from tomomesh.cli.each_label import SINGLE
+from tomomesh.errors import UsageError
 from tomomesh.segmentation.labels import Labelled
 
 if TYPE_CHECKING:
@@ -197,6 +198,21 @@ class TestCommand:
         assert each(written(tmp_path, np.zeros((3, 3, 3), np.uint8))) == 6
         assert "holds no label" in capsys.readouterr().err
         assert not (tmp_path / "out").exists()
+
+    def test_gray_levels_are_not_all_taken_for_labels(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
+        levels = np.arange(5000, dtype=np.int16).reshape(20, 10, 25)
+        assert each(written(tmp_path, levels)) == 2
+        assert "4999 levels" in capsys.readouterr().err
+        assert not (tmp_path / "out").exists()
+        assert each(tmp_path / "map.nii", "--select", "7,8", "--quiet") == 0
+        heads = Volume.from_stored(blocks().astype(np.int16), AFFINE, unit="HU")
+        with pytest.raises(UsageError, match="HU"):
+            reconstruct_labels(heads)
+
+    def test_all_without_the_option_names_it(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
+        line = ["reconstruct", str(written(tmp_path)), "--select", "all", "-o", str(tmp_path / "m.stl")]
+        assert main(line) == 2
+        assert "--each-label" in capsys.readouterr().err
 
     def test_gray_levels_between_whole_numbers_are_refused(self, tmp_path: Path, capsys: CaptureFixture[str]) -> None:
         assert each(written(tmp_path, blocks() + np.float32(0.5))) == 2

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from .errors import EmptyError
+from .errors import EmptyError, UsageError
 from .pipeline import laid_out, reconstructed, settled
 from .progress import Progress, silent
+from .segmentation.labels import MOST
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,10 +43,16 @@ class LabelSurfaces(Mapping[int, "Surface"]):
         self._numbers = settings.window.select or self._all()
 
     def _all(self) -> tuple[int, ...]:
-        assert self._study.labels is not None
-        numbers = tuple(number for number in self._study.labels.numbers.tolist() if number)
+        labels = self._study.labels
+        assert labels is not None
+        numbers = tuple(number for number in labels.numbers.tolist() if number)
         if not numbers:
             raise EmptyError("the label map holds no label", found="0 alone", expected="labels beside 0")
+        if labels.volume.unit == "HU" or len(numbers) > MOST:
+            found = f"{len(numbers)} levels, unit = {labels.volume.unit}"
+            raise UsageError(
+                "the label map may be a study of gray levels", found=found, hint="--select with its labels"
+            )
         return numbers
 
     def __iter__(self) -> Iterator[int]:

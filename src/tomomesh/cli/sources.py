@@ -89,9 +89,10 @@ def _number_of(label: int | str, known: dict[int, str], path: str) -> int:
     near = {*get_close_matches(_plain(label), names.values(), 3, 0.5)}
     told = ", ".join(f"{name} ({number})" for number, name in names.items() if name in near)
     what = "the label map names none of its labels" if not known else "the label map has no label of that name"
+    counted = f"`tomomesh inspect {shlex.quote(path)}`, which counts its labels, and --select N"
     raise UsageError(
         "several labels have that name" if found else what, file=path, found=f"--select {label}",
-        hint=told or f"`tomomesh inspect {shlex.quote(path)}`, which counts its labels, and --select N",
+        hint="--each-label" if label == ALL else told or counted,
     )  # fmt: skip
 
 
