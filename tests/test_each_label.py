@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from conftest import law
+from segmentations import written as dicom_segmentation
 from studies import write_nifti
 from test_io_nrrd import BALL, CORE, layered, segment
 from tomomesh import TomomeshError, Volume, io, reconstruct, reconstruct_labels
@@ -264,6 +265,19 @@ class TestNames:
             line = f"reconstruct {path} --select {number} -o {tmp_path}/m.stl --quiet --way voxels"
             assert main(line.split()) == 0
             assert (tmp_path / "out" / f"{name}.stl").read_bytes() == (tmp_path / "m.stl").read_bytes()
+
+    @pytest.mark.parametrize("apart", [True, False])
+    def test_segments_of_dicom(self, tmp_path: Path, apart: bool) -> None:
+        masks = {1: blocks() == 2, 3: blocks() == 5 if apart else blocks() < 5}
+        path = dicom_segmentation(masks, np.eye(4), tmp_path / "seg.dcm")
+        assert each(path, "--quiet") == 0
+        rows = table(tmp_path)
+        assert [row["label"] for row in rows] == ["1", "3"]
+        for row in rows:
+            assert row["name"] == f"label-000{row['label']}-{row['label_name'].replace(' ', '_')}"
+            line = f"reconstruct {path} --select {row['label']} -o {tmp_path}/m.stl --quiet"
+            assert main(line.split()) == 0
+            assert (tmp_path / "out" / f"{row['name']}.stl").read_bytes() == (tmp_path / "m.stl").read_bytes()
 
 
 TABLES = {
