@@ -35,6 +35,10 @@ if TYPE_CHECKING:
 APOSTROPHE = "'"
 """In front of what a spreadsheet may take for a formula."""
 AFFINE = np.array([[-0.7, 0.0, 0.0, 10.3], [0.0, 0.8, 0.1, -77.1], [0.0, 0.0, 1.3, 3.33], [0.0, 0.0, 0.0, 1.0]])
+ASKED: list[dict[str, Any]] = [
+    {}, {"keep": "largest"}, {"surface": "outer"}, {"slices": "sagittal"}, {"way": "contours"}, {"smooth": 1.0},
+    {"slice_range": (0, 0)}, {"roi": (4.0, 20.0, -78.0, -75.0, 0.0, 9.0)}, {"fill_slices": True},
+]  # fmt: skip
 NAMED = b"""<?xml version="1.0"?><CaretExtension><VolumeInformation><LabelTable>
 <Label Key="2" Red="0"><![CDATA[liver]]></Label><Label Key="5" Red="1"><![CDATA[../a b/rm -rf]]></Label>
 <Label Key="7" Red="1"><![CDATA[liver]]></Label></LabelTable></VolumeInformation></CaretExtension>"""
@@ -74,24 +78,41 @@ def told(surface: Surface) -> dict[str, Any]:
 
 
 class TestLaw:
-    @law(60)
-    @given(label_maps(), st.sampled_from([{}, {"keep": "largest"}, {"surface": "outer"}, {"slices": "sagittal"}]))
+    @law(80)
+    @given(label_maps(), st.sampled_from(ASKED))
     def test_each_surface_is_that_of_its_label_alone(self, voxels: NDArray[Any], options: dict[str, Any]) -> None:
         volume = Volume.from_stored(voxels, AFFINE)
+        alone = {
+            n: outcome(lambda n=n: reconstruct(volume, select=(n,), **options))
+            for n in np.unique(voxels.astype(np.int64)).tolist()
+            if n
+        }
         found = outcome(lambda: reconstruct_labels(volume, **options))
         if isinstance(found, str):
-            assert not np.any(voxels)
+            assert all(isinstance(one, str) for one in alone.values())
             return
-        assert list(found) == [number for number in np.unique(voxels) if number]
+        assert set(found) <= set(alone)
+        assert all(isinstance(one, str) for number, one in alone.items() if number not in found)
         for number in found:
-            one = outcome(lambda n=number: reconstruct(volume, select=(n,), **options))
-            other = outcome(lambda n=number: found[n])
+            one, other = alone[number], outcome(lambda n=number: found[n])
             if isinstance(one, str) or isinstance(other, str):
                 assert one == other
                 continue
             assert one.mesh.vertices.tobytes() == other.mesh.vertices.tobytes()
             assert one.mesh.faces.tobytes() == other.mesh.faces.tobytes()
             assert told(one) == told(other)
+
+    def test_it_is_a_mapping_of_the_labels(self) -> None:
+        found = reconstruct_labels(Volume.from_stored(blocks(), AFFINE))
+        assert list(found) == [2, 5, 7, 9]
+        assert len(found) == 4
+        assert 5 in found
+        assert 4 not in found
+        chosen = reconstruct_labels(Volume.from_stored(blocks(), AFFINE), select=(7, 4, 7))
+        assert list(chosen) == [7, 4]
+        assert chosen[7].segmentation.mask.sum() == np.count_nonzero(blocks() == 7)
+        with pytest.raises(TomomeshError, match="no such label"):
+            chosen[4]
 
     @law(200)
     @given(label_maps())

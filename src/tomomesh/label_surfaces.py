@@ -61,6 +61,9 @@ class LabelSurfaces(Mapping[int, "Surface"]):
     def __len__(self) -> int:
         return len(set(self._numbers))
 
+    def __contains__(self, number: object) -> bool:
+        return number in self._numbers
+
     def __getitem__(self, number: int) -> Surface:
         """Return the surface that `tomomesh.reconstruct` makes with ``select=(number,)``; raises as it does."""
         return self.surface(number, self._progress)
