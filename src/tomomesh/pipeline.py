@@ -121,7 +121,9 @@ def segment(
     12
     """
     settings = settled(settings, changes)
-    return _segmented(_laid_out(volume, labels, settings, progress), settings, changes, progress)[0]
+    progress("window", 0, 2)
+    study = lay_out(volume, labels, settings, labelled=settings.window.select is not None)
+    return _segmented(study, settings, changes, progress)[0]
 
 
 def reconstruct_points(
@@ -237,7 +239,7 @@ def _laid_out(volume: Volume, labels: Volume | None, settings: Settings, progres
 def laid_out(
     volume: Volume, labels: Volume | None, settings: Settings, progress: Progress, *, labelled: bool
 ) -> LaidOut:
-    """Lay out a study (`lay_out`), once no way refuses the settings."""
+    """Lay out a study (`lay_out`), once its way to a surface does not refuse the settings."""
     way_of(choose_way(settings, _input_of(volume))).require(settings)
     progress("window", 0, 2)
     return lay_out(volume, labels, settings, labelled=labelled)
