@@ -167,6 +167,17 @@ class TestCarrying:
         )
         np.testing.assert_allclose(found, (1 - share) * one + share * other, atol=1e-4)
 
+    @law(100)
+    @given(seeds, st.floats(0.5, 50))
+    def test_what_no_point_reaches_is_blended_without_what_is_carried(self, seed: int, reach: float) -> None:
+        rng = np.random.default_rng(seed)
+        below, above = rng.normal(size=(2, 5, 6)).astype(np.float32)
+        away, found = np.empty((5, 6), np.float32), np.empty((5, 6), np.float32)
+        carried = np.full((5, 6, 4), np.nan, np.float32)  # as memory may be that nobody has written to
+        carry_along(np.empty((0, 2)), np.empty((0, 4)), np.ones(2), reach, away, carried)
+        blend(below, above, away, carried, reach, 0.25, found)
+        np.testing.assert_allclose(found, 0.75 * below + 0.25 * above, rtol=1e-6, atol=1e-6)
+
 
 class TestLoops:
     """Rings at their place below a pixel, and how many neurons they have."""

@@ -22,6 +22,7 @@ _HOMES = {
     "read_points": "io",
     "read_volume": "io",
     "reconstruct": "pipeline",
+    "reconstruct_labels": "label_surfaces",
     "reconstruct_points": "pipeline",
     "segment": "pipeline",
     "window": "segmentation.window",
@@ -44,6 +45,7 @@ __all__ = [
     "read_points",
     "read_volume",
     "reconstruct",
+    "reconstruct_labels",
     "reconstruct_points",
     "segment",
     "window",
@@ -55,6 +57,7 @@ if TYPE_CHECKING:
     from .errors import TomomeshError
     from .head_phantom import phantom
     from .io import read_mesh, read_points, read_volume, write_mesh
+    from .label_surfaces import reconstruct_labels
     from .measure.fill import fill_mesh
     from .measure.report import assess
     from .model.mesh import TriMesh

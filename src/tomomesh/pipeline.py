@@ -11,7 +11,7 @@ from .effect import without_effect
 from .finish import compare_with, finish
 from .model.points import PointSet
 from .progress import Progress, silent
-from .segmentation.study import select_study
+from .segmentation.study import lay_out, select_in
 from .settings import Settings
 from .stage import Stage, folded
 from .ways import choose_way, way_of
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .model.mesh import TriMesh
     from .model.volume import Volume
     from .results import Segmentation, Surface
+    from .segmentation.study import LaidOut
     from .ways.way import Way
 
 
@@ -71,7 +72,10 @@ def reconstruct(
     >>> found.report["quality"]["closed"], found.report["quality"]["genus"]
     (True, 0)
     """
-    return _reconstructed(lambda: (volume, labels), _settled(settings, changes), changes, progress, truth=truth)
+    settings = settled(settings, changes)
+    return reconstructed(
+        lambda: _laid_out(volume, labels, settings, progress), settings, changes, progress, truth=truth
+    )
 
 
 def reconstruct_once(
@@ -92,7 +96,8 @@ def reconstruct_once(
         The mesh, its points and its report are those of `reconstruct`; the study's voxels, its window, networks and
         the surface before the fit are left out.
     """
-    return _reconstructed(read, _settled(settings, changes), changes, progress, kept=False)
+    settings = settled(settings, changes)
+    return reconstructed(lambda: _laid_out(*read(), settings, progress), settings, changes, progress, kept=False)
 
 
 def segment(
@@ -115,8 +120,10 @@ def segment(
     >>> found.report["networks"]["trained"]
     12
     """
-    settings = _settled(settings, changes)
-    return _segmented(volume, labels, settings, changes, progress)[0]
+    settings = settled(settings, changes)
+    progress("window", 0, 2)
+    study = lay_out(volume, labels, settings, labelled=settings.window.select is not None)
+    return _segmented(study, settings, changes, progress)[0]
 
 
 def reconstruct_points(
@@ -154,7 +161,7 @@ def reconstruct_points(
     from .printing.part import turned
     from .ways.clouds.points import take_points
 
-    settings = _settled(settings, changes)
+    settings = settled(settings, changes)
     cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)
     taken = take_points(cloud, settings)
     settings = replace(settings, printing=turned(settings.printing, cloud.frame))
@@ -165,14 +172,27 @@ def reconstruct_points(
     return replace(done.value, way=begun.value.name, settings=settings, stages=(taken, begun, made, done, *later))
 
 
-def _reconstructed(
-    read: Callable[[], tuple[Volume, Volume | None]], settings: Settings, given: Collection[str], progress: Progress,
+def reconstructed(
+    lay: Callable[[], LaidOut], settings: Settings, given: Collection[str], progress: Progress,
     *, truth: TriMesh | None = None, kept: bool = True,
 ) -> Surface:  # fmt: skip
-    volume, labels = read()
-    way_of(choose_way(settings, _input_of(volume))).require(settings)
-    found, way, taken = _segmented(volume, labels, settings, given, progress)
-    del volume, labels
+    """Take a study that was laid out to a surface; see `reconstruct` and `reconstruct_once`.
+
+    Parameters
+    ----------
+    lay : callable
+        Hands over the study, and need not keep it.
+    settings : Settings
+    given : collection of str
+        The parameters that were asked for.
+    progress : callable
+    truth : TriMesh, optional
+    kept : bool
+        Whether all stages are kept.
+    """
+    study = lay()
+    found, way, taken = _segmented(study, settings, given, progress)
+    del study
     found = found if kept else found.without_voxels()
     _give_back()
     made = way.surface(found, taken, progress)
@@ -191,7 +211,7 @@ def _give_back() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
-def _settled(settings: Settings | None, changes: dict[str, Any]) -> Settings:
+def settled(settings: Settings | None, changes: dict[str, Any]) -> Settings:
     """Return the settings of a run; refuse those whose packages are not installed."""
     settings = (settings or Settings()).replace(**changes)
     if settings.printing.asked:
@@ -212,16 +232,28 @@ def _begin(settings: Settings, given: Collection[str], *, input: str) -> Stage[W
     return Stage(way, {"way": section}, tuple(without_effect(settings, given, input=input)))
 
 
+def _laid_out(volume: Volume, labels: Volume | None, settings: Settings, progress: Progress) -> LaidOut:
+    return laid_out(volume, labels, settings, progress, labelled=settings.window.select is not None)
+
+
+def laid_out(
+    volume: Volume, labels: Volume | None, settings: Settings, progress: Progress, *, labelled: bool
+) -> LaidOut:
+    """Lay out a study (`lay_out`), once its way to a surface does not refuse the settings."""
+    way_of(choose_way(settings, _input_of(volume))).require(settings)
+    progress("window", 0, 2)
+    return lay_out(volume, labels, settings, labelled=labelled)
+
+
 def _segmented(
-    volume: Volume, labels: Volume | None, settings: Settings, given: Collection[str], progress: Progress
+    study: LaidOut, settings: Settings, given: Collection[str], progress: Progress
 ) -> tuple[Segmentation[Any], Way, Settings]:
     """Run stage one; return also the way that it takes, and the settings with nothing about that left open."""
-    progress("window", 0, 2)
-    kept = select_study(volume, labels, settings)
+    kept = select_in(study, settings)
     progress("window", 1, 2)
     taken = take_way(kept.value, settings)
     progress("window", 2, 2)
-    begun = _begin(taken.value, given, input=_input_of(volume))
+    begun = _begin(taken.value, given, input=_input_of(study.volume))
     way = begun.value
     assert way.segment is not None
     found = way.segment(kept.value, taken.value, progress)

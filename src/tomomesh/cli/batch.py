@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 from .. import io
 from ..errors import BatchError, UsageError, printable
+from ..settings import option_of
 from . import summary
 from .faults import as_error
 from .outputs.checks import check_files, check_folder, check_frame, make_folder
-from .records import COLUMNS, finished, record_of, row_of, row_of_fault
+from .records import finished, record_of, row_of, row_of_fault
 from .spread import Batch, check_workers, spread_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
+    from collections.abc import Callable, Generator, Sequence
 
     from ..results import Surface
     from ..settings import Settings
@@ -56,13 +57,23 @@ def reconstruct_each(chosen: Namespace, settings: Settings, work: Work) -> None:
     """
     folder = _checked(chosen, settings)
     studies = io.find_studies(chosen.study, without=[folder], series=settings.read.series)
-    batch = Batch(studies, chosen, settings, folder, partial(_done, work=work))
-    rows = _rows(batch)
+    do_all(Batch(studies, chosen, settings, folder, partial(done, work=work)))
+
+
+def do_all(batch: Batch) -> None:
+    """Do all studies of a batch, and tell what became of them.
+
+    Raises
+    ------
+    BatchError
+        At the end, where some failed.
+    """
+    rows, chosen = _rows(batch), batch.chosen
     if chosen.save_settings:
-        io.write_settings(settings, chosen.save_settings)
+        io.write_settings(batch.settings, chosen.save_settings)
     if chosen.json:
         print(json.dumps(rows, indent=2))
-    _tell_failures(chosen, rows)
+    _tell_failures(batch, rows)
 
 
 def _rows(batch: Batch) -> list[Row]:
@@ -78,7 +89,7 @@ def _rows(batch: Batch) -> list[Row]:
     finally:
         rows = [found[number] for number in sorted(found)]
         if rows:
-            io.write_table(rows, COLUMNS, batch.folder / TABLE)
+            io.write_table(rows, batch.columns, batch.folder / TABLE)
     return rows
 
 
@@ -96,16 +107,37 @@ def refuse_for_one(chosen: Namespace) -> None:
 
 def _checked(chosen: Namespace, settings: Settings) -> Path:
     """Return the folder of the results; refuse what does not go with many studies."""
-    single = [f"--{name.replace('_', '-')}" for name in SINGLE if getattr(chosen, name)]
-    if single:
-        raise UsageError("this option is for one study", found=f"{single[0]} with --each", hint="no --each")
+    refuse_with("--each", SINGLE, chosen)
     if not isinstance(chosen.study, str):
         raise UsageError("there is no folder of studies", expected="one STUDY, with --each")
     check_workers(chosen)
-    if chosen.output == "-" or os.path.realpath(chosen.output) == os.path.realpath(chosen.study):
-        raise UsageError("--each writes into a folder of its own", file=chosen.output, hint="another folder")
+    return check_results("--each", chosen, settings)
+
+
+def refuse_with(many: str, names: Sequence[str], chosen: Namespace) -> None:
+    """Refuse options that have no place where the option `many` makes many meshes of one command.
+
+    Raises
+    ------
+    UsageError
+    """
+    given = [option_of(name) for name in names if getattr(chosen, name) not in (None, False)]
+    if given:
+        raise UsageError("this option is for one mesh", found=f"{given[0]} with {many}", hint=f"no {many}")
+
+
+def check_results(many: str, chosen: Namespace, settings: Settings) -> Path:
+    """Return the folder of many results; refuse one that cannot be, before any work.
+
+    Raises
+    ------
+    UsageError, OutputError
+    """
+    same = isinstance(chosen.study, str) and os.path.realpath(chosen.output) == os.path.realpath(chosen.study)
+    if chosen.output == "-" or same:
+        raise UsageError(f"{many} writes into a folder of its own", file=chosen.output, hint="another folder")
     if Path(chosen.output).is_file():
-        raise UsageError("--each writes into a folder", file=chosen.output, expected="a folder")
+        raise UsageError(f"{many} writes into a folder", file=chosen.output, expected="a folder")
     check_frame(Path(chosen.output, f"NAME.{chosen.format or USUAL}"), settings)
     check_files(chosen)
     return check_folder(chosen.output)
@@ -120,7 +152,7 @@ def _rows_in_turn(batch: Batch) -> Generator[tuple[int, Row]]:
         yield number, batch.done(study, batch.chosen, batch.settings, batch.folder)
 
 
-def _done(study: io.Study, chosen: Namespace, settings: Settings, folder: Path, work: Work) -> Row:
+def done(study: io.Study, chosen: Namespace, settings: Settings, folder: Path, work: Work) -> Row:
     """Return a study's row: of its report, or of its fault; of a fault only words are kept, not what it holds on to."""
     try:
         asked = settings if study.series is None else settings.replace(series=study.series)
@@ -149,11 +181,12 @@ def _worked(
     return report
 
 
-def _tell_failures(chosen: Namespace, rows: list[Row]) -> None:
+def _tell_failures(batch: Batch, rows: list[Row]) -> None:
+    chosen = batch.chosen
     failed = [row for row in rows if row["exit_code"]]
     if not (chosen.quiet or chosen.json):
         print(printable(summary.of_batch(rows, chosen.output)))
     for row in failed:
         print(printable(f"failed    {row['name']}: {row['error']}"), file=sys.stderr)
     if failed:
-        raise BatchError(f"{len(failed)} of {len(rows)} studies failed", file=str(Path(chosen.output, TABLE)))
+        raise BatchError(f"{len(failed)} of {len(rows)} {batch.of} failed", file=str(Path(chosen.output, TABLE)))

@@ -15,6 +15,7 @@ from . import summary
 from .against import compared, is_mesh
 from .bars import Bars, bars_of
 from .batch import reconstruct_each, refuse_for_one
+from .each_label import reconstruct_each_label
 from .options.likely import require_kind
 from .outputs.checks import (
     OF_STUDIES,
@@ -91,8 +92,11 @@ def _demo(chosen: Namespace) -> None:
 
 def _reconstruct(chosen: Namespace) -> None:
     settings = settings_of(chosen)
-    if chosen.each:
+    if chosen.each and not chosen.each_label:
         reconstruct_each(chosen, settings, _reconstruct_one)
+        return
+    if chosen.each_label:
+        reconstruct_each_label(chosen, settings, given_of(chosen), _reconstruct_one)
         return
     refuse_for_one(chosen)
     surface = _reconstruct_one(chosen, settings)

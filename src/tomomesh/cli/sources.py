@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from .bars import Bars
 
 
+ALL = "all"
+"""Takes the place of every label, where each has a mesh of its own."""
+
+
 def gathered(chosen: Namespace) -> Namespace:
     """Make one study of the files that were named one by one: None, a path, or a tuple of paths.
 
@@ -57,12 +61,22 @@ def numbered(chosen: Namespace) -> Namespace:
     UsageError
         For a name that it does not have.
     """
-    asked = getattr(chosen, "select", ())
+    asked, table = getattr(chosen, "select", ()), getattr(chosen, "label_names", None)
+    if getattr(chosen, "each_label", False) and asked == (ALL,):
+        return Namespace(**vars(chosen) | {"select": None})
     if not any(isinstance(label, str) for label in asked):
         return chosen
-    path = getattr(chosen, "labels_in", None) or getattr(chosen, "against", None) or getattr(chosen, "study", None)
-    known = io.label_names(path) if isinstance(path, str) else {}
+    named = (getattr(chosen, name, None) for name in ("label_names", "labels_in", "against", "study"))
+    path = next((path for path in named if path), None)
+    known = names_of(table, path)
     return Namespace(**vars(chosen) | {"select": tuple(_number_of(label, known, str(path)) for label in asked)})
+
+
+def names_of(table: str | None, path: object) -> dict[int, str]:
+    """Return the names of labels by their numbers: of a table, or else of the label map's own file."""
+    if table:
+        return io.read_label_names(table)
+    return io.label_names(path) if isinstance(path, str) else {}
 
 
 def _number_of(label: int | str, known: dict[int, str], path: str) -> int:
@@ -75,9 +89,10 @@ def _number_of(label: int | str, known: dict[int, str], path: str) -> int:
     near = {*get_close_matches(_plain(label), names.values(), 3, 0.5)}
     told = ", ".join(f"{name} ({number})" for number, name in names.items() if name in near)
     what = "the label map names none of its labels" if not known else "the label map has no label of that name"
+    counted = f"`tomomesh inspect {shlex.quote(path)}`, which counts its labels, and --select N"
     raise UsageError(
         "several labels have that name" if found else what, file=path, found=f"--select {label}",
-        hint=told or f"`tomomesh inspect {shlex.quote(path)}`, which counts its labels, and --select N",
+        hint="--each-label" if label == ALL else told or counted,
     )  # fmt: skip
 
 
@@ -97,7 +112,7 @@ def sources_of(chosen: Namespace, settings: Settings) -> list[str]:
     sources = [path for path in (*study, chosen.labels_in) if path]
     if not sources:
         raise UsageError("there is no study", expected="STUDY, or --labels-in with --select")
-    if chosen.labels_in and settings.window.select is None:
+    if chosen.labels_in and settings.window.select is None and not getattr(chosen, "each_label", False):
         raise UsageError(
             "no label was chosen", found=f"--labels-in {chosen.labels_in}", expected="--select with its labels"
         )

@@ -15,7 +15,7 @@ from .. import io
 from ..errors import ResourceError, TomomeshError, UsageError, printable
 from .bars import Bars
 from .outputs.checks import make_folder
-from .records import row_of_fault
+from .records import COLUMNS, row_of_fault
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Sequence
@@ -53,6 +53,10 @@ class Batch:
         Of the results.
     done : callable
         Makes the row of one study: the same wherever it is done.
+    columns : tuple of str
+        Of the table.
+    of : str
+        What its studies are called.
     """
 
     studies: Sequence[io.Study]
@@ -60,6 +64,8 @@ class Batch:
     settings: Settings
     folder: Path
     done: Done
+    columns: tuple[str, ...] = COLUMNS
+    of: str = "studies"
 
     def place(self, number: int) -> str:
         """Say which study has a number, from 0."""

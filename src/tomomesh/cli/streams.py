@@ -40,7 +40,7 @@ def streamed(chosen: Namespace) -> Iterator[Namespace]:
     """
     inside = next((name for name in SOURCES if getattr(chosen, name, None) == STREAM), "")
     source = inside or _of_named_format(chosen)
-    each = getattr(chosen, "each", False)
+    each = getattr(chosen, "each", False) or getattr(chosen, "each_label", False)
     outside = getattr(chosen, "output", None) == STREAM and not each
     if getattr(chosen, "format", None) and not (outside or each):
         raise UsageError("a file's suffix tells its format", found=f"--format {chosen.format}", expected="-o -")

@@ -16,8 +16,9 @@ from .meshes.encapsulated import ARCHIVED, check_archived, is_archived, write_en
 from .meshes.frame import frame_of_file
 from .meshes.read import MESH_READERS, read_mesh
 from .meshes.write import MESH_WRITERS, keeps, write_mesh
-from .studies.folder import Study, find_studies
+from .studies.folder import Study, files_of, find_studies
 from .studies.label_names import label_names
+from .studies.label_tables import read_label_names
 from .studies.listing import list_series
 from .studies.read import VOLUME_READERS, read_volume
 from .studies.size import voxel_bytes
@@ -40,6 +41,7 @@ __all__ = [
     "Study",
     "check_archived",
     "check_output",
+    "files_of",
     "find_studies",
     "frame_in_file",
     "frame_of_file",
@@ -49,6 +51,7 @@ __all__ = [
     "keeps",
     "label_names",
     "list_series",
+    "read_label_names",
     "read_mesh",
     "read_picture",
     "read_points",

@@ -24,6 +24,7 @@ from .well_composed import surface_cells, without_contacts
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..model.boxes import Box
     from ..model.mesh import TriMesh
     from ..model.volume import Volume
     from ..settings import FitSettings
@@ -92,6 +93,7 @@ def boundary(
     layers: str = "all",
     surface: str = "all",
     divide: bool = False,
+    around: Box | None = None,
     threads: int = 0,
 ) -> Boundary:
     """Find the boundary of a window, and where the gray levels cross its bounds.
@@ -108,6 +110,8 @@ def boundary(
         All surfaces, or those that nothing surrounds.
     divide : bool
         Whether voxels of thick slices are divided first.
+    around : box, optional
+        Outside of which no voxel is kept.
     threads : int
 
     Returns
@@ -123,8 +127,8 @@ def boundary(
     levels, affine = Levels(volume.voxels, lower, upper, layers), volume.affine
     thin = thinned(levels, mask, affine, threads) if divide else None
     if thin is not None:
-        levels, mask, affine = thin.levels, thin.mask, thin.affine
-    held, low = _framed(mask)
+        levels, mask, affine, around = thin.levels, thin.mask, thin.affine, None
+    held, low = _framed(mask, around)
     cells = surface_cells(held, threads)
     joined = without_contacts(held, lambda voxels: levels.excess(voxels + low), threads, cells)
     whole = _filled(joined) if surface == "outer" else joined
@@ -137,9 +141,9 @@ def boundary(
     return Boundary(affine, net, found, added, 1 if thin is None else thin.parts)
 
 
-def _framed(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
+def _framed(mask: NDArray[np.bool_], around: Box | None) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
     """Return the box of a mask with one layer of background around it, and its lowest voxel (x, y, z)."""
-    box = box_of(mask)
+    box = box_of(mask, around)
     return np.pad(mask[box], 1), np.array([side.start - 1 for side in box[::-1]], np.int32)
 
 

@@ -15,6 +15,7 @@ from .window import PRESETS_HU
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..model.boxes import Box
     from ..model.volume import Volume
 
 THICK = 6.0
@@ -138,7 +139,7 @@ class Cleaned:
     pore_voxels: int = 0
 
 
-def without_specks(mask: NDArray[np.bool_]) -> Cleaned:
+def without_specks(mask: NDArray[np.bool_], around: Box | None = None) -> Cleaned:
     """Leave out components that are specks, and fill enclosed holes as small as that (`SPECK`, `SMALL`).
 
     Components touch along faces, edges or at corners, and holes along faces: no voxel of a hole that is filled has a
@@ -148,15 +149,18 @@ def without_specks(mask: NDArray[np.bool_]) -> Cleaned:
     ----------
     mask : (K, J, I) bool array
         One voxel at least.
+    around : box, optional
+        Outside of which nothing is true.
     """
-    box = box_of(mask)
+    box = box_of(mask, around)
     pieces, holes = Runs.of(mask[box], corners=True), Runs.of(mask[box], value=False)
     sizes, room = pieces.sizes, holes.sizes
     limit = min(float(SPECK), SMALL * float(sizes.max()))
     small, pores = sizes < limit, ~holes.bordering & (room < limit)
     if not (small.any() or pores.any()):
         return Cleaned(mask)
-    cleaned = mask.copy()
+    cleaned = np.zeros(mask.shape, np.bool_)
+    cleaned[box] = mask[box]
     pieces.fill(cleaned[box], small, False)
     holes.fill(cleaned[box], pores, True)
     counts = (small.sum(), sizes[small].sum(), sizes[small].max(initial=0), pores.sum(), room[pores].sum())

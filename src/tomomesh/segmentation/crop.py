@@ -12,10 +12,9 @@ from ..errors import EmptyError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..model.boxes import Box
     from ..model.volume import Volume
     from ..settings import CropSettings
-
-    Box = tuple[slice, slice, slice]
 
 NEAR = 1e-6
 """Share of a voxel by which its center may lie outside of a box and still count as in it. Centers are computed to some

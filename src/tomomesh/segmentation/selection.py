@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import EmptyError, UsageError
+from ..model.boxes import box_of
 from .body import Cleaned, components_of_body, is_dense, largest_component, solid, thick_components, without_specks
 from .contours.labelled import filled_slices, gaps_in
-from .labels import select
 from .padding import all_padding, named_padding
 from .window import PRESETS_HU, choose_window, window
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..model.boxes import Box
     from ..model.volume import Volume
     from ..settings import Settings, WindowSettings
     from .body import Components
+    from .labels import Labelled
     from .window import Limit
 
 
@@ -71,6 +74,8 @@ class Chosen:
         Specks and pores.
     told : str
         What is to be said of slices without labels.
+    around : box or None
+        Outside of which no voxel is kept, where that is known.
     """
 
     volume: Volume
@@ -80,20 +85,33 @@ class Chosen:
     counts: Counts = field(default_factory=Counts)
     cleaned: Cleaned | None = None
     told: str = ""
+    around: Box | None = None
+
+    @cached_property
+    def box(self) -> Box:
+        """What the voxels that are kept lie in: outside of it nothing has to be looked at."""
+        return box_of(self.mask, self.around)
+
+    @cached_property
+    def kept(self) -> int:
+        """How many voxels are kept."""
+        return int(np.count_nonzero(self.mask[self.box]))
 
     def counted(self, mask: NDArray[np.bool_], **counts: int) -> Chosen:
         """Return the same with another mask and some counts."""
         return replace(self, mask=mask, counts=replace(self.counts, **counts))
 
 
-def choose(stack: Volume, labels: Volume | None, settings: Settings, inside: NDArray[np.bool_] | None = None) -> Chosen:
+def choose(
+    stack: Volume, labels: Labelled | None, settings: Settings, inside: NDArray[np.bool_] | None = None
+) -> Chosen:
     """Return what the settings keep of a study.
 
     Parameters
     ----------
     stack : Volume
-    labels : Volume or None
-        A label map on its grid, for ``select``; where there is none, the study is the label map itself.
+    labels : Labelled or None
+        A label map on its grid, for ``select``: the study itself, or one beside it.
     settings : Settings
     inside : (K, J, I) bool array, optional
         The voxels that may be kept.
@@ -101,26 +119,26 @@ def choose(stack: Volume, labels: Volume | None, settings: Settings, inside: NDA
     Raises
     ------
     UsageError, EmptyError
-        As `window` and `select`.
+        As `window` and `Labelled.mask`.
     """
     asked = settings.window
-    chosen = _of_labels(stack, labels, asked) if asked.select is not None else _of_levels(stack, asked)
-    mask = chosen.mask if inside is None else _within(chosen.mask, inside)
-    chosen = _parts(chosen.counted(mask, window=int(np.count_nonzero(mask))), stack, asked)
+    chosen = _of_levels(stack, asked) if labels is None else _of_labels(stack, labels, asked)
+    chosen = chosen if inside is None else replace(chosen, mask=_within(chosen.mask, inside))
+    chosen = _parts(chosen.counted(chosen.mask, window=chosen.kept), stack, asked)
     if asked.keep == "all":
         return chosen
-    cleaned = without_specks(chosen.mask)
+    cleaned = without_specks(chosen.mask, chosen.around)
     return replace(chosen, mask=cleaned.mask, cleaned=cleaned)
 
 
-def _of_labels(stack: Volume, labels: Volume | None, asked: WindowSettings) -> Chosen:
-    mask = select(stack if labels is None else labels, asked.select or ())
+def _of_labels(stack: Volume, labels: Labelled, asked: WindowSettings) -> Chosen:
+    mask, box = labels.mask(asked.select or ())
     if asked.fill_slices:
         volume, told = filled_slices(mask, stack)
         return Chosen(volume, volume.voxels > 0, 0.0, np.inf, told=told)
-    gaps = gaps_in(mask)
+    gaps = gaps_in(mask, box)
     told = f"{gaps.told}: --fill-slices interpolates them" if gaps else ""
-    return Chosen(replace(stack, voxels=mask.view(np.uint8)), mask, 0.5, np.inf, told=told)
+    return Chosen(replace(stack, voxels=mask.view(np.uint8)), mask, 0.5, np.inf, told=told, around=box)
 
 
 def _of_levels(stack: Volume, asked: WindowSettings) -> Chosen:

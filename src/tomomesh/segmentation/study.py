@@ -13,7 +13,7 @@ from ..stage import Stage, folded, timed
 from .body import Cleaned
 from .crop import crop, inside_roi
 from .grid import onto_grid
-from .labels import doubted, labels_in, whole
+from .labels import Labelled, doubted, labels_in, whole
 from .selection import Chosen, choose
 
 if TYPE_CHECKING:
@@ -54,51 +54,98 @@ class Selected:
         return self.chosen.mask
 
 
-def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> Stage[Selected]:
-    """Turn the slices of a study the way they are asked for, crop them, and choose voxels by gray level or label.
+@dataclass(frozen=True)
+class LaidOut:
+    """A study as it is looked at, before any voxel is chosen: the same for all of its labels.
+
+    Attributes
+    ----------
+    volume : Volume
+        The part of it that is asked for, its slices along K.
+    plane : str
+        Of the slices: axial, coronal or sagittal.
+    labels : Labelled or None
+        Where labels choose: the label map on its grid, itself or one beside it.
+    inside : (K, J, I) bool array or None
+        The voxels that may be chosen, where not all may.
+    cropped : dict or None
+    """
+
+    volume: Volume
+    plane: str
+    labels: Labelled | None
+    inside: NDArray[np.bool_] | None
+    cropped: dict[str, list[int]] | None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What its readers, and those of the label map, have decided."""
+        beside = () if self.labels is None or self.labels.volume is self.volume else self.labels.volume.notes
+        return self.volume.notes + beside
+
+
+def lay_out(volume: Volume, labels: Volume | None, settings: Settings, *, labelled: bool) -> LaidOut:
+    """Turn the slices of a study the way they are asked for, crop them, and lay a label map over them.
 
     Parameters
     ----------
     volume : Volume
     labels : Volume or None
-        A label map, for ``select``; where there is none, the study is the label map itself.
+        A label map; where there is none and labels choose, the study is the label map itself.
     settings : Settings
+    labelled : bool
+        Whether labels choose the voxels.
 
     Raises
     ------
     UsageError, EmptyError
-        Where the input is no study, or nothing is left of it.
+        Where the input is no study, no label map, or nothing is left of it.
     """
     if not isinstance(volume, Volume):
         raise UsageError(
-            "a study is a Volume",
-            found=type(volume).__name__,
+            "a study is a Volume", found=type(volume).__name__,
             expected="read_volume(path) or Volume.from_stored(array, affine)",
-        )
-    if settings.window.fill_slices and settings.window.select is None:
-        raise UsageError("slices are filled between labels", found="--fill-slices", hint="--select with the labels")
-    if settings.window.select is not None and labels is None:
-        volume = whole(volume)
+        )  # fmt: skip
+    _check_labelled(labels, settings, labelled=labelled)
+    volume = whole(volume) if labelled and labels is None else volume
     axis = _slice_axis(volume, settings.network.slices)
     part, box = crop(volume, settings.crop, axis)
     study = part.along(axis)
-    notes = study.notes
-    if labels is not None:
-        labels = _fitting(labels, volume, settings).cropped(box).along(axis)
-        notes += labels.notes
-    chosen = _choose(study, labels, settings)
-    kept = tuple(box[n] for n in order_along(axis))
-    section = _section(
-        study,
-        AXES[axis],
-        _cropped(kept, volume.along(axis).shape),
-        notes + _dropped(chosen, settings) + _sparse(chosen) + _cut_off(chosen.value.mask),
-    )
-    doubt = settings.window.select is not None and doubted(study if labels is None else labels)
-    warnings = (*_doubts(chosen.value, settings), *((doubt,) if doubt else ()))
+    laid = study if labels is None else _fitting(labels, volume).cropped(box).along(axis)
+    cropped = _cropped(tuple(box[n] for n in order_along(axis)), volume.along(axis).shape)
+    found = Labelled.of(laid) if labelled else None
+    return LaidOut(study, AXES[axis], found, inside_roi(study, settings.crop.roi), cropped)
+
+
+def _check_labelled(labels: Volume | None, settings: Settings, *, labelled: bool) -> None:
+    """Refuse what needs labels where none is chosen."""
+    if settings.window.fill_slices and not labelled:
+        raise UsageError("slices are filled between labels", found="--fill-slices", hint="--select with the labels")
+    if labels is not None and not labelled:
+        raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
+
+
+def select_in(study: LaidOut, settings: Settings) -> Stage[Selected]:
+    """Choose voxels of a study by gray level or label.
+
+    Raises
+    ------
+    UsageError, EmptyError
+        As `choose`.
+    """
+    chosen = _choose(study, settings)
+    notes = study.notes + _dropped(chosen, settings) + _sparse(chosen) + _cut_off(chosen.value)
+    section = _section(study.volume, study.plane, study.cropped, notes)
+    doubt = () if study.labels is None else doubted(study.labels)
+    warnings = (*_doubts(chosen.value, settings), *doubt)
     window = {"window": _window(chosen.value, settings)}
-    selected = Selected(study, AXES[axis], chosen.value)
+    selected = Selected(study.volume, study.plane, chosen.value)
     return folded(selected, Stage(None, {"study": section}), chosen, Stage(None, window, warnings))
+
+
+def select_study(volume: Volume, labels: Volume | None, settings: Settings) -> Stage[Selected]:
+    """Lay out a study, and choose its voxels; parameters and errors are those of `lay_out` and `select_in`."""
+    return select_in(lay_out(volume, labels, settings, labelled=settings.window.select is not None), settings)
 
 
 def _slice_axis(volume: Volume, slices: str) -> int:
@@ -107,10 +154,8 @@ def _slice_axis(volume: Volume, slices: str) -> int:
     return volume.stored_axis if slices == "stored" else AXES.index(slices)
 
 
-def _fitting(labels: Volume, volume: Volume, settings: Settings) -> Volume:
-    """Lay a label map onto the study's grid; refuse one of which no label is asked for."""
-    if settings.window.select is None:
-        raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
+def _fitting(labels: Volume, volume: Volume) -> Volume:
+    """Lay a label map onto the study's grid."""
     labels = whole(labels)
     try:
         return onto_grid(labels, volume)
@@ -123,8 +168,8 @@ def _fitting(labels: Volume, volume: Volume, settings: Settings) -> Volume:
 
 
 @timed("window")
-def _choose(study: Volume, labels: Volume | None, settings: Settings) -> Stage[Chosen]:
-    return Stage(choose(study, labels, settings, inside_roi(study, settings.crop.roi)))
+def _choose(study: LaidOut, settings: Settings) -> Stage[Chosen]:
+    return Stage(choose(study.volume, study.labels, settings, study.inside))
 
 
 def _section(study: Volume, plane: str, cropped: dict[str, list[int]] | None, notes: tuple[str, ...]) -> dict[str, Any]:
@@ -161,9 +206,10 @@ def _dropped(chosen: Stage[Chosen], settings: Settings) -> tuple[str, ...]:
     )
 
 
-def _cut_off(mask: NDArray[np.bool_]) -> tuple[str, ...]:
+def _cut_off(chosen: Chosen) -> tuple[str, ...]:
     """Say at which end slices a window is cut off, and goes on beyond the study."""
-    pixels = np.count_nonzero(mask, axis=(1, 2))
+    pixels = np.zeros(len(chosen.mask), np.int64)
+    pixels[chosen.box[0]] = np.count_nonzero(chosen.mask[chosen.box], axis=(1, 2))
     ends = [name for name, end in (("first", 0), ("last", -1)) if pixels[end] > CUT_OFF * pixels.max()]
     return (
         (f"the window is cut off at the {' and the '.join(ends)} slice: the surface is closed there",) if ends else ()
@@ -186,9 +232,9 @@ def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:
         "chosen_by": chosen_by(settings),
         "lower_from": _from("lower", lower, settings),
         "upper_from": _from("upper", upper, settings),
-        "voxels": int(mask.sum()),
-        "share": float(mask.mean()),
-        "touches_border": bool(any(_edges(mask))),
+        "voxels": chosen.kept,
+        "share": chosen.kept / mask.size,
+        "touches_border": any(_edges(chosen)),
         **_became(chosen.counts, chosen.cleaned or Cleaned(mask)),
     }
 
@@ -225,9 +271,10 @@ def _from(name: str, limit: Limit, settings: Settings) -> str | None:
     return None if np.isinf(limit).all() else "given" if given else chosen_by(settings)
 
 
-def _edges(mask: NDArray[np.bool_]) -> list[np.bool_]:
+def _edges(chosen: Chosen) -> list[bool]:
     """Tell of both sides of each axis whether a kept voxel lies on them."""
-    return [np.take(mask, end, axis=axis).any() for axis in range(3) for end in (0, -1)]
+    sides = zip(chosen.box, chosen.mask.shape, strict=True)
+    return [end for side, size in sides for end in (side.start == 0, side.stop == size)]
 
 
 def _doubts(chosen: Chosen, settings: Settings) -> list[str]:
@@ -242,7 +289,7 @@ def _doubts(chosen: Chosen, settings: Settings) -> list[str]:
         )
     if chosen_by(settings) == "otsu" and len(labels_in(chosen.volume.voxels[::APART])) > 1:
         warnings.append("labels of a label map were taken for gray levels: --select chooses labels")
-    if any(_edges(chosen.mask)[2:]):
+    if any(_edges(chosen)[2:]):
         warnings.append("the window touches the border of the slices: the surface is closed along it")
     return warnings
 

@@ -29,7 +29,8 @@ def segment_by_voxels(kept: Selected, settings: Settings, progress: Progress) ->
     progress("voxels", 0, 1)
     bounded = measured(
         "points", boundary, chosen.volume, chosen.mask, lower=chosen.lower, upper=chosen.upper,
-        layers=settings.window.layers, surface=surface, divide=settings.cubes.divide, threads=settings.run.threads,
+        layers=settings.window.layers, surface=surface, divide=settings.cubes.divide, around=chosen.box,
+        threads=settings.run.threads,
     )  # fmt: skip
     progress("voxels", 1, 1)
     found, spacing = bounded.value, max(kept.study.spacing_mm)

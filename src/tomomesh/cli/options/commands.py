@@ -56,8 +56,9 @@ def _reconstruct(commands: Any) -> None:
     main = _command(commands, "reconstruct", "a study of slices in, a closed surface out", epilog=_ways("study"))
     add_study(main)
     main.add_argument(
-        "-o", "--output", required=True, metavar="MESH", help=f"{STUDY_MESH}, or - with --format; with --each, a folder"
-    )
+        "-o", "--output", required=True, metavar="MESH",
+        help=f"{STUDY_MESH}, or - with --format; with --each or --each-label, a folder",
+    )  # fmt: skip
     add_streams(main, STUDY_FORMATS, STUDY_MESH_FORMATS)
     add_each(main)
     add_outputs(main, "points", "labels", "mask_out", "figures").add_argument(

@@ -54,6 +54,18 @@ def add_each(parser: argparse.ArgumentParser) -> None:
         help="STUDY is a folder of studies, each reconstructed into the folder MESH: NAME.stl (or --format), its "
         "report NAME.json, and all in reports.csv; what is finished is passed over",
     )
+    group.add_argument(
+        "--each-label",
+        action="store_true",
+        help="each label of a label map, or each of --select, is reconstructed by itself into the folder MESH: "
+        "label-0005-NAME.stl (or --format), its report .json beside it, and all in reports.csv; the map is read once",
+    )
+    group.add_argument(
+        "--label-names",
+        metavar="FILE",
+        help="names of the labels, for --each-label and --select: a table .csv or .tsv, .json, or the text of "
+        "FreeSurfer, ITK-SNAP or 3D Slicer; where not given, those in the label map's own file",
+    )
     group.add_argument("--force", action="store_true", help="reconstruct again what is finished")
     group.add_argument(
         "--workers", type=int, metavar="N", help="work on N studies at once, each in a process of its own, with Dask"

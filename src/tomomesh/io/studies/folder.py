@@ -142,6 +142,18 @@ def _slices_in(folder: Path, top: Path, wanted: int | None) -> list[Study]:
     return [Study(name, folder, wanted if slices.dicom else None, files)] if files else []
 
 
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Return the files that a study may be read from.
+
+    Raises
+    ------
+    UnreadableError, FormatError
+        Where there is none.
+    """
+    path = existing(path)
+    return tuple(regular_files(path, deep=True, hidden=True)[0]) if path.is_dir() else _beside(path)
+
+
 def _beside(path: Path) -> tuple[Path, ...]:
     """Return the files that a volume may be read from: a header may name any file in its folder."""
     return tuple(regular_files(path.parent)[0]) if suffix_of(path) in DETACHED_HEADERS else (path,)

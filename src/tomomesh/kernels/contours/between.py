@@ -140,10 +140,11 @@ def blend(
         Result.
     """
     rows, columns = depth.shape
+    none = np.float32(reach * reach)  # as `away` holds it, which may be less
     for j in range(rows):
         for i in range(columns):
             low, high = below[j, i], above[j, i]
-            if away[j, i] < reach * reach:
+            if away[j, i] < none:
                 weight = min(2.0 - 2.0 * np.sqrt(away[j, i]) / reach, 1.0)
                 for side in range(2):
                     x = min(max(i + weight * carried[j, i, 2 * side], 0.0), columns - 1.0)

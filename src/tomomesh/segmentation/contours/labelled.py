@@ -12,12 +12,14 @@ import scipy
 from ...contours.slices import Slices
 from ...contours.stack import solid_between
 from ...errors import UsageError
+from ...model.boxes import box_of
 from ...progress import Progress, silent
 from .loops import trace
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ...model.boxes import Box
     from ...model.volume import Volume
 
     Mask = NDArray[np.bool_]
@@ -62,7 +64,7 @@ class Gaps:
         return f"{len(gone)} {across} are empty between {len(self.labelled)} that hold labels ({named})"
 
 
-def gaps_in(mask: Mask) -> Gaps | None:
+def gaps_in(mask: Mask, around: Box | None = None) -> Gaps | None:
     """Find the empty slices of labels of which some slices alone were drawn; None where there are none.
 
     Either no two of the slices with labels are neighbors, for the most part, or a body is cut off on both sides of a
@@ -72,9 +74,12 @@ def gaps_in(mask: Mask) -> Gaps | None:
     ----------
     mask : (K, J, I) bool array
         The voxels of the labels that are wanted.
+    around : box, optional
+        Outside of which there are none.
     """
-    found = [_gaps_across(mask, axis) for axis in range(mask.ndim)]
-    return next((one for one in found if one is not None), None)
+    box = box_of(mask, around)
+    found = [_gaps_across(mask[box], axis) for axis in range(mask.ndim)]
+    return next((Gaps(one.axis, box[one.axis].start + one.labelled) for one in found if one is not None), None)
 
 
 def _gaps_across(mask: Mask, axis: int) -> Gaps | None:
