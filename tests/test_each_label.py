@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import nibabel
 import numpy as np
@@ -25,12 +26,15 @@ from tomomesh.errors import UsageError
 from tomomesh.segmentation.labels import Labelled
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from _pytest.capture import CaptureFixture
     from numpy.typing import NDArray
 
     from tomomesh.results import Surface
+
+T = TypeVar("T")
 
 APOSTROPHE = "'"
 """In front of what a spreadsheet may take for a formula."""
@@ -64,13 +68,12 @@ def label_maps(draw: st.DrawFn) -> NDArray[Any]:
     return voxels
 
 
-def outcome(make: Any) -> Surface | str:
-    """Return a surface, or the words in which it is refused."""
+def outcome(make: Callable[[], T]) -> T | str:
+    """Return what is made, or the words in which it is refused."""
     try:
-        made: Surface = make()
+        return make()
     except TomomeshError as fault:
         return f"{fault.exit_code} {fault}"
-    return made
 
 
 def told(surface: Surface) -> dict[str, Any]:
@@ -82,11 +85,8 @@ class TestLaw:
     @given(label_maps(), st.sampled_from(ASKED))
     def test_each_surface_is_that_of_its_label_alone(self, voxels: NDArray[Any], options: dict[str, Any]) -> None:
         volume = Volume.from_stored(voxels, AFFINE)
-        alone = {
-            n: outcome(lambda n=n: reconstruct(volume, select=(n,), **options))
-            for n in np.unique(voxels.astype(np.int64)).tolist()
-            if n
-        }
+        numbers = [number for number in np.unique(voxels.astype(np.int64)).tolist() if number]
+        alone = {number: outcome(partial(reconstruct, volume, select=(number,), **options)) for number in numbers}
         found = outcome(lambda: reconstruct_labels(volume, **options))
         if isinstance(found, str):
             assert all(isinstance(one, str) for one in alone.values())
@@ -94,7 +94,7 @@ class TestLaw:
         assert set(found) <= set(alone)
         assert all(isinstance(one, str) for number, one in alone.items() if number not in found)
         for number in found:
-            one, other = alone[number], outcome(lambda n=number: found[n])
+            one, other = alone[number], outcome(partial(found.__getitem__, number))
             if isinstance(one, str) or isinstance(other, str):
                 assert one == other
                 continue
@@ -110,7 +110,9 @@ class TestLaw:
         assert 4 not in found
         chosen = reconstruct_labels(Volume.from_stored(blocks(), AFFINE), select=(7, 4, 7))
         assert list(chosen) == [7, 4]
-        assert chosen[7].segmentation.mask.sum() == np.count_nonzero(blocks() == 7)
+        segmented = chosen[7].segmentation
+        assert segmented is not None
+        assert segmented.mask.sum() == np.count_nonzero(blocks() == 7)
         with pytest.raises(TomomeshError, match="no such label"):
             chosen[4]
 
