@@ -178,6 +178,20 @@ class TestEdge:
         assert errors[0] > 2.5 * errors[1] > 6 * errors[2]
 
 
+class TestCoincident:
+    @pytest.mark.parametrize("seed", [104, 108, 110, 140])
+    def test_vertices_come_to_lie_at_no_position_of_another(self, seed: int) -> None:
+        """A net without springs in noise has corners so sharp that a vertex moved onto one that was kept."""
+        source = np.random.default_rng(seed)
+        noise = ndimage.gaussian_filter(source.normal(size=source.integers(8, 26, 3)), source.uniform(1, 3))
+        levels = (1000 * noise / np.abs(noise).max()).astype(np.int16)
+        volume = Volume.from_stored(levels, np.eye(4))
+        made = reconstruct(volume, lower=float(np.percentile(levels, 60)), way="voxels", stiffness=0.0)
+        assert made.report["remesh"]["done"]
+        assert len(np.unique(made.mesh.vertices, axis=0)) == len(made.mesh.vertices)
+        assert made.report["quality"]["self_intersections"] == 0
+
+
 class TestFewer:
     @law(12)
     @given(share=st.floats(0.02, 0.99))

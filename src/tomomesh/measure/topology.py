@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InternalCheckError
 from ..kernels.measure.positions import first_equal
+from ..model.columns import any_of
 from ..model.mesh import TriMesh
 from .links import Links
 from .shape import areas_and_volumes
@@ -167,6 +168,13 @@ def count_positions(positions: NDArray[np.float64]) -> int:
     """Count positions (n, 3), equal ones once; each -0 becomes 0, in place."""
     first = first_equals(positions)
     return int((first == np.arange(len(first))).sum())
+
+
+def with_equal_corners(vertices: NDArray[np.float64], faces: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
+    """Mark the faces (m, 3) with a corner at the position of another vertex, (m,)."""
+    first = first_equals(np.array(vertices, order="C"))
+    many = np.bincount(first, minlength=len(first)) > 1
+    return any_of(many[first][faces]) if many.any() else np.zeros(len(faces), np.bool_)
 
 
 def first_equals(positions: NDArray[np.float64]) -> NDArray[np.int32]:

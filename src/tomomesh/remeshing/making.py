@@ -17,6 +17,7 @@ from ..kernels.remeshing.splits import split_edges
 from ..kernels.remeshing.surface import normals_of
 from ..kernels.threads import in_blocks
 from ..measure.intersections import marked_in
+from ..measure.topology import with_equal_corners
 from ..measure.tree import Tree
 from ..model.columns import any_of, mean_over
 from ..model.mesh import TriMesh
@@ -89,9 +90,11 @@ class Making:
         return TriMesh(self.places[used], faces.astype(np.int64)), self.under[used]
 
     def crossing(self) -> NDArray[np.bool_]:
-        """Mark the faces (m,) that pass through others; before there is a mesh, whose numbers have twice the bits."""
+        """Mark the faces (m,) that meet others; before there is a mesh, whose numbers have twice the bits."""
         used, faces = self._numbered()
-        return marked_in(Tree.over(self.places[used], faces, threads=self._threads), threads=self._threads)
+        places = self.places[used]
+        crosses = marked_in(Tree.over(places, faces, threads=self._threads), threads=self._threads)
+        return crosses | with_equal_corners(places, faces)
 
     def _numbered(self) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
         """Tell which vertices (n,) are used, and return the faces (m, 3) by their numbers among these."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..measure.intersections import crossing_of
+from ..measure.topology import with_equal_corners
 from ..model.mesh import TriMesh
 from .making import Making
 
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
 
     Marks = NDArray[np.bool_]
     Made = tuple[TriMesh, NDArray[np.int32], Marks]
-    """A mesh, the face of the surface before under each vertex, and the faces that pass through others."""
+    """A mesh, the face of the surface before under each vertex, and the faces that pass through others or touch
+    them at a vertex of their own."""
 
 ROUNDS = 5
 """Most rounds of splits, collapses, flips and moves."""
@@ -74,12 +76,17 @@ def _repaired(making: Making, most: float, threads: int) -> Made:
             break
         around = repair(making, crosses)
         made, under = making.mesh()
-        crosses = crossing_of(made, around, threads=threads)
+        crosses = _meeting(made, around, threads)
         if len(made.faces) > most:
             break
         if crosses.sum() < best[2].sum():
             best = made, under, crosses
     return best
+
+
+def _meeting(mesh: TriMesh, some: Marks, threads: int) -> Marks:
+    """Mark the faces (m,) that pass through `some` of them (m,), and those with two vertices at one position."""
+    return crossing_of(mesh, some, threads=threads) | with_equal_corners(mesh.vertices, mesh.faces)
 
 
 def _resize(making: Making, crosses: Marks, share: float) -> Marks:
@@ -101,7 +108,7 @@ def made_anew(ground: Ground, kept: Marks, before: Made, most: float, threads: i
     faces = np.concatenate([(np.cumsum(used) - 1)[left], other.faces + used.sum()])
     joined = TriMesh(np.concatenate([made.vertices[used], other.vertices]), faces)
     fresh = np.arange(len(faces)) >= len(left)
-    return joined, np.concatenate([under[used], below]), crossing_of(joined, fresh, threads=threads)
+    return joined, np.concatenate([under[used], below]), _meeting(joined, fresh, threads)
 
 
 def _round(making: Making, *, split: bool = True) -> float:
