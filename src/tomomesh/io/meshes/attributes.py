@@ -97,12 +97,10 @@ def _narrow(positions: NDArray[np.float64]) -> NDArray[np.float32] | None:
     near = np.isfinite(wide).all() and np.abs(wide - positions).max(initial=0) <= MOVED * _distance(positions)
     if not near:
         return None
-    apart = count_positions(wide)  # most meshes have each position once: then the others need not be counted
-    return (
-        narrow
-        if apart == len(positions) or apart == count_positions(np.array(positions, np.float64, order="C"))
-        else None
-    )
+    apart, exact = count_positions(wide), np.array(positions, np.float64, order="C")
+    # most meshes have each position once: then the exact ones need not be counted
+    all_apart = apart == len(positions) or apart == count_positions(exact)
+    return narrow if all_apart else None
 
 
 def _distance(positions: NDArray[np.float64]) -> float:
