@@ -1,14 +1,15 @@
-"""Sizes, and the shapes whose truth is known."""
+"""Sizes, the shapes whose truth is known, and a cluster of two processes."""
 
 from __future__ import annotations
 
+import logging
 import os
 import pkgutil
 from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pytest
@@ -151,3 +152,33 @@ def torus(count: int, radius: float = 10.0, tube: float = 4.0) -> NDArray[np.flo
     around = np.interp((np.arange(count) + 0.5) / count * area[-1], area, fine)
     ring = radius + tube * np.cos(around)
     return np.column_stack([ring * np.cos(along), ring * np.sin(along), tube * np.sin(around)])
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """Two worker processes on loopback; one death is enough for Dask to hand a task back."""
+    dask = pytest.importorskip("dask", reason="the extra `scale` is not installed")
+    distributed = pytest.importorskip("distributed", reason="the extra `scale` is not installed")
+    asked = {
+        "distributed.scheduler.allowed-failures": 0,
+        "distributed.scheduler.worker-saturation": 1.0,
+        "temporary-directory": str(tmp_path_factory.mktemp("scratch")),
+    }
+    with (
+        dask.config.set(asked),
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, host="127.0.0.1", memory_limit=0,
+            silence_logs=logging.CRITICAL, dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},
+        ) as made,
+    ):  # fmt: skip
+        yield made
+
+
+@pytest.fixture
+def client(here: Any) -> Iterator[Any]:
+    """Hand over who gives tasks to these two."""
+    from distributed import Client
+
+    with Client(here, set_as_default=False) as made:
+        made.wait_for_workers(2)
+        yield made

@@ -19,7 +19,7 @@ from conftest import law
 from segmentations import written as dicom_segmentation
 from studies import write_nifti
 from test_io_nrrd import BALL, CORE, layered, segment
-from tomomesh import TomomeshError, Volume, io, reconstruct, reconstruct_labels
+from tomomesh import TomomeshError, Volume, reconstruct, reconstruct_labels
 from tomomesh.cli import main
 from tomomesh.cli.each_label import SINGLE
 from tomomesh.errors import UsageError
@@ -301,59 +301,3 @@ class TestNames:
             line = f"reconstruct {path} --select {row['label']} -o {tmp_path}/m.stl --quiet"
             assert main(line.split()) == 0
             assert (tmp_path / "out" / f"{row['name']}.stl").read_bytes() == (tmp_path / "m.stl").read_bytes()
-
-
-TABLES = {
-    "bids.tsv": "index\tname\tcolor\n2\tleft lobe\t#ff0000\n14175\twm_rh\t#00ff00\n",
-    "excel.csv": "Name;Label\nleft lobe;2.0\nwm_rh;14175\n",
-    "plain.csv": "2,left lobe\n14175,wm_rh\n",
-    "slicer.csv": "LabelValue,Name,Color_R,Color_G,Color_B,Color_A\n2,left lobe,1,2,3,255\n14175,wm_rh,1,2,3,255\n",
-    "total.json": '{"2": "left lobe", "14175": "wm_rh"}',
-    "dataset.json": '{"labels": {"left lobe": 2, "wm_rh": 14175}, "channel_names": {"0": "CT"}}',
-    "snap.label": '# ITK-SNAP\n    2   255 0 0   1  1  1    "left lobe"\n14175 0 255 0 0.5 1 0 "wm_rh"\n',
-    "snap.txt": '2 255 0 0 1 1 1 "left lobe"\n14175 0 255 0 1 1 1 "wm_rh"\n',
-}
-PLAIN = {
-    "FreeSurferColorLUT.txt": "#No. Label Name: R G B A\n\n2   left_lobe   245 245 245 0\n14175 wm_rh 1 2 3 0\n",
-    "slicer.ctbl": "# Color table file\n2 left_lobe 245 245 245 255\n14175 wm_rh 1 2 3 255\n",
-    "two.lut": "2 left_lobe\n14175 wm_rh\n",
-}
-WRONG = {
-    "a.csv": "color,size\nred,3\n",
-    "b.csv": "index,name\nx,liver\n",
-    "c.json": "[1, 2]",
-    "d.json": '{"1": {"name": "liver"}}',
-    "e.txt": "1 liver and more\n",
-    "f.txt": "<?xml version='1.0'?>\n",
-    "g.tsv": "index\tname\n3\n",
-    "h.csv": "",
-    "i.csv": "index,name\n",
-    "j.csv": "index,name\n3,a\n3,b\n",
-    "k.json": "{",
-    "l.txt": "\udcff\udcfe\udcfa",
-}
-
-
-class TestTables:
-    @pytest.mark.parametrize("name", TABLES | PLAIN)
-    def test_names_are_those_that_programs_write(self, name: str, tmp_path: Path) -> None:
-        (tmp_path / name).write_text((TABLES | PLAIN)[name])
-        first = "left lobe" if name in TABLES else "left_lobe"
-        assert io.read_label_names(tmp_path / name) == {2: first, 14175: "wm_rh"}
-
-    @pytest.mark.parametrize("name", WRONG)
-    def test_what_is_no_table_is_refused_in_one_line(
-        self, name: str, tmp_path: Path, capsys: CaptureFixture[str]
-    ) -> None:
-        (tmp_path / name).write_bytes(WRONG[name].encode("utf-8", "surrogateescape"))
-        assert each(written(tmp_path), "--label-names", str(tmp_path / name)) == 4
-        line, *more = capsys.readouterr().err.splitlines()
-        assert name in line
-        assert not more
-        assert not (tmp_path / "out").exists()
-
-    def test_numbers_in_any_order_come_to_the_same(self, tmp_path: Path) -> None:
-        rows = [f"{n},organ {n}" for n in range(1, 40)]
-        for order in (rows, rows[::-1]):
-            (tmp_path / "n.csv").write_text("\n".join(["id,structure", *order]))
-            assert io.read_label_names(tmp_path / "n.csv") == {n: f"organ {n}" for n in range(1, 40)}

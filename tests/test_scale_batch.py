@@ -2,39 +2,25 @@
 
 from __future__ import annotations
 
-import csv
 import json
-import logging
-import math
 import os
 import signal
 import subprocess
 import sys
-import time
-from contextlib import suppress
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from conftest import law
+from batches import OPTIONS, as_alone, ball, batch, codes, results, table, until
 from studies import write_nifti
 from tomomesh.cli import main
-from tomomesh.kernels.threads import cores
-from tomomesh.scale.cluster import Cluster
-from tomomesh.scale.tasks import Tasks
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from _pytest.capture import CaptureFixture
 
-    from tomomesh.scale.tasks import Told
 
 dask = pytest.importorskip("dask", reason="the extra `scale` is not installed")
 distributed = pytest.importorskip("distributed", reason="the extra `scale` is not installed")
@@ -42,41 +28,7 @@ pytest.importorskip("cryptography", reason="the extra `scale` is not installed")
 psutil = pytest.importorskip("psutil", reason="it comes with distributed")
 resource = pytest.importorskip("resource", reason="workers are killed by signals, which this system lacks")
 
-OPTIONS = ["--each", "--lower", "50", "--format", "ply"]
 STUDIES, MANY = 3, 20
-WAIT_S = 60.0
-"""Most that processes may take to end on a busy machine."""
-
-
-@pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """Two worker processes on loopback; one death is enough for Dask to hand a task back."""
-    settings = {
-        "distributed.scheduler.allowed-failures": 0,
-        "distributed.scheduler.worker-saturation": 1.0,
-        "temporary-directory": str(tmp_path_factory.mktemp("scratch")),
-    }
-    with (
-        dask.config.set(settings),
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, host="127.0.0.1", memory_limit=0,
-            silence_logs=logging.CRITICAL, dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},
-        ) as made,
-    ):  # fmt: skip
-        yield made
-
-
-@pytest.fixture
-def client(here: Any) -> Iterator[Any]:
-    with distributed.Client(here, set_as_default=False) as made:
-        made.wait_for_workers(2)
-        yield made
-
-
-def ball(side: int) -> Any:
-    """Return a ball of 100 in 0."""
-    k, j, i = (axis - (side - 1) / 2 for axis in np.ogrid[:side, :side, :side])
-    return np.where(k**2 + j**2 + i**2 < (0.35 * side) ** 2, 100, 0).astype(np.uint8)
 
 
 @pytest.fixture
@@ -90,41 +42,8 @@ def folder(tmp_path: Path) -> Path:
     return made
 
 
-def batch(folder: Path, out: str, *options: str) -> int:
-    return main(["reconstruct", str(folder), "-o", str(folder.parent / out), *OPTIONS, *options])
-
-
 def on(here: Any) -> list[str]:
     return ["--scheduler", here.scheduler_address]
-
-
-def table(folder: Path, out: str) -> list[dict[str, str]]:
-    """Return the rows of a table, without what is about time."""
-    with (folder.parent / out / "reports.csv").open(newline="", encoding="utf-8") as file:
-        return [row | {"seconds": ""} for row in csv.DictReader(file)]
-
-
-def codes(folder: Path, out: str) -> dict[str, str]:
-    return {row["name"]: row["exit_code"] for row in table(folder, out)}
-
-
-def results(folder: Path, out: str) -> dict[str, object]:
-    """Return what a batch has left: bytes of meshes, reports without what is about time, and names of all else."""
-    found: dict[str, object] = {}
-    for path in sorted((folder.parent / out).iterdir()):
-        found[path.name] = path.read_bytes() if path.suffix == ".ply" else None
-        if path.suffix == ".json":
-            report = json.loads(path.read_text())
-            del report["timings"], report["batch"]["seconds"]
-            found[path.name] = report
-    return found
-
-
-def as_alone(folder: Path, out: str) -> bool:
-    """Tell whether a batch has left the very same as one that does one study after the other."""
-    if not (folder.parent / "alone").exists():
-        assert batch(folder, "alone", "--quiet") == 10
-    return results(folder, out) == results(folder, "alone") and table(folder, out) == table(folder, "alone")
 
 
 class TestSame:
@@ -257,7 +176,7 @@ class TestFaults:
 
         for number in range(MANY):
             write_nifti(folder / f"t{number}.nii", ball(14), np.eye(4))
-        with scheduler_and_worker(tmp_path) as (scheduler, file):
+        with SchedulerAndWorker(tmp_path) as (scheduler, file):
             told = summary.of_row
 
             def and_away(place: str, row: dict[str, Any]) -> str:
@@ -283,7 +202,7 @@ def _blind(name: str) -> None:
     vars(found)["existing"] = seen
 
 
-class scheduler_and_worker:  # noqa: N801
+class SchedulerAndWorker:
     """A scheduler and a worker of its own, in processes that can be killed."""
 
     def __init__(self, folder: Path) -> None:
@@ -307,175 +226,6 @@ class scheduler_and_worker:  # noqa: N801
         for process in self._processes:
             process.kill()
             process.wait()
-
-
-def until(true: Callable[[], Any]) -> None:
-    """Wait for something that comes about soon."""
-    for _ in range(int(WAIT_S / 0.05)):
-        if true():
-            return
-        time.sleep(0.05)
-    raise AssertionError("it did not come about")
-
-
-def _echo(number: int, told: Told) -> tuple[int, int]:
-    told("echo", 1, 1)
-    return number, cores()
-
-
-class TestTasks:
-    @pytest.mark.parametrize("pooled", [True, False])
-    def test_large_ones_are_done_by_themselves_and_too_large_ones_not(self, client: Any, pooled: bool) -> None:
-        cluster = Cluster(client, {"127.0.0.1": 2}, share=10, most=100, pooled=pooled)
-        heard: list[int] = []
-        warned: dict[int, str] = {}
-        tasks = Tasks(
-            _echo, [50, 5, 200, 7, 60], float, lambda number, *stage: heard.append(number), warned.__setitem__
-        )
-        found = list(tasks.done_on(cluster))
-        order = [number for number, _ in found]
-        assert (order[0], sorted(order[1:3]), order[3:]) == (2, [1, 3], [0, 4])
-        by_number = dict(found)
-        assert by_number[2].exit_code == 7
-        assert "Expected: at most 100 bytes" in str(by_number[2])
-        assert warned.keys() == {0, 4}
-        assert warned[0] == "by itself, as it needs about 50 bytes, and a worker's share is 10 bytes"
-        until(lambda: sorted(heard) == [0, 1, 3, 4])
-        half, whole = max(dask.system.CPU_COUNT // 2, 1), dask.system.CPU_COUNT
-        assert by_number[1] == (5, half)
-        assert by_number[3] == (7, half)
-        assert by_number[0] == (50, whole)
-
-    @law(100)
-    @given(st.integers(1, 100), st.floats(1, 100), st.floats(1, 1e4))
-    def test_as_many_as_fit_are_done_at_once(self, slots: int, share: float, size: float) -> None:
-        """Of one memory; were there twice as many, they would not fit."""
-        count = Cluster(None, {"a": slots}, share, math.inf, pooled=True).fitting(size)
-        assert 1 <= count <= slots
-        assert count == 1 or count * size <= slots * share * (1 + 1e-12)
-        assert count == slots or (2 * count + 1) * size > slots * share
-
-    def test_nothing_is_left_on_the_scheduler(self, client: Any) -> None:
-        cluster = Cluster(client, {"127.0.0.1": 2}, share=10, most=100, pooled=True)
-        tasks = Tasks(_forever, [0, 1], float, lambda *stage: None, lambda *why: None)
-        coming = tasks.done_on(cluster)
-        assert next(coming) == (0, "done")
-        coming.close()
-        until(lambda: not client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks)))
-        until(lambda: not any(client.processing().values()))
-        until(lambda: all(not count for count in client.run(_at_work).values()))
-
-
-def _forever(item: int, told: Told) -> str:
-    """Work until nobody wants it any more, but for one."""
-    if item == 0:
-        return "done"
-    while True:
-        told("working", 0, 1)
-        time.sleep(0.01)
-
-
-def _at_work(dask_worker: Any) -> int:
-    return len(dask_worker.state.tasks)
-
-
-def children_of(process: subprocess.Popen[str]) -> list[Any]:
-    return list(psutil.Process(process.pid).children(recursive=True))
-
-
-def line_of(process: Any) -> str:
-    with suppress(psutil.Error):
-        return " ".join(process.cmdline())
-    return ""
-
-
-def addresses(processes: list[Any]) -> set[str]:
-    """Return where processes listen."""
-    found = (one for process in processes for one in process.net_connections("inet"))
-    return {one.laddr.ip for one in found if one.status == psutil.CONN_LISTEN}
-
-
-class TestOwnWorkers:
-    """The program with --workers, in a process of its own, as a user at a terminal starts it."""
-
-    @pytest.fixture
-    def many(self, tmp_path: Path) -> Path:
-        made = tmp_path / "studies"
-        made.mkdir()
-        for number in range(12):
-            write_nifti(made / f"s{number:02d}.nii", ball(30), np.eye(4))
-        for name in ("temporary", "current"):
-            (tmp_path / name).mkdir()
-        return made
-
-    @pytest.fixture
-    def starting(self, many: Path) -> Iterator[subprocess.Popen[str]]:
-        """Start a batch that SIGINT reaches: a shell's background jobs ignore it."""
-        line = [sys.executable, "-m", "tomomesh", "reconstruct", str(many), "-o", str(many.parent / "out")]
-        with subprocess.Popen(
-            [*line, *OPTIONS, "--workers", "2"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            cwd=many.parent / "current", env={**os.environ, "TMPDIR": str(many.parent / "temporary")},
-            start_new_session=True, preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
-        ) as process:  # fmt: skip
-            yield process
-            process.kill()
-
-    @pytest.fixture
-    def started(self, starting: subprocess.Popen[str]) -> subprocess.Popen[str]:
-        """Hand it over when the first study is done."""
-        assert starting.stdout is not None
-        assert "sound" in starting.stdout.readline()
-        return starting
-
-    def nothing_left(self, many: Path, processes: list[Any]) -> bool:
-        """Tell whether processes are gone, and no file is left but whole results."""
-        _, alive = psutil.wait_procs(processes, WAIT_S)
-        until(lambda: not list((many.parent / "temporary").iterdir()))
-        left = [path.name for path in (many.parent / "out").iterdir() if path.name.startswith(".")]
-        return not alive and not left and not list((many.parent / "current").iterdir())
-
-    def test_to_the_end(self, many: Path, started: subprocess.Popen[str]) -> None:
-        workers = children_of(started)
-        assert addresses([psutil.Process(started.pid), *workers]) == {"127.0.0.1"}
-        said, heard = started.communicate(timeout=WAIT_S)
-        assert started.returncode == 0, heard
-        assert heard.splitlines()[0] == "waiting for workers"
-        assert heard.splitlines()[1].startswith("headers    12/12")
-        assert all(line.startswith("studies ") for line in heard.splitlines()[2:])
-        assert said.count("sound") == 11
-        assert self.nothing_left(many, workers)
-        assert batch(many, "alone", "--quiet") == 0
-        assert as_alone(many, "out")
-
-    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-    def test_stopped(self, many: Path, started: subprocess.Popen[str], number: int) -> None:
-        workers = children_of(started)
-        if number == signal.SIGINT:
-            os.killpg(started.pid, number)  # a terminal sends it to all
-        else:
-            started.send_signal(number)
-        _, heard = started.communicate(timeout=WAIT_S)
-        assert started.returncode == (130 if number == signal.SIGINT else 143)
-        assert "Traceback" not in heard
-        assert "distributed" not in heard
-        assert self.nothing_left(many, workers)
-        assert 1 <= len(table(many, "out")) < 12
-        assert set(codes(many, "out").values()) == {"0"}
-
-    def test_stopped_while_workers_start(self, many: Path, starting: subprocess.Popen[str]) -> None:
-        until(lambda: any("spawn_main" in line_of(child) for child in children_of(starting)))
-        workers = children_of(starting)
-        os.killpg(starting.pid, signal.SIGINT)
-        _, heard = starting.communicate(timeout=WAIT_S)
-        assert starting.returncode == 130
-        assert heard.splitlines() == ["waiting for workers", "", "interrupted; no unfinished file is left"]
-        (many.parent / "out").mkdir()  # it has not been made
-        assert self.nothing_left(many, workers)
-
-    def test_killed(self, many: Path, started: subprocess.Popen[str]) -> None:
-        workers = children_of(started)
-        started.kill()
-        assert self.nothing_left(many, workers)
 
 
 class TestUsage:
