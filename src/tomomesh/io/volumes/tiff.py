@@ -9,20 +9,24 @@ from __future__ import annotations
 import logging
 import math
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
 
 from ...errors import FormatError
+from ...model.lazy import LazyVoxels
 from ...model.units import millimeters
 from ...model.volume import Volume
 from ..files.extras import required
 from ..files.limits import require_bytes, require_memory
+from ..files.numbers import Numbers, Plain
+from ..files.parts import Seen, read_later
 from ..files.source import existing_file, third_party
 from .affine import GIVEN, UNTURNED, check_spacing, passed_over, required_spacing, upright
 from .gray import WHITE_IS_ZERO, bright_is_high, native
-from .raster import gray_or_color
+from .raster import gray_or_color, layers_last
 from .tiff_pages import check_chain
 
 if TYPE_CHECKING:
@@ -98,22 +102,79 @@ def _opened(path: Path, name: str) -> Iterator[Any]:
         yield pages
 
 
-def _stored(found: list[Any], path: Path, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+def _stored(found: list[Any], path: Path, name: str) -> tuple[Any, tuple[str, ...]]:
     """Return the voxels (K, J, I), or (K, J, I, 3), of a stack, and notes."""
-    require_memory(sum(one.nbytes for one in found), file=name)
+    if not read_later():
+        require_memory(sum(one.nbytes for one in found), file=name)
     for one in found:
         _check_promise(one, path.stat().st_size, name)
+    keyframe, planar = found[0].keyframe, _page_axes(found[0]) == "SYX"
+    stored = native(_numbers(found, path, name), file=name)
+    bits = keyframe.bitspersample if keyframe.photometric == WHITE_IS_ZERO or keyframe.bitspersample == 1 else 0
+    stored, turned = bright_is_high(stored, bits)
+    stored = layers_last(stored, (0, 2, 3) if planar else (0, 1, 2), file=name)
+    voxels, more = gray_or_color(stored, stored.shape[3], file=name)
+    return voxels, turned + more
+
+
+def _numbers(found: list[Any], path: Path, name: str) -> Any:
+    """Return the numbers of a stack, slices first, with an axis of 1 behind; or leave them where they are."""
+    page = found[0].shape[found[0].ndim - len(_page_axes(found[0])) :]
+    count = sum(math.prod(one.shape) for one in found) // math.prod(page)
+    shape, start = (count, *page, 1), found[0].dataoffset
+    if read_later() and len(found) == 1 and start is not None:
+        kind = found[0].dtype.newbyteorder(found[0].keyframe.parent.byteorder)
+        return LazyVoxels.of(Numbers(shape, kind, (Plain(Seen.of(path), start),)))
+    if read_later() and len(_pages_of(found)) == count:
+        return LazyVoxels.of(Pages(shape, found[0].dtype, Seen.of(path), name))
+    require_memory(sum(one.nbytes for one in found), file=name)
     parts = [one.asarray() for one in found]
     if any(part.shape != one.shape for part, one in zip(parts, found, strict=True)):
         raise ValueError(parts[0].shape)
-    keyframe, page = found[0].keyframe, found[0].shape[found[0].ndim - len(_page_axes(found[0])) :]
-    stored = (parts[0] if len(parts) == 1 else np.stack(parts)).reshape(-1, *page)
-    stored = native(stored, file=name)
-    bits = keyframe.bitspersample if keyframe.photometric == WHITE_IS_ZERO or keyframe.bitspersample == 1 else 0
-    stored, turned = bright_is_high(stored, bits)
-    stored = np.moveaxis(stored, 1, -1) if _page_axes(found[0]) == "SYX" else stored.reshape(*stored.shape[:3], -1)
-    voxels, more = gray_or_color(stored, stored.shape[3], file=name)
-    return voxels, turned + more
+    return (parts[0] if len(parts) == 1 else np.stack(parts)).reshape(shape)
+
+
+def _pages_of(found: list[Any]) -> list[Any]:
+    return [page for one in found for page in one.pages]
+
+
+@dataclass(frozen=True)
+class Pages:
+    """The pages of a file, each of which is read alone.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Sizes of all axes: pages, those of a page, and one of 1.
+    dtype : data type
+    seen : Seen
+        The file.
+    file : str
+        The path as the user typed it.
+    """
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    seen: Seen
+    file: str
+
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Sizes of what is read together: a page."""
+        return (1, *self.shape[1:])
+
+    def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
+        """Return a part.
+
+        Raises
+        ------
+        FormatError, UnreadableError
+            For pages that are damaged, and a file that was written since it was opened.
+        """
+        numbers = range(self.shape[0])[box[0]]
+        with _opened(self.seen.unchanged(), self.file) as pages:
+            found = _pages_of(_stack(pages.series, self.file))
+            return np.stack([found[n].asarray().reshape(self.shape[1:])[box[1:]] for n in numbers])
 
 
 class _Complaints(logging.Handler):
