@@ -105,9 +105,9 @@ def link_cells(
     linked : (256, 6) bool array
         Whether a cell of a case shares one in a direction; the cell there does so too.
     latest : (2, J, I) int32 array
-        Overwritten: the cell that was last seen at a place of even and of odd layers.
+        -1 everywhere; overwritten: the cell that was last seen at a place of even and of odd layers.
     table : (n, 6) int32 array
-        Result: the neighbor in each direction, -1 where none is linked.
+        Result: the neighbor in each direction, -1 where none is linked, or none is there.
     """
     for v in range(len(cells)):
         x, y, z, case = cells[v, 0], cells[v, 1], cells[v, 2], cases[v]
@@ -115,7 +115,9 @@ def link_cells(
             table[v, 2 * axis], table[v, 2 * axis + 1] = -1, -1
             if linked[case, 2 * axis]:
                 before = v - 1 if axis == 0 else latest[z & 1, y - 1, x] if axis == 1 else latest[z - 1 & 1, y, x]
-                table[v, 2 * axis], table[before, 2 * axis + 1] = before, v
+                table[v, 2 * axis] = before
+                if before >= 0:  # else the first of these layers is not the first there is
+                    table[before, 2 * axis + 1] = v
         latest[z & 1, y, x] = v
 
 
