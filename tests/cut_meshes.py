@@ -1,37 +1,30 @@
-"""Meshes cut into pieces at any of their vertices, and who works on the pieces."""
+"""Meshes cut into pieces at any of their vertices."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from hypothesis import strategies as st
 
-from tomomesh import TriMesh
-from tomomesh.slabs.patches.patch import Patches, patches_of
+from tomomesh.slabs.keep import InMemory
+from tomomesh.slabs.mesh import Piece, SlabMesh
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
+
+    from tomomesh import TriMesh
+    from tomomesh.slabs.keep import Slabs
 
 
-@dataclass(frozen=True)
-class Piece:
-    vertices: Any
-    centers: Any
-    halves: Any
-    quarters: Any
-
-
-class InMemory:
-    def each(self, work: Callable[..., Any], *columns: Sequence[Any]) -> list[Any]:
-        return [work(*row) for row in zip(*columns, strict=True)]
-
-    def fetch(self, kept: Sequence[Any]) -> list[Any]:
-        return list(kept)
-
-
-def cut(mesh: TriMesh, at: Sequence[int], centers: int = 0, quarters: int = 0, seed: int | None = None) -> list[Piece]:
+def cut(
+    mesh: TriMesh,
+    at: Sequence[int],
+    centers: int = 0,
+    quarters: int = 0,
+    seed: int | None = None,
+    slabs: Slabs | None = None,
+) -> SlabMesh:
     """Cut a mesh before some of its vertices; a face goes to the piece of its lowest vertex, or to any by a seed.
 
     The last `centers` vertices are centers, which are shared out evenly, and the last `quarters` faces quarters.
@@ -43,24 +36,14 @@ def cut(mesh: TriMesh, at: Sequence[int], centers: int = 0, quarters: int = 0, s
     if seed is not None:
         piece = np.random.default_rng(seed).integers(len(ends) - 1, size=len(piece))
     half = np.arange(len(mesh.faces)) < halves
-    return [
+    pieces = [
         Piece(
             mesh.vertices[ends[n] : ends[n + 1]], mesh.vertices[middle[n] : middle[n + 1]],
             mesh.faces[half & (piece == n)], mesh.faces[~half & (piece == n)],
         )
         for n in range(len(ends) - 1)
     ]  # fmt: skip
-
-
-def whole(pieces: Sequence[Piece]) -> TriMesh:
-    """Return the mesh whose pieces these are, its faces in their order."""
-    vertices = [one.vertices for one in pieces] + [one.centers for one in pieces]
-    faces = [one.halves for one in pieces] + [one.quarters for one in pieces]
-    return TriMesh(np.concatenate(vertices), np.concatenate(faces))
-
-
-def patches(pieces: Sequence[Piece]) -> Patches:
-    return patches_of(InMemory(), pieces)
+    return SlabMesh.of(pieces, InMemory() if slabs is None else slabs)
 
 
 cuts = st.lists(st.integers(0, 400), max_size=5)

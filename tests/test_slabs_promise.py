@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds, size
-from cut_meshes import cut, cuts, patches, whole
+from cut_meshes import cut, cuts
 from test_twins_topology import ball, beside, isosurface, ring
 from tomomesh.errors import InternalCheckError
 from tomomesh.measure.topology import check_promise, distinct_positions, topology
 from tomomesh.model.mesh import TriMesh
-from tomomesh.slabs.patches.positions import distinct_in
+from tomomesh.slabs.patches.patch import patches_of
 from tomomesh.slabs.patches.promise import check_patches
 from tomomesh.slabs.patches.seams import whole_of
 
@@ -32,23 +32,21 @@ class TestTopology:
         rng = np.random.default_rng(seed)
         mesh = TriMesh(rng.normal(size=(n, 3)), np.array([rng.choice(n, 3, replace=False) for _ in range(m)], np.int64))
         pieces = cut(mesh, [one % n for one in at], min(centers, n), min(centers, m), seed)
-        assert whole_of(patches(pieces)).topology == topology(whole(pieces))
+        assert whole_of(patches_of(pieces)).topology == topology(pieces.joined())
 
     @law(60)
     @given(seed=seeds, share=st.floats(0.05, 0.6), at=cuts, left=st.sampled_from([0.7, 0.98, 1.0]))
-    def test_of_a_surface_with_holes_is_the_whole_s(
-        self, seed: int, share: float, at: list[int], left: float
-    ) -> None:
+    def test_of_a_surface_with_holes_is_the_whole_s(self, seed: int, share: float, at: list[int], left: float) -> None:
         mesh = isosurface(seed, share)
         kept = np.random.default_rng(seed).random(len(mesh.faces)) < left
         pieces = cut(TriMesh(mesh.vertices, mesh.faces[kept]), at)
-        found = whole_of(patches(pieces))
-        assert found.topology == topology(whole(pieces))
+        found = whole_of(patches_of(pieces))
+        assert found.topology == topology(pieces.joined())
         assert found.table.faces.sum() == kept.sum()
         assert (np.diff(found.table.lowest) > 0).all()
 
     def test_of_one_piece_has_no_seam(self) -> None:
-        found = whole_of(patches(cut(ring(), [])))
+        found = whole_of(patches_of(cut(ring(), [])))
         assert found.topology == topology(ring())
         assert not found.seams.links.faces.size
 
@@ -56,7 +54,7 @@ class TestTopology:
         inner = ball().moved(ball().vertices / 2)
         mesh = beside(ball(), TriMesh(inner.vertices, inner.faces[:, ::-1]))
         for cavities in (0, 1):
-            pieces = patches(cut(mesh, [20, 50, 70]))
+            pieces = patches_of(cut(mesh, [20, 50, 70]))
             assert whole_of(pieces, cavities=cavities).topology == topology(mesh, cavities=cavities)
 
 
@@ -68,7 +66,8 @@ class TestPositions:
         places = rng.integers(values, size=(n, 3)) * rng.choice([-1.0, 1.0, 1 + 2**-40], (n, 3))
         mesh = TriMesh(places, np.empty((0, 3), np.int64))
         kind = np.float32 if single else np.float64
-        found = distinct_in(patches(cut(mesh, [one % n for one in at])), kind, along=rng.normal(size=3).tolist())
+        pieces = cut(mesh, [one % n for one in at])
+        found = patches_of(pieces, tuple(rng.normal(size=3))).distinct(kind)
         assert found == distinct_positions(mesh, kind)
 
 
@@ -121,7 +120,7 @@ class TestPromise:
     def test_is_kept_by_a_surface_in_any_pieces(self, seed: int, at: list[int]) -> None:
         mesh = ring()
         pieces = cut(mesh, [one % len(mesh.vertices) for one in at], seed=seed)
-        assert check_patches(patches(pieces)).topology == topology(mesh)
+        assert check_patches(patches_of(pieces)).topology == topology(mesh)
 
     @pytest.mark.parametrize("broken", [dropped, flipped, doubled, torn, pinched, laid_over, nowhere])
     @law(size(15, 5))
@@ -133,11 +132,11 @@ class TestPromise:
         # the cut passes through the face
         pieces = cut(mesh, [at, int(ring().faces[face].max())])
         with pytest.raises(InternalCheckError) as wanted:
-            check_promise(whole(pieces))
+            check_promise(pieces.joined())
         with pytest.raises(InternalCheckError) as found:
-            check_patches(patches(pieces))
+            check_patches(patches_of(pieces))
         assert str(found.value) == str(wanted.value)
 
     def test_lets_a_sheet_have_borders(self) -> None:
-        pieces = patches(cut(dropped(ring(), 7), [30, 60]))
+        pieces = patches_of(cut(dropped(ring(), 7), [30, 60]))
         assert check_patches(pieces, open_=True).topology.boundary_loops == 1

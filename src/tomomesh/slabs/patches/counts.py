@@ -128,7 +128,7 @@ def _after(half: NDArray[np.int32]) -> NDArray[np.int32]:
 def _borders(
     fans: NDArray[np.int32], alone: NDArray[np.int32], rim: NDArray[np.intp]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Follow the lines of borders: what those at each corner (f, 3) are named by, and the names of those off the rim."""
+    """Name the line of borders at each corner, (f, 3); return also the names of those that do not touch the rim."""
     lines = fans.copy()
     join_borders(alone, lines)
     return lines.reshape(-1, 3), np.setdiff1d(lines[alone], lines.reshape(-1, 3)[rim])

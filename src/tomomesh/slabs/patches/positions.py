@@ -17,25 +17,29 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-ALONG = (0.0, 0.0, 1.0)
-"""A direction along which the patches of axial slices follow one another. No result depends on it, only how many
-vertices lie beside other patches."""
 
-
-def distinct_in(patches: Patches, kind: type[np.floating[Any]] = np.float64, *, along: Sequence[float] = ALONG) -> int:
+def distinct_in(patches: Patches, kind: type[np.floating[Any]] = np.float64) -> int:
     """Count the positions that stay apart at a precision, as `tomomesh.measure.topology.distinct_positions`.
 
     Equal ones lie at equal heights, so only vertices at heights of other patches are brought together.
     """
-    slabs, count = patches.slabs, len(patches.kept)
-    ways, kinds = [tuple(along)] * count, [kind] * count
-    spans = np.reshape(slabs.fetch(slabs.each(_span, patches.kept, kinds, ways)), (count, 2))
-    others = [np.delete(spans, n, axis=0) for n in range(count)]
-    both = [np.stack([np.maximum(o[:, 0], s[0]), np.minimum(o[:, 1], s[1])], 1) for o, s in zip(others, spans, strict=True)]
-    zones = [_merged(zone[zone[:, 0] <= zone[:, 1]]) for zone in both]
-    found = slabs.fetch(slabs.each(_unique, patches.kept, kinds, ways, zones))
+    spans = np.reshape(patches.told(_span, [kind], [patches.along]), (len(patches), 2))
+    zones = [zones_of(spans, one) for one in range(len(patches))]
+    found = patches.told(_unique, [kind], [patches.along], zones)
     beside = np.concatenate([np.empty((0, 3)), *(places for _, places in found)])
-    return sum(number for number, _ in found) - len(beside) + count_positions(beside)
+    return int(sum(number for number, _ in found)) - len(beside) + count_positions(beside)
+
+
+def zones_of(spans: Floats, one: int) -> Floats:
+    """Return which heights of one span (s, 2) the others have too, as rising zones (z, 2) that do not overlap."""
+    others = np.delete(spans, one, axis=0)
+    low, high = np.maximum(others[:, 0], spans[one, 0]), np.minimum(others[:, 1], spans[one, 1])
+    some = np.flatnonzero(low <= high)
+    some = some[np.argsort(low[some], kind="stable")]
+    low, reached = low[some], np.maximum.accumulate(high[some])
+    begins = np.flatnonzero(np.r_[True, low[1:] > reached[:-1]][: len(low)])
+    ends = np.r_[begins[1:] - 1, len(low) - 1][: len(begins)]
+    return np.stack([low[begins], reached[ends]], axis=1)
 
 
 def _places(patch: Patch, kind: type[np.floating[Any]]) -> Floats:
@@ -43,23 +47,15 @@ def _places(patch: Patch, kind: type[np.floating[Any]]) -> Floats:
         return np.array(patch.kept.astype(kind, copy=False), np.float64, order="C")
 
 
-def _heights(places: Floats, along: Sequence[float]) -> Floats:
+def heights_of(places: Floats, along: Sequence[float]) -> Floats:
+    """Return how far positions (n, 3) lie along a direction, (n,): equal ones equally far."""
     x, y, z = along
     return np.asarray(x * places[:, 0] + y * places[:, 1] + z * places[:, 2])
 
 
 def _span(patch: Patch, kind: type[np.floating[Any]], along: Sequence[float]) -> tuple[float, float]:
-    heights = _heights(_places(patch, kind), along)
+    heights = heights_of(_places(patch, kind), along)
     return float(heights.min(initial=np.inf)), float(heights.max(initial=-np.inf))
-
-
-def _merged(zones: Floats) -> Floats:
-    """Return the same heights as few zones (z, 2) that do not overlap."""
-    zones = zones[np.argsort(zones[:, 0])]
-    reached = np.maximum.accumulate(zones[:, 1]) if len(zones) else zones[:, 1]
-    begins = np.flatnonzero(np.r_[True, zones[1:, 0] > reached[:-1]][: len(zones)])
-    ends = np.r_[begins[1:] - 1, len(zones) - 1][: len(begins)]
-    return np.stack([zones[begins, 0], reached[ends]], axis=1)
 
 
 def _unique(
@@ -68,7 +64,7 @@ def _unique(
     """Count the positions of a patch, and return those within zones, each once."""
     places = _places(patch, kind)
     once = first_equals(places) == np.arange(len(places))
-    heights = _heights(places, along)
+    heights = heights_of(places, along)
     zone = np.searchsorted(zones[:, 0], heights, side="right") - 1
     beside = (zone >= 0) & (heights <= np.r_[zones[:, 1], -np.inf][zone])
     return int(once.sum()), places[once & beside]

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ...measure.topology import require_finite, require_promise
-from .positions import ALONG, distinct_in
 from .seams import whole_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from .patch import Patches
     from .seams import Whole
 
 
 def check_patches(
-    patches: Patches, *, cavities: int = 0, open_: bool = False, along: Sequence[float] = ALONG
+    patches: Patches, *, cavities: int = 0, open_: bool = False
 ) -> Whole:  # fmt: skip
     """Check across all seams what `tomomesh.measure.topology.check_promise` checks on a whole mesh.
 
@@ -27,8 +26,6 @@ def check_patches(
         Components that are known to line a cavity, and so must face inward.
     open_ : bool
         Let the mesh have borders.
-    along : sequence of 3 floats
-        A direction along which the patches follow one another: the normal of the slices.
 
     Returns
     -------
@@ -42,5 +39,5 @@ def check_patches(
     """
     whole = whole_of(patches, cavities=cavities)
     require_finite(finite=whole.finite)
-    require_promise(whole.topology, patches.vertices - distinct_in(patches, along=along), open_=open_)
+    require_promise(whole.topology, patches.vertex_count - patches.distinct(np.float64), open_=open_)
     return whole

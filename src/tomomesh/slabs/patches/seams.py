@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -61,13 +61,13 @@ class Seams:
     def starts(self) -> Ints:
         """The first half edge of each edge, (e,)."""
         order, first = self.links.edges
-        return order[first[:-1]]
+        starts: Ints = order[first[:-1]]
+        return starts
 
     @cached_property
     def theirs(self) -> Bools:
         """Which edges (e,) have a shared vertex, and so are counted here and nowhere else."""
-        order, first = self.links.edges
-        corner, start = self.links.faces.reshape(-1), order[first[:-1]]
+        corner, start = self.links.faces.reshape(-1), self.starts
         after = np.where(start % 3 == 2, start - 2, start + 1)
         return self.shared[corner[start]] | self.shared[corner[after]]
 
@@ -154,9 +154,7 @@ def whole_of(patches: Patches, *, cavities: int = 0) -> Whole:
     -------
     Whole
     """
-    found: list[Counted] = patches.slabs.fetch(
-        patches.slabs.each(counted, patches.kept, [patches.extent] * len(patches.kept))
-    )
+    found: list[Counted] = patches.told(counted, [patches.extent])
     seams = Seams.between([one.rim for one in found], [len(one.table.faces) for one in found], patches.shared)
     table, numbers = _joined([one.table for one in found], seams)
     return Whole(_topology(found, table, seams, cavities), table, seams, numbers, all(one.finite for one in found))
@@ -181,7 +179,7 @@ def _with_seams(rows: Table, seams: Seams) -> Table:
     _, at = np.unique(corner, return_index=True)
     at = at[seams.shared[corner[at]]]
 
-    def number(faces: NDArray[np.integer]) -> NDArray[np.int64]:
+    def number(faces: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
         return np.bincount(piece[faces], minlength=count).astype(np.int64)
 
     return replace(
@@ -190,7 +188,7 @@ def _with_seams(rows: Table, seams: Seams) -> Table:
     )  # fmt: skip
 
 
-def _added(values: NDArray, numbers: NDArray[np.int64], count: int) -> NDArray:
+def _added(values: NDArray[Any], numbers: NDArray[np.int64], count: int) -> NDArray[Any]:
     sums = np.zeros((count, *values.shape[1:]), values.dtype)
     np.add.at(sums, numbers, values)
     return sums
