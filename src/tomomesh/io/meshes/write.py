@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ...errors import UsageError
+from ...model.mesh import TriMesh
 from ...model.points import COLORS
 from ..fields import AXES, flat_columns
 from ..files.atomic import check_output
@@ -13,6 +15,7 @@ from .gifti import is_bare, write_gifti
 from .glb import write_glb
 from .obj import write_obj
 from .off import write_off
+from .parts import InOnePiece
 from .ply import write_ply_mesh
 from .stl import write_stl
 from .threemf import write_3mf
@@ -24,11 +27,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ...model.mesh import TriMesh
+    from .parts import Parts
+
+    PartWriter = Callable[[Parts, str | Path, MeshAttributes], None]
 
 
 def write_mesh(
-    mesh: TriMesh,
+    mesh: TriMesh | Parts,
     path: str | Path,
     *,
     unit: str = "mm",
@@ -42,8 +47,9 @@ def write_mesh(
 
     Parameters
     ----------
-    mesh : TriMesh
-        Its coordinates are written as they are.
+    mesh : TriMesh or Parts
+        Its coordinates are written as they are. One that is never whole, `tomomesh.slabs.patches.patch.Patches`, is
+        written part by part: as ``.ply``, ``.stl`` or ``.obj``.
     path : path
         ``.ply`` and ``.vtp`` (binary), ``.obj``, ``.off`` and ``.3mf`` (text) keep 64-bit coordinates; ``.stl``,
         ``.glb`` and ``.gii`` (binary; Connectome Workbench wants ``.surf.gii``) 32-bit ones, as do 3MF's readers.
@@ -76,11 +82,20 @@ def write_mesh(
     >>> Path("corner.stl").stat().st_size == 84 + 50 * len(corner.faces)
     True
     """
+    parts = InOnePiece(mesh) if isinstance(mesh, TriMesh) else mesh
     check_output(path, MESH_WRITERS)
-    at_vertices = flat_columns(vertex_fields or {}, len(mesh.vertices), AXES)
-    on_faces = flat_columns(face_fields or {}, len(mesh.faces), ["count", "corners", "vertex_indices"])
+    at_vertices = flat_columns(vertex_fields or {}, parts.vertex_count, AXES)
+    on_faces = flat_columns(face_fields or {}, parts.face_count, ["count", "corners", "vertex_indices"])
     beside = MeshAttributes(unit, frame, at_vertices, on_faces, z_up=z_up, single=precision == 32)
-    MESH_WRITERS[suffix_of(path)](mesh, path, beside)
+    if suffix_of(path) in PART_WRITERS:
+        PART_WRITERS[suffix_of(path)](parts, path, beside)
+    elif isinstance(mesh, TriMesh):
+        MESH_WRITERS[suffix_of(path)](mesh, path, beside)
+    else:
+        raise UsageError(
+            "the format is not written part by part, as a mesh larger than memory is", file=str(path),
+            expected=" | ".join(sorted(PART_WRITERS)),
+        )  # fmt: skip
 
 
 KEEP_ALL = (".ply", ".vtp")
@@ -99,10 +114,14 @@ def keeps(path: str | Path, field: str, *, on_faces: bool = False) -> bool:
     return suffix in KEEP_AT_VERTICES or (suffix in KEEP_COLORS and field in COLORS)
 
 
+def _in_one_piece(write: PartWriter) -> Callable[[TriMesh, str | Path, MeshAttributes], None]:
+    return lambda mesh, path, beside: write(InOnePiece(mesh), path, beside)
+
+
+PART_WRITERS: dict[str, PartWriter] = {".stl": write_stl, ".ply": write_ply_mesh, ".obj": write_obj}
+"""Suffix to writer of meshes that need not be whole."""
 MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, MeshAttributes], None]] = {
-    ".stl": write_stl,
-    ".ply": write_ply_mesh,
-    ".obj": write_obj,
+    **{suffix: _in_one_piece(write) for suffix, write in PART_WRITERS.items()},
     ".off": write_off,
     ".glb": write_glb,
     ".vtp": write_vtp_mesh,
