@@ -8,32 +8,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.isosurface.runs import count_in_runs, count_runs, fill_runs, join_runs, list_runs
-from ..kernels.threads import in_blocks
+from ..kernels.isosurface.runs import join_runs
+from .run_mask import RunMask
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     Ints = NDArray[np.int32]
     Longs = NDArray[np.int64]
     Mask = NDArray[np.bool_]
 
-LAYERS = 8
-"""Slices looked at in one call: far below 100 ms. No result depends on it."""
-
 
 @dataclass(frozen=True)
 class Runs:
-    """The runs of one value in the rows of a mask (K, J, I), and the component that each belongs to.
+    """A mask (K, J, I), and the component that each of its runs belongs to.
 
     Attributes
     ----------
-    shape : (int, int, int)
-        Of the mask.
-    begin : (K J + 1,) int64 array
-        The first run of each row.
-    starts, stops : (r,) int32 array
-        The first column of each run, and that behind its last.
+    mask : RunMask
     parts : (r,) int32 array
         Number of its component, in the order of their first voxels.
 
@@ -44,78 +38,56 @@ class Runs:
     ([3], [2, 1])
     """
 
-    shape: tuple[int, int, int]
-    begin: Longs
-    starts: Ints
-    stops: Ints
+    mask: RunMask
     parts: Ints
 
     @classmethod
-    def of(cls, mask: Mask, *, value: bool = True, corners: bool = False, threads: int = 0) -> Runs:
-        """Find the components of what has a value, whose voxels touch along faces, or edges and corners too."""
-        begin = np.zeros(mask.shape[0] * mask.shape[1] + 1, np.int64)
-
-        def count(start: int, stop: int) -> None:
-            count_runs(mask, value, begin[1:], start, stop)
-
-        def listed(start: int, stop: int) -> None:
-            list_runs(mask, value, begin, starts, stops, start, stop)
-
-        in_blocks(count, len(mask), block=LAYERS, threads=threads)
-        np.cumsum(begin, out=begin)
-        starts, stops = np.empty((2, int(begin[-1])), np.int32)
-        in_blocks(listed, len(mask), block=LAYERS, threads=threads)
-        own = np.arange(len(starts), dtype=np.int32)
+    def of(cls, mask: Mask | RunMask, *, corners: bool = False, threads: int = 0) -> Runs:
+        """Find the components of a mask, whose voxels touch along faces, or edges and corners too."""
+        runs = mask if isinstance(mask, RunMask) else RunMask.of([mask], threads)
+        own = np.arange(len(runs.starts), dtype=np.int32)
         roots = own.copy()
-        join_runs(begin, starts, stops, mask.shape[1], int(corners), roots)
+        join_runs(runs.begin, runs.starts, runs.stops, runs.shape[1], int(corners), roots)
         number = np.cumsum(roots == own, dtype=np.int32) - np.int32(1)
-        return cls((mask.shape[0], mask.shape[1], mask.shape[2]), begin, starts, stops, number[roots])
+        return cls(runs, number[roots])
 
     @cached_property
     def sizes(self) -> Longs:
         """Voxels of each component, (c,)."""
-        return self._summed(self.stops - self.starts)
+        return self._summed(self.mask.sizes)
 
     @cached_property
     def boxes(self) -> Longs:
         """First slice, row and column of each component, and those behind its last, (c, 2, 3)."""
-        line = np.repeat(np.arange(len(self.begin) - 1), np.diff(self.begin))
-        k, j = line // self.shape[1], line % self.shape[1]
+        k, j = np.divmod(self.mask.rows, self.mask.shape[1])
         boxes = np.zeros((len(self.sizes), 2, 3), np.int64)
-        boxes[:, 0] = self.shape
-        np.minimum.at(boxes[:, 0], self.parts, np.column_stack([k, j, self.starts]))
-        np.maximum.at(boxes[:, 1], self.parts, np.column_stack([k + 1, j + 1, self.stops]))
+        boxes[:, 0] = self.mask.shape
+        np.minimum.at(boxes[:, 0], self.parts, np.column_stack([k, j, self.mask.starts]))
+        np.maximum.at(boxes[:, 1], self.parts, np.column_stack([k + 1, j + 1, self.mask.stops]))
         return boxes
 
     @cached_property
     def bordering(self) -> Mask:
         """Whether a component reaches the border of the mask, (c,)."""
-        count, rows, columns = self.shape
+        count, rows, columns = self.mask.shape
         ends = np.zeros((count, rows), np.bool_)
         ends[[0, -1]] = ends[:, [0, -1]] = True
-        outer = np.repeat(ends.ravel(), np.diff(self.begin)) | (self.starts == 0) | (self.stops == columns)
+        outer = ends.ravel()[self.mask.rows] | (self.mask.starts == 0) | (self.mask.stops == columns)
         found = np.zeros(len(self.sizes), np.bool_)
         found[self.parts[outer]] = True
         return found
 
-    def within(self, mask: Mask, threads: int = 0) -> Longs:
-        """Count the voxels of another mask (K, J, I) in each component, (c,)."""
-        found = np.empty(len(self.starts), np.int64)
+    def within(self, slabs: Iterable[Mask], threads: int = 0) -> Longs:
+        """Count the voxels of another mask, given as consecutive slabs (n, J, I), in each component, (c,)."""
+        return self._summed(self.mask.within(slabs, threads))
 
-        def count(start: int, stop: int) -> None:
-            count_in_runs(mask, self.begin, self.starts, self.stops, found, start, stop)
-
-        in_blocks(count, len(mask), block=LAYERS, threads=threads)
-        return self._summed(found)
+    def only(self, marked: Mask) -> RunMask:
+        """Return the mask of marked components (c,)."""
+        return self.mask.only(marked[self.parts])
 
     def fill(self, mask: Mask, marked: Mask, value: bool, threads: int = 0) -> None:
         """Give the voxels of marked components (c,) a value, in place."""
-        taken = marked[self.parts]
-
-        def fill(start: int, stop: int) -> None:
-            fill_runs(mask, self.begin, self.starts, self.stops, taken, value, start, stop)
-
-        in_blocks(fill, len(mask), block=LAYERS, threads=threads)
+        self.mask.fill(mask, marked[self.parts], value, threads)
 
     def _summed(self, values: NDArray[np.integer]) -> Longs:
         count = int(self.parts.max(initial=-1)) + 1

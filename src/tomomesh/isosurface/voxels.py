@@ -15,6 +15,7 @@ from ..model.points import PointSet
 from ..progress import Progress, silent
 from .crossings import LevelCrossings, Levels, crossings
 from .diagonals import placed, right_handed, triangulated
+from .run_mask import RunMask
 from .runs import Runs
 from .surface_nets import Net, NetFit, net_around, settle
 from .thick_slices import thinned
@@ -149,7 +150,7 @@ def _framed(mask: NDArray[np.bool_], around: Box | None) -> tuple[NDArray[np.boo
 
 def _filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Fill what the outside does not reach; a mask without contacts stays without them."""
-    holes, filled = Runs.of(mask, value=False), mask.copy()
+    holes, filled = Runs.of(~RunMask.of([mask])), mask.copy()
     holes.fill(filled, ~holes.bordering, True)
     return filled
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
+from ..isosurface.run_mask import RunMask
 from ..isosurface.runs import Runs
 from ..model.boxes import box_of
 from .window import PRESETS_HU
@@ -115,7 +116,7 @@ def thick_components(mask: NDArray[np.bool_], volume: Volume) -> Components:
 def _in_body(mask: NDArray[np.bool_], body: NDArray[np.bool_]) -> Components:
     """Keep the components that lie in bodies by a tenth at least."""
     runs = Runs.of(mask, corners=True)
-    return _kept(runs, runs.within(body) >= LEAST * runs.sizes, mask)
+    return _kept(runs, runs.within([body]) >= LEAST * runs.sizes, mask)
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,7 @@ def without_specks(mask: NDArray[np.bool_], around: Box | None = None) -> Cleane
         Outside of which nothing is true.
     """
     box = box_of(mask, around)
-    pieces, holes = Runs.of(mask[box], corners=True), Runs.of(mask[box], value=False)
+    pieces, holes = Runs.of(mask[box], corners=True), Runs.of(~RunMask.of([mask[box]]))
     sizes, room = pieces.sizes, holes.sizes
     limit = min(float(SPECK), SMALL * float(sizes.max()))
     small, pores = sizes < limit, ~holes.bordering & (room < limit)

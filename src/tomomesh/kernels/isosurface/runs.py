@@ -1,4 +1,4 @@
-"""Loops over runs: the stretches of a mask's rows whose voxels are alike. See `tomomesh.isosurface.runs`.
+"""Loops over runs: the stretches of a mask's rows that it holds. See `tomomesh.isosurface.run_mask`.
 
 Row ``J k + j`` is row j of slice k; its runs are those from ``begin[row]`` to before ``begin[row + 1]``.
 """
@@ -18,33 +18,31 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 
-@kernel("void(b1[:,:,:], b1, i8[::1], i8, i8)")
-def count_runs(mask: Mask, value: bool, count: NDArray[np.int64], start: int, stop: int) -> None:
-    """Count the runs of a value in each row (K J,) of some slices."""
+@kernel("void(b1[:,:,:], i8[::1], i8, i8)")
+def count_runs(mask: Mask, count: NDArray[np.int64], start: int, stop: int) -> None:
+    """Count the runs in each row (K J,) of some slices."""
     rows, columns = mask.shape[1], mask.shape[2]
     for k in range(start, stop):
         for j in range(rows):
-            found, last = 0, not value
+            found, last = 0, False
             for i in range(columns):
                 here = mask[k, j, i]
-                found += here == value and last != value
+                found += here and not last
                 last = here
             count[k * rows + j] = found
 
 
-@kernel("void(b1[:,:,:], b1, i8[::1], i4[::1], i4[::1], i8, i8)")
-def list_runs(
-    mask: Mask, value: bool, begin: NDArray[np.int64], starts: Ints, stops: Ints, start: int, stop: int
-) -> None:
+@kernel("void(b1[:,:,:], i8[::1], i4[::1], i4[::1], i8, i8)")
+def list_runs(mask: Mask, begin: NDArray[np.int64], starts: Ints, stops: Ints, start: int, stop: int) -> None:
     """List the first column of each run, and that behind its last, of some slices."""
     rows, columns = mask.shape[1], mask.shape[2]
     for k in range(start, stop):
         for j in range(rows):
-            n, last = begin[k * rows + j], not value
+            n, last = begin[k * rows + j], False
             for i in range(columns):
                 here = mask[k, j, i]
                 if here != last:
-                    if here == value:
+                    if here:
                         starts[n], stops[n] = i, columns
                         n += 1
                     else:
