@@ -2,59 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..errors import EmptyError
-from ..kernels.som.neighborhoods import GAUSSIAN
 from ..kernels.threads import in_blocks
-from ..measure.polygon import side_lengths
 from ..model.lattice import lattice
 from ..model.networks import Networks
+from ..model.planes import ranges
 from ..progress import Progress, silent
-from ..settings import IN_SLICE, MOST_NEURONS
-from ..som.even_spacing import bridged_edges, even_spacing
-from ..som.fit import fit, match, radii, shape_of
-from .contours.curved import evened
+from ..som.fit import match
 from .contours.inputs import FEWEST, SIDES_EACH
-from .contours.shrinking import unshrunk
-from .signal import crossings_around, fills_most, is_stepped, outline, pixels_of
+from .signal import pixels_of
+from .slices import Slices
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from ..isosurface.crossings import Levels
     from ..model.contours import Contours
     from ..model.lattice import Lattice
+    from ..model.planes import Planes
     from ..settings import NetworkSettings
-    from ..som.fit import Fitted
-
-LOOKED_AT = 6
-"""Slices on which the number of neurons is found: a tenth of a study's, and of its time. Chosen: half of it changes the
-distance by -1.2 %, twice by -1.9 %."""
-MUCH = 1.5
-"""Neurons over those of a ring up to which what it asks for is believed: its sides' errors, taken for parabolas, are
-those of a cubic, and 1.5^2 times as small."""
-CHORD = 0.1
-"""Most that the middle of a side may be off the line, pixels, where the number of neurons follows from the outlines:
-twice what the pixels' noise moves a neuron (measured, 0.04 px). Chosen: half of it changes the distance by -3.2 %, with
-two fifths more neurons, twice by +20.9 %."""
-REST = 0.05
-"""Share of a ring whose sides may be off by more: at a corner no number is enough. Chosen: half of it changes the
-distance by -2.4 %, twice by -1.1 %."""
-NEAR = 2.0
-"""First radius, hops, where a network starts from the result of the slice below. Measured: a ring that starts from its
-neighbor's place needs 3 epochs from there, and a start at 4 fails on two-sided walls."""
 
 
 def train_study(
-    mask: NDArray[np.bool_],
+    mask: Planes,
     settings: NetworkSettings,
     *,
-    layers: NDArray[np.bool_] | None = None,
+    layers: Planes | None = None,
     levels: Levels | None = None,
     pixel_mm: tuple[float, float] = (1.0, 1.0),
     seed: int = 0,
@@ -69,9 +49,10 @@ def train_study(
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : (K, J, I) bool array or planes
+        What is not an array is drawn some slices at a time, and never whole; so are `layers` and `levels`.
     settings : NetworkSettings
-    layers : (K, J, I, L) bool array, optional
+    layers : (K, J, I, L) bool array or planes, optional
         The layers of a color study that lie in their windows. Eq. 4 has an input x_ijl for each k_ijl that is not 0:
         it is read as a pixel that is presented once for every layer in which it lies in the window, at
         (i, j, l), layers lying as far apart as columns. A neuron's place is its first two coordinates. Outlines have
@@ -102,11 +83,46 @@ def train_study(
     slices = Slices.of(mask, layers, levels, settings, pixel_mm, seed, first)
     graph = lattice(settings.topology, slices.enough() if settings.neurons_follow else settings.neuron_count)
     least = SIDES_EACH * FEWEST if settings.neurons_follow else len(graph)
-    count = len(mask)
+    count, parts, below = mask.shape[0], [], None
+    for start, stop in ranges(mask):
+        told = partial(_tell, progress, start, count)
+        parts.append(train_some(slices.part(start, stop), graph, least, below, threads=threads, done=told))
+        below = parts[-1].last
+    return _networks(parts, slices, graph, least)
+
+
+class Some(NamedTuple):
+    """What was trained on some slices, (n, ...), and what the network of the next may start from."""
+
+    codebooks: NDArray[np.float64]
+    bridged: NDArray[np.bool_]
+    pixels: NDArray[np.int64]
+    strays: NDArray[np.int64]
+    last: NDArray[np.float64] | None
+
+
+def train_some(
+    slices: Slices, graph: Lattice, least: int, below: NDArray[np.float64] | None = None,
+    *, threads: int = 0, done: Callable[[int], None] = lambda count: None,
+) -> Some:  # fmt: skip
+    """Train the networks of some slices: those of any ranges are those of the whole.
+
+    Parameters
+    ----------
+    slices : Slices
+        A part of a study's.
+    graph : Lattice
+    least : int
+        Inputs that a network needs.
+    below : (u, 2) float array, optional
+        The network of the slice before the first, where each starts from the one below.
+    threads : int
+    done : callable
+        Told how many slices are done.
+    """
+    count, followed = slices.mask.shape[0], slices.settings.start == "neighbor"
     codebooks, bridged = np.zeros((count, len(graph), 2)), np.zeros((count, len(graph.edges)), bool)
     pixels, strays = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    followed = settings.start == "neighbor"
-    below: NDArray[np.float64] | None = None
 
     def work(start: int, stop: int) -> None:
         nonlocal below
@@ -119,8 +135,17 @@ def train_study(
                 codebooks[k], bridged[k] = slices.spaced(fitted, graph)
                 strays[k] = (~fitted.kept).sum()
 
-    workers = 1 if followed else threads
-    in_blocks(work, count, block=1, threads=workers, done=lambda done: progress("networks", done, count))
+    in_blocks(work, count, block=1, threads=1 if followed else threads, done=done)
+    return Some(codebooks, bridged, pixels, strays, below)
+
+
+def _tell(progress: Progress, start: int, count: int, done: int) -> None:
+    progress("networks", start + done, count)
+
+
+def _networks(parts: list[Some], slices: Slices, graph: Lattice, least: int) -> Networks:
+    """Join what was trained on consecutive slices."""
+    codebooks, bridged, pixels, strays = (np.concatenate([part[n] for part in parts]) for n in range(4))
     trained = pixels >= least
     if not trained.any():
         raise EmptyError(
@@ -140,128 +165,8 @@ def train_study(
     )
 
 
-@dataclass(frozen=True)
-class Slices:
-    """What the networks of a study see, and how they are trained."""
-
-    mask: NDArray[np.bool_]
-    layers: NDArray[np.bool_] | None
-    levels: Levels | None
-    settings: NetworkSettings
-    pixel_mm: tuple[float, float]
-    seed: int
-    first: int
-    outlined: bool
-
-    @classmethod
-    def of(
-        cls, mask: NDArray[np.bool_], layers: NDArray[np.bool_] | None, levels: Levels | None,
-        settings: NetworkSettings, pixel_mm: tuple[float, float], seed: int, first: int,
-    ) -> Slices:  # fmt: skip
-        """Choose what is shown; for the whole study, which would else have a step in its surface."""
-        solid = settings.signal == "auto" and settings.topology != "grid" and fills_most(mask)
-        outlined = settings.signal == "boundary" or solid
-        fine = levels if outlined and settings.training == "batch" else None
-        if fine is not None and is_stepped(mask, fine):
-            fine = None
-        return cls(mask, layers, fine, settings, pixel_mm, seed, first, outlined)
-
-    def shown(self, k: int) -> NDArray[np.float64]:
-        """Return what the network of a slice sees, in millimeters."""
-        plane = self.mask[k] if self.outlined or self.layers is None else self.layers[k]
-        if self.levels is not None:
-            shown = crossings_around(plane, self.levels, k)
-        else:
-            shown = outline(plane) if self.outlined else pixels_of(plane)
-        return shown * (*self.pixel_mm, self.pixel_mm[0])[: shown.shape[1]]
-
-    @property
-    def pixel_area(self) -> float:
-        """Area that an input stands for, mm^2; 0 where the inputs are on a line."""
-        return 0.0 if self.levels is not None else self.pixel_mm[0] * self.pixel_mm[1]
-
-    @cached_property
-    def times_shown(self) -> float:
-        """How often a pixel is shown: once, or for each of its layers."""
-        if self.outlined or self.layers is None:
-            return 1.0
-        return float(self.layers.sum()) / max(float(self.layers.any(axis=-1).sum()), 1.0)
-
-    def fitted(
-        self, k: int, shown: NDArray[np.float64], graph: Lattice, below: NDArray[np.float64] | None = None
-    ) -> Fitted:
-        """Train the network of a slice, a smaller one where the inputs are few; one that follows another begins there.
-
-        One that follows another has its own place near the other's.
-        """
-        settings, rng = self.settings, np.random.default_rng([self.seed, self.first + k])
-        if len(shown) < SIDES_EACH * len(graph) and settings.neurons_follow:
-            graph, below = lattice("ring", len(shown) // SIDES_EACH), None
-        if below is not None and settings.radius is None:
-            _, last = radii(shown, graph, settings, self.pixel_area)
-            settings = replace(settings, radius=(max(NEAR, last), last))
-        return fit(shown, graph, settings, rng, pixel_area=self.pixel_area, start=below)
-
-    def spaced(self, fitted: Fitted, graph: Lattice) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the neurons in pixels, and which edges bridge gaps; rings unshrunk, lines evenly spaced if asked for.
-
-        A ring that was trained with fewer neurons than there are in `graph` gets as many along its curve.
-        """
-        settings, codebook = self.settings, np.ascontiguousarray(fitted.codebook[:, :2])
-        own = graph if len(codebook) == len(graph) else lattice("ring", len(codebook))
-        gaps = bridged_edges(codebook, own, settings.bridge)
-        ring = graph.name == "ring"
-        if ring and settings.training == "batch" and shape_of(settings) == GAUSSIAN:
-            codebook = unshrunk(codebook, gaps, fitted.radius, self._half_width(fitted, gaps))
-        if ring and (settings.even or own is not graph):
-            codebook, gaps = evened(codebook, gaps, len(graph))
-        elif settings.even:
-            codebook, gaps = even_spacing(codebook, graph, gaps)
-        return codebook / self.pixel_mm, gaps
-
-    def _half_width(self, fitted: Fitted, gaps: NDArray[np.bool_]) -> float:
-        """Return half the width of the band that the inputs of a ring fill: their area over the ring's length."""
-        length = float(side_lengths(fitted.codebook[:, :2])[~gaps].sum())
-        return float(fitted.kept.sum()) * self.pixel_area / (2 * self.times_shown * max(length, 1e-300))
-
-    def enough(self) -> int:
-        """Return how many neurons a ring needs to follow the outlines of all slices; see `neurons_for`.
-
-        Some slices are looked at, evenly spaced: a ring of `IN_SLICE` is trained on each, and the one that it asks for
-        where that is much larger, for it may show bends which the first could not.
-        """
-        full = np.flatnonzero(self.mask.any(axis=(1, 2)))
-        some = full[np.linspace(0, len(full) - 1, min(LOOKED_AT, len(full))).round().astype(int)]
-        return max([FEWEST, *(self._wanted_on(int(k)) for k in some)])
-
-    def _wanted_on(self, k: int) -> int:
-        shown = self.shown(k)
-        count, most = 0, min(MOST_NEURONS, len(shown) // SIDES_EACH)
-        asked = min(IN_SLICE, most)
-        while asked >= FEWEST and asked > MUCH * count:
-            count, graph = asked, lattice("ring", asked)
-            ring, gaps = self.spaced(self.fitted(k, shown, graph), graph)
-            asked = min(neurons_for(ring * self.pixel_mm, gaps, min(self.pixel_mm)), most)
-        return asked
-
-
-def neurons_for(ring: NDArray[np.float64], gaps: NDArray[np.bool_], pixel: float) -> int:
-    """Return how many neurons follow the line of a ring (u, 2) to a `CHORD` of a pixel.
-
-    A chord of length s on curvature c is s^2 c / 8 off in its middle; from the cubic through the neurons around it,
-    that is a sixteenth of what the two outer ones lack. So n neurons in place of u are off by (u / n)^2 as much. The
-    bends that `REST` of the line leave out are corners, which no number follows.
-    """
-    off = (ring + np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0) - np.roll(ring, -2, axis=0)) / 16
-    near = gaps | np.roll(gaps, 1) | np.roll(gaps, -1)
-    lengths = np.sqrt((off**2).sum(axis=1))[~near]
-    if len(lengths) == 0:
-        return len(ring)
-    return int(np.ceil(len(ring) * np.sqrt(float(np.quantile(lengths, 1 - REST)) / (CHORD * pixel))))
-
-
 def regions(
-    mask: NDArray[np.bool_],
+    mask: Planes,
     found: Networks | Contours,
     *,
     pixel_mm: tuple[float, float] = (1.0, 1.0),
@@ -271,7 +176,7 @@ def regions(
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : (K, J, I) bool array or planes
     found : Networks or Contours
         One network a slice, or several.
     pixel_mm : (float, float)
@@ -289,8 +194,9 @@ def regions(
     def work(start: int, stop: int) -> None:
         for k in found.slices[start:stop]:
             codebook = found.codebook_on(int(k)) * pixel_mm
-            winners, _ = match(codebook, pixels_of(mask[k]) * pixel_mm)
-            labels[k][mask[k]] = winners + 1
+            plane = mask[int(k)]
+            winners, _ = match(codebook, pixels_of(plane) * pixel_mm)
+            labels[k][plane] = winners + 1
 
     in_blocks(work, len(found.slices), block=1, threads=threads)
     return labels
