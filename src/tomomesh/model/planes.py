@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import NDArray
 
 SOME = 32
@@ -30,23 +28,27 @@ class Planes(Protocol):
         """Return a slice, or those of a range."""
 
 
-def ranges(planes: Planes) -> Iterator[tuple[int, int]]:
-    """Yield the ranges of slices that are worked on together: all of an array, which is there; else `SOME`.
+def ranges(start: int, stop: int, step: int = SOME) -> list[tuple[int, int]]:
+    """Part slices into ranges that are worked on together.
 
     Examples
     --------
-    >>> list(ranges(np.zeros((70, 1, 1), bool)))
-    [(0, 70)]
+    >>> ranges(5, 70)
+    [(5, 37), (37, 69), (69, 70)]
     """
+    return [(first, min(first + step, stop)) for first in range(start, stop, max(step, 1))]
+
+
+def parts_of(planes: Planes) -> list[tuple[int, int]]:
+    """Return the ranges of slices that threads share: all of an array, which is there; else `SOME`."""
     count = planes.shape[0]
-    step = max(count, 1) if isinstance(planes, np.ndarray) else SOME
-    return ((start, min(start + step, count)) for start in range(0, count, step))
+    return [(0, count)] if isinstance(planes, np.ndarray) else ranges(0, count)
 
 
 def some_of(planes: Planes, start: int, stop: int) -> NDArray[Any]:
     """Return the slices of a range; a view of an array."""
     some = planes[start:stop]
-    return np.asarray(some) if isinstance(some, np.ndarray) else np.asarray(some.read())
+    return some if isinstance(some, np.ndarray) else np.asarray(some.read())
 
 
 def areas_of(mask: Planes) -> NDArray[np.int64]:

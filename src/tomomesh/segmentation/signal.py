@@ -10,7 +10,7 @@ import scipy
 from ..kernels.contours.closing import close_plane
 from ..kernels.contours.moments import plane_moments
 from ..model.columns import for_kernels
-from ..model.planes import areas_of, ranges, some_of
+from ..model.planes import areas_of, parts_of, some_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,7 +46,7 @@ def fills_most(mask: Planes, *, solid: float = SOLID) -> bool:
     mask : (K, J, I) bool array or planes
     """
     sums = np.empty((mask.shape[0], 6))
-    for start, stop in ranges(mask):
+    for start, stop in parts_of(mask):
         plane_moments(for_kernels(some_of(mask, start, stop), np.bool_), sums[start:stop])
     count, x, y, xx, xy, yy = sums[sums[:, 0] > 2].T
     spread = (xx / count - (x / count) ** 2 + 1 / 12) * (yy / count - (y / count) ** 2 + 1 / 12)

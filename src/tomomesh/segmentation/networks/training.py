@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import EmptyError
-from ..kernels.threads import in_blocks
-from ..model.lattice import lattice
-from ..model.networks import Networks
-from ..model.planes import ranges
-from ..progress import Progress, silent
-from ..som.fit import match
-from .contours.inputs import FEWEST, SIDES_EACH
-from .signal import pixels_of
+from ...errors import EmptyError
+from ...kernels.threads import in_blocks
+from ...model.lattice import lattice
+from ...model.networks import Networks
+from ...model.planes import parts_of
+from ...progress import Progress, silent
+from ...som.fit import match
+from ..contours.inputs import FEWEST, SIDES_EACH
+from ..signal import pixels_of
 from .slices import Slices
 
 if TYPE_CHECKING:
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..isosurface.crossings import Levels
-    from ..model.contours import Contours
-    from ..model.lattice import Lattice
-    from ..model.planes import Planes
-    from ..settings import NetworkSettings
+    from ...isosurface.crossings import Levels
+    from ...model.contours import Contours
+    from ...model.lattice import Lattice
+    from ...model.planes import Planes
+    from ...settings import NetworkSettings
 
 
 def train_study(
@@ -84,7 +84,7 @@ def train_study(
     graph = lattice(settings.topology, slices.enough() if settings.neurons_follow else settings.neuron_count)
     least = SIDES_EACH * FEWEST if settings.neurons_follow else len(graph)
     count, parts, below = mask.shape[0], [], None
-    for start, stop in ranges(mask):
+    for start, stop in parts_of(mask):
         told = partial(_tell, progress, start, count)
         parts.append(train_some(slices.part(start, stop), graph, least, below, threads=threads, done=told))
         below = parts[-1].last

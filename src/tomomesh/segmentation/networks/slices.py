@@ -7,26 +7,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.som.neighborhoods import GAUSSIAN
-from ..measure.polygon import side_lengths
-from ..model.lattice import lattice
-from ..model.planes import areas_of, ranges, some_of
-from ..settings import IN_SLICE, MOST_NEURONS
-from ..som.even_spacing import bridged_edges, even_spacing
-from ..som.fit import fit, radii, shape_of
-from .contours.curved import evened
-from .contours.inputs import FEWEST, SIDES_EACH
-from .contours.shrinking import unshrunk
-from .signal import crossings_around, fills_most, is_stepped, outline, pixels_of
+from ...kernels.som.neighborhoods import GAUSSIAN
+from ...measure.polygon import side_lengths
+from ...model.lattice import lattice
+from ...model.planes import areas_of, parts_of, some_of
+from ...settings import IN_SLICE, MOST_NEURONS
+from ...som.even_spacing import bridged_edges, even_spacing
+from ...som.fit import fit, radii, shape_of
+from ..contours.curved import evened
+from ..contours.inputs import FEWEST, SIDES_EACH
+from ..contours.shrinking import unshrunk
+from ..signal import crossings_around, fills_most, is_stepped, outline, pixels_of
+from ..window import by_layer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..isosurface.crossings import Levels
-    from ..model.lattice import Lattice
-    from ..model.planes import Planes
-    from ..settings import NetworkSettings
-    from ..som.fit import Fitted
+    from ...isosurface.crossings import Levels
+    from ...model.lattice import Lattice
+    from ...model.planes import Planes
+    from ...model.volume import Volume
+    from ...settings import NetworkSettings
+    from ...som.fit import Fitted
+    from ..window import Limit
 
 LOOKED_AT = 6
 """Slices on which the number of neurons is found: a tenth of a study's, and of its time. Chosen: half of it changes the
@@ -169,9 +172,32 @@ def neurons_for(ring: NDArray[np.float64], gaps: NDArray[np.bool_], pixel: float
     return int(np.ceil(len(ring) * np.sqrt(float(np.quantile(lengths, 1 - REST)) / (CHORD * pixel))))
 
 
+@dataclass(frozen=True)
+class ByLayer:
+    """The window of each layer of the voxels that are kept, (K, J, I, L), made as it is asked for."""
+
+    volume: Volume
+    mask: Planes
+    lower: Limit
+    upper: Limit
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Sizes K, J, I, L."""
+        return (*self.volume.shape, self.volume.layers)
+
+    def __getitem__(self, slices: int | slice) -> NDArray[np.bool_]:
+        """Return a slice, or those of a range."""
+        if not isinstance(slices, slice):
+            return np.asarray(self[slices : slices + 1][0])
+        start, stop, _ = slices.indices(self.shape[0])
+        some = replace(self.volume, voxels=some_of(self.volume.voxels, start, stop))
+        return by_layer(some, lower=self.lower, upper=self.upper) & some_of(self.mask, start, stop)[..., None]
+
+
 def _times_shown(layers: Planes) -> float:
     shown = pixels = 0
-    for start, stop in ranges(layers):
+    for start, stop in parts_of(layers):
         some = some_of(layers, start, stop)
         shown, pixels = shown + int(some.sum()), pixels + int(some.any(axis=-1).sum())
     return float(shown) / max(float(pixels), 1.0)
