@@ -10,14 +10,14 @@ import numpy as np
 from ..kernels.isosurface.voxels import leave_window
 from ..kernels.threads import in_blocks
 from ..model.columns import any_of
-from ..model.planes import some_of
 from ..model.points import ADDED, BORDER, CROSSING
+from ..model.sliced import some_of
 from .means import BLOCK
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..model.planes import Planes
+    from ..model.sliced import Sliced
     from .thick_slices import Thinned
 
 CLOSEST = 0.01
@@ -49,7 +49,7 @@ class Levels:
         A voxel is inside where all its layers are in their windows, or one at least.
     """
 
-    voxels: NDArray[Any] | Planes
+    voxels: NDArray[Any] | Sliced
     lower: float | NDArray[np.float64]
     upper: float | NDArray[np.float64]
     layers: str = "all"

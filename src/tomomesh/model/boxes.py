@@ -9,12 +9,12 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from .planes import Planes
+    from .sliced import Sliced
 
     Box = tuple[slice, slice, slice]
 
 
-def box_of(mask: Planes, around: Box | None = None) -> Box:
+def box_of(mask: Sliced, around: Box | None = None) -> Box:
     """Return the box (K, J, I) of what is true in a mask; empty where nothing is.
 
     Parameters

@@ -13,14 +13,14 @@ import numpy as np
 
 from ..kernels.measure.edges import join_pairs
 from ..model.boxes import box_of
-from ..model.planes import ranges, some_of
+from ..model.sliced import ranges, some_of
 from .signal import SOLID
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.boxes import Box
-    from ..model.planes import Planes
+    from ..model.sliced import Sliced
 
     Ints = NDArray[np.int64]
     Floats = NDArray[np.float64]
@@ -168,12 +168,12 @@ class _Runs:
         return roots.astype(np.int64)
 
 
-def outlines_of(mask: Planes, pixel_mm: tuple[float, float] = (1.0, 1.0), around: Box | None = None) -> Outlines:
+def outlines_of(mask: Sliced, pixel_mm: tuple[float, float] = (1.0, 1.0), around: Box | None = None) -> Outlines:
     """Tell what each slice of a window is.
 
     Parameters
     ----------
-    mask : (K, J, I) bool array or planes
+    mask : (K, J, I) bool array or slices of it
     pixel_mm : (float, float)
         Distance of the columns and of the rows.
     around : box, optional

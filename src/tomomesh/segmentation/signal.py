@@ -10,13 +10,13 @@ import scipy
 from ..kernels.contours.closing import close_plane
 from ..kernels.contours.moments import plane_moments
 from ..model.columns import for_kernels
-from ..model.planes import areas_of, parts_of, some_of
+from ..model.sliced import areas_of, parts_of, some_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..isosurface.crossings import Levels
-    from ..model.planes import Planes
+    from ..model.sliced import Sliced
 
 SOLID = 0.4
 """Share of its ellipse that a window must fill to count as a solid, whose outline is taken.
@@ -35,7 +35,7 @@ WORD = 64
 """Pixels in a word of bits."""
 
 
-def fills_most(mask: Planes, *, solid: float = SOLID) -> bool:
+def fills_most(mask: Sliced, *, solid: float = SOLID) -> bool:
     """Tell whether the window of a study is a solid, like skin, and not a wall, like a skull.
 
     Compares the pixels of all slices with the areas of the ellipses that have the same second moments; a ring
@@ -43,7 +43,7 @@ def fills_most(mask: Planes, *, solid: float = SOLID) -> bool:
 
     Parameters
     ----------
-    mask : (K, J, I) bool array or planes
+    mask : (K, J, I) bool array or slices of it
     """
     sums = np.empty((mask.shape[0], 6))
     for start, stop in parts_of(mask):
@@ -105,7 +105,7 @@ def crossings_around(plane: NDArray[np.bool_], levels: Levels, k: int) -> NDArra
     return np.asarray(inner + share[:, None] * steps)
 
 
-def is_stepped(mask: Planes, levels: Levels) -> bool:
+def is_stepped(mask: Sliced, levels: Levels) -> bool:
     """Tell whether the gray levels at the border of a window in its slices are those of a mask, no finer than it."""
     full = np.flatnonzero(areas_of(mask))
     some = full[:: max(1, len(full) // STEPPED_ON)].tolist()

@@ -23,7 +23,7 @@ from .way import CUBES, POINTS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
     from ..model.networks import Networks
-    from ..model.planes import Planes
+    from ..model.sliced import Sliced
     from ..progress import Progress
     from ..results import Surface
     from ..segmentation.study import Selected
@@ -86,7 +86,7 @@ def levels_of(kept: Selected, settings: Settings) -> Levels:
     return Levels(chosen.volume.voxels, chosen.lower, chosen.upper, settings.window.layers)
 
 
-def _layers(kept: Selected, settings: Settings) -> Planes | None:
+def _layers(kept: Selected, settings: Settings) -> Sliced | None:
     """Return the window of each layer (K, J, I, L), where networks are shown layers."""
     chosen = kept.chosen
     if chosen.volume.layers == 1 or settings.network.inputs != "layers":

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..model.planes import areas_of
 from ..model.points import BRIDGE, CAP, NEURON
+from ..model.sliced import areas_of
 from ..results import Enclosed
 from ..stage import Stage
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from ..cuberille.leak_test import LeakTest
     from ..isosurface.voxels import Boundary, VoxelSurface
-    from ..model.planes import Planes
     from ..model.points import PointSet
+    from ..model.sliced import Sliced
     from ..model.trace import Trace
     from ..results import Segmentation
     from ..segmentation.sample import Sampling
@@ -54,7 +54,7 @@ def points_found(points: PointSet, spacing: float, *, unit: str = "mm", bridged:
     return Stage(None, {"points": section})
 
 
-def missed(slices: NDArray[np.int32], mask: Planes) -> tuple[list[int], tuple[str, ...]]:
+def missed(slices: NDArray[np.int32], mask: Sliced) -> tuple[list[int], tuple[str, ...]]:
     """Return the slices that have no network, and the warning that some of them should have one."""
     areas = areas_of(mask)
     without = np.setdiff1d(np.arange(len(areas)), slices)

@@ -11,7 +11,7 @@ import scipy
 from ...isosurface.runs import Runs
 from ...kernels.threads import in_order
 from ...model.contours import HOLE, OUTER
-from ...model.planes import parts_of, some_of
+from ...model.sliced import parts_of, some_of
 from ...som.starts import moments
 from ..signal import SOLID, outline, pixels_of
 from .loops import Loop, Patch, trace
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ...model.planes import Planes
+    from ...model.sliced import Sliced
 
     Crossed = Callable[[NDArray[np.int64], NDArray[np.int64]], NDArray[np.float64]]
 
@@ -190,7 +190,7 @@ def solids(components: Sequence[Component]) -> set[int]:
     return {body for body, more in filled.items() if more > 0}
 
 
-def slices_with_several(mask: Planes, threads: int = 0) -> int:
+def slices_with_several(mask: Sliced, threads: int = 0) -> int:
     """Count the slices in which components of the window lie side by side, for which one network is too few.
 
     A component counts where its box covers at least `BESIDE` of the largest one's and lies in no other; they are
@@ -198,25 +198,25 @@ def slices_with_several(mask: Planes, threads: int = 0) -> int:
 
     Parameters
     ----------
-    mask : (K, J, I) bool array or planes
+    mask : (K, J, I) bool array or slices of it
     threads : int
     """
     return int(_of_planes(_side_by_side, mask, threads).sum())
 
 
-def share_of_holes(mask: Planes, threads: int = 0) -> float:
+def share_of_holes(mask: Sliced, threads: int = 0) -> float:
     """Return the area of the holes in the slices of a window over its own, which an outline fills, in coarse pixels.
 
     Parameters
     ----------
-    mask : (K, J, I) bool array or planes
+    mask : (K, J, I) bool array or slices of it
     threads : int
     """
     filled, own = _of_planes(_filled_and_own, mask, threads).sum(axis=0)
     return float(filled / max(own, 1) - 1.0)
 
 
-def _of_planes(find: Callable[[NDArray[np.bool_]], int | tuple[int, int]], mask: Planes, threads: int) -> NDArray[Any]:
+def _of_planes(find: Callable[[NDArray[np.bool_]], int | tuple[int, int]], mask: Sliced, threads: int) -> NDArray[Any]:
     """Return what is found on each slice, (K, ...)."""
     found: list[int | tuple[int, int]] = []
     for start, stop in parts_of(mask):

@@ -10,7 +10,7 @@ import numpy as np
 from ...kernels.som.neighborhoods import GAUSSIAN
 from ...measure.polygon import side_lengths
 from ...model.lattice import lattice
-from ...model.planes import areas_of, parts_of, some_of
+from ...model.sliced import areas_of, parts_of, some_of
 from ...settings import IN_SLICE, MOST_NEURONS
 from ...som.even_spacing import bridged_edges, even_spacing
 from ...som.fit import fit, radii, shape_of
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from ...isosurface.crossings import Levels
     from ...model.lattice import Lattice
-    from ...model.planes import Planes
+    from ...model.sliced import Sliced
     from ...model.volume import Volume
     from ...settings import NetworkSettings
     from ...som.fit import Fitted
@@ -53,8 +53,8 @@ neighbor's place needs 3 epochs from there, and a start at 4 fails on two-sided 
 class Slices:
     """What the networks of a study see, and how they are trained."""
 
-    mask: Planes
-    layers: Planes | None
+    mask: Sliced
+    layers: Sliced | None
     levels: Levels | None
     settings: NetworkSettings
     pixel_mm: tuple[float, float]
@@ -66,7 +66,7 @@ class Slices:
 
     @classmethod
     def of(
-        cls, mask: Planes, layers: Planes | None, levels: Levels | None,
+        cls, mask: Sliced, layers: Sliced | None, levels: Levels | None,
         settings: NetworkSettings, pixel_mm: tuple[float, float], seed: int, first: int,
     ) -> Slices:  # fmt: skip
         """Choose what is shown; for the whole study, which would else have a step in its surface."""
@@ -177,7 +177,7 @@ class ByLayer:
     """The window of each layer of the voxels that are kept, (K, J, I, L), made as it is asked for."""
 
     volume: Volume
-    mask: Planes
+    mask: Sliced
     lower: Limit
     upper: Limit
 
@@ -195,7 +195,7 @@ class ByLayer:
         return by_layer(some, lower=self.lower, upper=self.upper) & some_of(self.mask, start, stop)[..., None]
 
 
-def _times_shown(layers: Planes) -> float:
+def _times_shown(layers: Sliced) -> float:
     shown = pixels = 0
     for start, stop in parts_of(layers):
         some = some_of(layers, start, stop)

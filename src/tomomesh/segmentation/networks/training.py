@@ -11,7 +11,7 @@ from ...errors import EmptyError
 from ...kernels.threads import in_blocks
 from ...model.lattice import lattice
 from ...model.networks import Networks
-from ...model.planes import parts_of
+from ...model.sliced import parts_of
 from ...progress import Progress, silent
 from ...som.fit import match
 from ..contours.inputs import FEWEST, SIDES_EACH
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from ...isosurface.crossings import Levels
     from ...model.contours import Contours
     from ...model.lattice import Lattice
-    from ...model.planes import Planes
+    from ...model.sliced import Sliced
     from ...settings import NetworkSettings
 
 
 def train_study(
-    mask: Planes,
+    mask: Sliced,
     settings: NetworkSettings,
     *,
-    layers: Planes | None = None,
+    layers: Sliced | None = None,
     levels: Levels | None = None,
     pixel_mm: tuple[float, float] = (1.0, 1.0),
     seed: int = 0,
@@ -49,10 +49,10 @@ def train_study(
 
     Parameters
     ----------
-    mask : (K, J, I) bool array or planes
+    mask : (K, J, I) bool array or slices of it
         What is not an array is drawn some slices at a time, and never whole; so are `layers` and `levels`.
     settings : NetworkSettings
-    layers : (K, J, I, L) bool array or planes, optional
+    layers : (K, J, I, L) bool array or slices of it, optional
         The layers of a color study that lie in their windows. Eq. 4 has an input x_ijl for each k_ijl that is not 0:
         it is read as a pixel that is presented once for every layer in which it lies in the window, at
         (i, j, l), layers lying as far apart as columns. A neuron's place is its first two coordinates. Outlines have
@@ -166,7 +166,7 @@ def _networks(parts: list[Some], slices: Slices, graph: Lattice, least: int) -> 
 
 
 def regions(
-    mask: Planes,
+    mask: Sliced,
     found: Networks | Contours,
     *,
     pixel_mm: tuple[float, float] = (1.0, 1.0),
@@ -176,7 +176,7 @@ def regions(
 
     Parameters
     ----------
-    mask : (K, J, I) bool array or planes
+    mask : (K, J, I) bool array or slices of it
     found : Networks or Contours
         One network a slice, or several.
     pixel_mm : (float, float)

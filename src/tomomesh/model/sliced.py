@@ -14,7 +14,7 @@ SOME = 32
 twice as often, twice of it takes 16 MB more of a study of 512 x 512 pixels of a byte."""
 
 
-class Planes(Protocol):
+class Sliced(Protocol):
     """What has slices (J, I) or (J, I, L): an array, a `RunMask` that draws them, or voxels that are read.
 
     A number gives the slice as an array; a range gives an array, or what ``read()`` makes one.
@@ -39,19 +39,19 @@ def ranges(start: int, stop: int, step: int = SOME) -> list[tuple[int, int]]:
     return [(first, min(first + step, stop)) for first in range(start, stop, max(step, 1))]
 
 
-def parts_of(planes: Planes) -> list[tuple[int, int]]:
+def parts_of(sliced: Sliced) -> list[tuple[int, int]]:
     """Return the ranges of slices that threads share: all of an array, which is there; else `SOME`."""
-    count = planes.shape[0]
-    return [(0, count)] if isinstance(planes, np.ndarray) else ranges(0, count)
+    count = sliced.shape[0]
+    return [(0, count)] if isinstance(sliced, np.ndarray) else ranges(0, count)
 
 
-def some_of(planes: Planes, start: int, stop: int) -> NDArray[Any]:
+def some_of(sliced: Sliced, start: int, stop: int) -> NDArray[Any]:
     """Return the slices of a range; a view of an array."""
-    some = planes[start:stop]
+    some = sliced[start:stop]
     return some if isinstance(some, np.ndarray) else np.asarray(some.read())
 
 
-def areas_of(mask: Planes) -> NDArray[np.int64]:
+def areas_of(mask: Sliced) -> NDArray[np.int64]:
     """Count the voxels of a mask on each slice, (K,)."""
     if not isinstance(mask, np.ndarray):
         return np.asarray(mask.areas())  # type: ignore[attr-defined]
