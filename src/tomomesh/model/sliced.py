@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from .lazy import in_memory
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -47,8 +49,7 @@ def parts_of(sliced: Sliced) -> list[tuple[int, int]]:
 
 def some_of(sliced: Sliced, start: int, stop: int) -> NDArray[Any]:
     """Return the slices of a range; a view of an array."""
-    some = sliced[start:stop]
-    return some if isinstance(some, np.ndarray) else np.asarray(some.read())
+    return in_memory(sliced[start:stop])
 
 
 def areas_of(mask: Sliced) -> NDArray[np.int64]:
