@@ -37,6 +37,31 @@ STEPPED, SAMPLES = 0.9, 5_000
 """Share of a border's height between two voxels over which the gray levels are those of a mask, and how many crossings
 are looked at to tell. Measured: studies have 0.4 to 0.6, the built-in head 0.66."""
 
+
+@dataclass(frozen=True)
+class Stretch:
+    """Voxels of a part of a volume, indexed as all would be; what lies beyond the part is as its nearest voxel.
+
+    Attributes
+    ----------
+    stored : (k, j, i) or (k, j, i, L) array
+    low : (int, int, int)
+        Its first voxel.
+    shape : tuple of int
+        Of the volume.
+    """
+
+    stored: NDArray[Any]
+    low: tuple[int, int, int]
+    shape: tuple[int, ...]
+
+    def __getitem__(self, places: tuple[NDArray[np.int32], ...]) -> NDArray[Any]:
+        """Return what voxels hold, given as indices along the three axes."""
+        sizes = self.stored.shape[:3]
+        near = [np.clip(n - low, 0, size - 1) for n, low, size in zip(places, self.low, sizes, strict=True)]
+        return np.asarray(self.stored[tuple(near)])
+
+
 IN_LINE = (-1, 0, 1, 2)
 """Steps from the voxel inside to the four in a line across a border."""
 
@@ -47,7 +72,7 @@ class Levels:
 
     Attributes
     ----------
-    voxels : (K, J, I) or (K, J, I, L) array, planes that are read as they are asked for, or Columns
+    voxels : (K, J, I) or (K, J, I, L) array, planes that are read as they are asked for, Columns or Stretch
     lower, upper : float or (L,) float array
         A layer is in its window where lower < k <= upper.
     layers : {"all", "any"}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..cuberille.neighbors import DIRECTIONS
-from ..kernels.isosurface.voxels import link_cells, list_faces, list_fans
+from ..kernels.isosurface.voxels import link_cells, list_borders, list_faces, list_fans
 from .means import over
 from .well_composed import CORNERS, surface_cells
 
@@ -69,7 +69,7 @@ class Net:
     @property
     def steps(self) -> NDArray[np.int32]:
         """Steps from the voxels inside to those outside, (q, 3)."""
-        return np.take(np.array(DIRECTIONS, np.int32), self.directions, axis=0)
+        return steps_of(self.directions)
 
 
 def net_around(
@@ -122,14 +122,39 @@ def net_of(
     start, stop = exact or (0, len(cells))
     table = np.empty((len(cells), 6), np.int32)
     link_cells(cells, cases, LINKED, np.full((2, *shape), -1, np.int32), table)
-    owned = OWNED[cases]
-    first = np.cumsum(owned) - owned
-    total = int(owned.sum())
-    quads, twins, inner = (np.zeros((total, count), np.int32) for count in (4, 4, 3))
-    fans, directions = np.zeros((len(cells), 6), np.int32), np.zeros(total, np.uint8)
-    low = cells + lowest
-    over(
-        lambda a, b: list_faces(low, cases, table, first, quads, inner, directions, a, b), (start, len(cells)), threads
-    )
+    first, low = faces_before(cases), cells + lowest
+    inner, directions = borders_of(low, cases, threads)
+    quads, twins = np.zeros((2, len(inner), 4), np.int32)
+    fans = np.zeros((len(cells), 6), np.int32)
+    over(lambda a, b: list_faces(cases, table, first, quads, a, b), (start, len(cells)), threads)
     over(lambda a, b: list_fans(cases, table, first, fans, twins, a, b), (0, stop), threads)
     return Net(low, table, fans, quads, twins, inner, directions)
+
+
+def faces_before(cases: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return how many faces are owned by the cells before each, (n,)."""
+    owned = OWNED[cases]
+    return np.asarray(np.cumsum(owned) - owned)
+
+
+def borders_of(
+    low: NDArray[np.int32], cases: NDArray[np.uint8], threads: int = 0
+) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    """Return the voxels (q, 3) behind the faces that cells own, and the directions (q,) to those outside.
+
+    Parameters
+    ----------
+    low : (n, 3) int32 array
+        Lowest corner of each cell, as voxel indices (x, y, z).
+    cases : (n,) uint8 array
+    threads : int
+    """
+    first, total = faces_before(cases), int(OWNED[cases].sum())
+    inner, directions = np.empty((total, 3), np.int32), np.empty(total, np.uint8)
+    over(lambda a, b: list_borders(low, cases, first, inner, directions, a, b), (0, len(cases)), threads)
+    return inner, directions
+
+
+def steps_of(directions: NDArray[np.uint8]) -> NDArray[np.int32]:
+    """Return the steps (q, 3) along directions (q,)."""
+    return np.take(np.array(DIRECTIONS, np.int32), directions, axis=0)

@@ -66,7 +66,7 @@ class Boundary:
         """The faces themselves."""
         net = self.net
         outward = slice(None, None, 1 if right_handed(self.affine) else -1)
-        corners = placed(net.low + 0.5, self.affine)
+        corners = placed(net.low + np.float64(0.5), self.affine)
         return QuadMesh(corners, net.quads[:, outward].astype(np.int64))
 
     @cached_property
