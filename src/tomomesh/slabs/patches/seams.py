@@ -69,7 +69,8 @@ class Seams:
         """Which edges (e,) have a shared vertex, and so are counted here and nowhere else."""
         corner, start = self.links.faces.reshape(-1), self.starts
         after = np.where(start % 3 == 2, start - 2, start + 1)
-        return self.shared[corner[start]] | self.shared[corner[after]]
+        theirs: Bools = self.shared[corner[start]] | self.shared[corner[after]]
+        return theirs
 
     @cached_property
     def borders(self) -> Ints:
