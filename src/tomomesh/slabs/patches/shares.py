@@ -45,7 +45,8 @@ def shares(patches: Patches, count: int) -> Iterator[TriMesh]:
 def _lowest(patch: Patch) -> Ints:
     """Return the lowest vertex of every face, (f,)."""
     a, b, c = patch.numbers[patch.faces.T]
-    return np.minimum(np.minimum(a, b), c)
+    lowest: Ints = np.minimum(np.minimum(a, b), c)
+    return lowest
 
 
 def _spread(patch: Patch, total: int) -> tuple[tuple[int, int], Ints]:
