@@ -71,7 +71,7 @@ class Seams:
     @cached_property
     def borders(self) -> Ints:
         """Half edges of these that have no other beside them."""
-        return self.starts[self.theirs & (self.links.uses == 1)]
+        return np.asarray(self.starts[self.theirs & (self.links.uses == 1)], np.int32)
 
     @cached_property
     def misoriented(self) -> int:
