@@ -117,6 +117,11 @@ class File:
         self.end = 0
         self.handle: Any = None
 
+    def __del__(self) -> None:
+        """Close the file with the last value that is kept in it; maps of it stay."""
+        if self.handle is not None:
+            self.handle.close()
+
     def put(self, array: Any) -> Any:
         """Write an array; one that is small, and what is no array, stays as it is."""
         if not isinstance(array, np.ndarray) or array.nbytes < LARGE:

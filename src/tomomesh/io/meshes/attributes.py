@@ -41,6 +41,8 @@ class MeshAttributes:
         Whether z is up where the frame does not say so, as of a part to print.
     single : bool
         Whether formats of 64 bits are to hold 32, where these keep the vertices apart.
+    fits : bool, optional
+        Whether they do, where that is known: of the whole that this is a piece of.
     """
 
     unit: str
@@ -49,6 +51,7 @@ class MeshAttributes:
     face_fields: Fields
     z_up: bool = False
     single: bool = False
+    fits: bool | None = None
 
     @property
     def head(self) -> str:
@@ -58,12 +61,12 @@ class MeshAttributes:
 
 def narrowed(positions: NDArray[np.float64], *, single: bool) -> NDArray[np.floating[Any]]:
     """Return positions (n, 3) in 32 bits where that was asked for and keeps them apart, else in 64."""
-    return np.asarray(positions, kind_of(_alone(positions), single=single))
+    return np.asarray(positions, np.float32 if single and fits_single(_alone(positions)) else np.float64)
 
 
-def kind_of(mesh: Parts, *, single: bool) -> type[np.floating[Any]]:
+def kind_of(mesh: Parts, beside: MeshAttributes) -> type[np.floating[Any]]:
     """Return 32 bits where these were asked for and keep the vertices apart and in place, else 64."""
-    return np.float32 if single and fits_single(mesh) else np.float64
+    return np.float32 if beside.single and fits_single(mesh, beside.fits) else np.float64
 
 
 def single_precision(vertices: NDArray[np.float64], path: str | Path, *, kind: str) -> NDArray[np.float32]:
@@ -78,7 +81,7 @@ def single_precision(vertices: NDArray[np.float64], path: str | Path, *, kind: s
     return np.asarray(vertices, np.float32)
 
 
-def require_single(mesh: Parts, path: str | Path, *, kind: str) -> None:
+def require_single(mesh: Parts, path: str | Path, *, kind: str, known: bool | None = None) -> None:
     """Refuse a mesh whose vertices 32 bits do not keep apart and in place.
 
     Parameters
@@ -88,13 +91,15 @@ def require_single(mesh: Parts, path: str | Path, *, kind: str) -> None:
         The output.
     kind : str
         Name of the format, for the error.
+    known : bool, optional
+        See `MeshAttributes.fits`.
 
     Raises
     ------
     OutputError
         Where two vertices would fall together, one would move too far, or a coordinate is too large.
     """
-    if not fits_single(mesh):
+    if not fits_single(mesh, known):
         largest = max((float(np.abs(some).max()) for some in mesh.vertices()), default=0.0)
         raise OutputError(
             f"the 32-bit coordinates of {kind} cannot keep the vertices apart and in place",
@@ -104,8 +109,10 @@ def require_single(mesh: Parts, path: str | Path, *, kind: str) -> None:
         )
 
 
-def fits_single(mesh: Parts) -> bool:
+def fits_single(mesh: Parts, known: bool | None = None) -> bool:
     """Whether in 32 bits no coordinate is too large, none moves too far, and no two vertices fall together."""
+    if known is not None:
+        return known
     moved, low, high = 0.0, np.full(3, np.inf), np.full(3, -np.inf)
     with np.errstate(over="ignore", invalid="ignore"):
         for some in mesh.vertices():

@@ -10,7 +10,6 @@ import numpy as np
 
 from ...errors import FormatError
 from ..colors import named_colors
-from ..files.atomic import replacing
 from ..text import lists_of, numbers_of, written
 from .cells import fans, weld
 
@@ -31,12 +30,11 @@ BESIDE = re.compile(r"(?<=\d)/\S*")
 """The numbers of textures and normals behind that of a vertex."""
 
 
-def write_obj(mesh: Parts, path: str | Path, beside: MeshAttributes) -> None:
-    """Write 64-bit coordinates, and colors as fractions behind them."""
-    with replacing(path) as file:
-        file.write(f"# {beside.head}\n".encode("ascii"))
-        file.writelines(text.encode("ascii") for text in _vertices(mesh, beside))
-        file.writelines(written("f %d %d %d\n", *(some + 1).T.tolist()).encode("ascii") for some in mesh.faces())
+def obj_parts(mesh: Parts, path: str | Path, beside: MeshAttributes) -> Iterator[bytes]:
+    """Yield a file part by part: 64-bit coordinates, and colors as fractions behind them."""
+    yield f"# {beside.head}\n".encode("ascii")
+    yield from (text.encode("ascii") for text in _vertices(mesh, beside))
+    yield from (written("f %d %d %d\n", *(some + 1).T.tolist()).encode("ascii") for some in mesh.faces())
 
 
 def _vertices(mesh: Parts, beside: MeshAttributes) -> Iterator[str]:

@@ -9,9 +9,11 @@ import numpy as np
 
 from ...measure.topology import count_positions
 from ...model.columns import parts_of
+from ..files.atomic import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -76,3 +78,17 @@ class InOnePiece:
         """Count the positions that stay apart at a precision."""
         with np.errstate(over="ignore"):
             return count_positions(np.array(self.mesh.vertices.astype(kind, copy=False), np.float64, order="C"))
+
+
+def write_parts(parts: Iterator[bytes], path: str | Path) -> None:
+    """Write a file part by part; what is refused before the first is refused before the file is begun.
+
+    Raises
+    ------
+    OutputError
+        Where it cannot be written.
+    """
+    head = next(parts)
+    with replacing(path) as file:
+        file.write(head)
+        file.writelines(parts)

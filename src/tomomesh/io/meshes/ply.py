@@ -151,8 +151,8 @@ def _elements(lines: list[list[str]]) -> list[PlyElement]:
     return [PlyElement(name, count, tuple(properties)) for name, count, properties in found]
 
 
-def write_ply_mesh(mesh: Parts, path: str | Path, beside: MeshAttributes) -> None:
-    """Write 64-bit coordinates, or 32-bit ones where asked for, with all fields, of vertices and of faces.
+def ply_parts(mesh: Parts, path: str | Path, beside: MeshAttributes) -> Iterator[bytes]:
+    """Yield a file part by part: 64-bit coordinates, or 32-bit ones where asked for, with all fields.
 
     Raises
     ------
@@ -164,15 +164,14 @@ def write_ply_mesh(mesh: Parts, path: str | Path, beside: MeshAttributes) -> Non
             "PLY numbers vertices in 32 bits", file=str(path), found=f"vertices = {mesh.vertex_count}",
             expected=f"at most {MOST_VERTICES}", hint="an .obj file, or --pieces",
         )  # fmt: skip
-    kind = kind_of(mesh, single=beside.single)
+    kind = kind_of(mesh, beside)
     at, on = ({name: _storable(values) for name, values in one.items()} for one in _fields(beside))
     vertices = _numbered((dict(zip(AXES, some.astype(kind).T, strict=True)) for some in mesh.vertices()), at)
     faces = _numbered(({"count": _threes(some), "corners": some.astype(np.int32)} for some in mesh.faces()), on)
     lines = _element("vertex", mesh.vertex_count, {**dict.fromkeys(AXES, np.empty(0, kind)), **at})
     lines += [f"element face {mesh.face_count}", "property list uchar int vertex_indices", *_properties(on)]
-    with replacing(path) as file:
-        file.write(_head(beside.head, lines))
-        file.writelines(_rows(some).tobytes() for rows in (vertices, faces) for some in rows)
+    yield _head(beside.head, lines)
+    yield from (_rows(some).tobytes() for rows in (vertices, faces) for some in rows)
 
 
 def _fields(beside: MeshAttributes) -> tuple[Fields, Fields]:

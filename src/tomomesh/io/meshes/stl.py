@@ -9,7 +9,6 @@ import numpy as np
 
 from ...errors import FormatError, OutputError
 from ..fields import doubles
-from ..files.atomic import replacing
 from ..files.limits import require_bytes
 from .attributes import require_single
 from .cells import weld
@@ -108,40 +107,20 @@ def _text_corners(data: bytes, file: str) -> NDArray[np.float64]:
     return corners
 
 
-def write_stl(mesh: Parts, path: str | Path, beside: MeshAttributes) -> None:
-    """Write a binary file.
+def stl_parts(mesh: Parts, path: str | Path, beside: MeshAttributes) -> Iterator[bytes]:
+    """Yield a binary file part by part: 32-bit coordinates, each face with its normal, behind a header with the frame.
 
     Raises
     ------
     OutputError
-        Where 32 bits cannot keep the vertices apart, or cannot count the faces.
+        Where 32 bits cannot keep the vertices apart, or cannot count the faces; `path` is named.
     """
-    parts = _stl_parts(mesh, path, beside)
-    head = next(parts)  # refused before a file is begun
-    with replacing(path) as file:
-        file.write(head)
-        file.writelines(parts)
-
-
-def stl_bytes(mesh: Parts, path: str | Path, beside: MeshAttributes) -> bytes:
-    """Return a binary file: 32-bit coordinates, each face with its normal, behind a header that names the frame.
-
-    Raises
-    ------
-    OutputError
-        As `write_stl`; `path` is named.
-    """
-    return b"".join(_stl_parts(mesh, path, beside))
-
-
-def _stl_parts(mesh: Parts, path: str | Path, beside: MeshAttributes) -> Iterator[bytes]:
-    """Yield the bytes of a file part by part, first those before the faces."""
     if mesh.face_count > MOST_FACES:
         raise OutputError(
             "STL counts faces in 32 bits", file=str(path), found=f"faces = {mesh.face_count}",
             expected=f"at most {MOST_FACES}", hint="a .ply file, or --pieces",
         )  # fmt: skip
-    require_single(mesh, path, kind="STL")
+    require_single(mesh, path, kind="STL", known=beside.fits)
     head = _shortened(beside.head).encode("ascii").ljust(STL_HEADER_BYTES)
     yield head + np.array(mesh.face_count, "<u4").tobytes()
     for corners in mesh.corners():

@@ -13,23 +13,21 @@ from ..files.source import suffix_of
 from .attributes import MeshAttributes
 from .gifti import is_bare, write_gifti
 from .glb import write_glb
-from .obj import write_obj
+from .obj import obj_parts
 from .off import write_off
-from .parts import InOnePiece
-from .ply import write_ply_mesh
-from .stl import write_stl
+from .parts import InOnePiece, write_parts
+from .ply import ply_parts
+from .stl import stl_parts
 from .threemf import write_3mf
 from .vtp import write_vtp_mesh
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from .parts import Parts
-
-    PartWriter = Callable[[Parts, str | Path, MeshAttributes], None]
 
 
 def write_mesh(
@@ -88,9 +86,9 @@ def write_mesh(
     on_faces = flat_columns(face_fields or {}, parts.face_count, ["count", "corners", "vertex_indices"])
     beside = MeshAttributes(unit, frame, at_vertices, on_faces, z_up=z_up, single=precision == 32)
     if suffix_of(path) in PART_WRITERS:
-        PART_WRITERS[suffix_of(path)](parts, path, beside)
+        write_parts(PART_WRITERS[suffix_of(path)](parts, path, beside), path)
     elif isinstance(mesh, TriMesh):
-        MESH_WRITERS[suffix_of(path)](mesh, path, beside)
+        WHOLE_WRITERS[suffix_of(path)](mesh, path, beside)
     else:
         raise UsageError(
             "the format is not written part by part, as a mesh larger than memory is", file=str(path),
@@ -114,14 +112,13 @@ def keeps(path: str | Path, field: str, *, on_faces: bool = False) -> bool:
     return suffix in KEEP_AT_VERTICES or (suffix in KEEP_COLORS and field in COLORS)
 
 
-def _in_one_piece(write: PartWriter) -> Callable[[TriMesh, str | Path, MeshAttributes], None]:
-    return lambda mesh, path, beside: write(InOnePiece(mesh), path, beside)
-
-
-PART_WRITERS: dict[str, PartWriter] = {".stl": write_stl, ".ply": write_ply_mesh, ".obj": write_obj}
-"""Suffix to writer of meshes that need not be whole."""
-MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, MeshAttributes], None]] = {
-    **{suffix: _in_one_piece(write) for suffix, write in PART_WRITERS.items()},
+PART_WRITERS: dict[str, Callable[[Parts, str | Path, MeshAttributes], Iterator[bytes]]] = {
+    ".stl": stl_parts,
+    ".ply": ply_parts,
+    ".obj": obj_parts,
+}
+"""Suffix to what yields a file of a mesh that need not be whole, part by part."""
+WHOLE_WRITERS: dict[str, Callable[[TriMesh, str | Path, MeshAttributes], None]] = {
     ".off": write_off,
     ".glb": write_glb,
     ".vtp": write_vtp_mesh,
@@ -130,3 +127,5 @@ MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, MeshAttributes], None]] =
     ".surf.gii": write_gifti,
 }
 """Suffix to writer; that of a surface for Connectome Workbench is both, of which the last decides."""
+MESH_WRITERS = (*PART_WRITERS, *WHOLE_WRITERS)
+"""Suffixes of meshes that are written."""

@@ -99,7 +99,7 @@ def counted(patch: Patch, extent: Extent) -> Counted:
     corner = links.faces.reshape(-1)
     order, first = links.edges
     start, last = order[first[:-1]], order[first[1:] - 1]
-    inner = ~(patch.shared[corner[start]] | patch.shared[corner[_after(start)]])
+    inner = inner_edges(patch, links)
     alone = start[inner & (links.uses == 1)]
     twice = inner & (links.uses == 2)
     fans = np.arange(len(corner), dtype=np.int32)
@@ -120,9 +120,17 @@ def counted(patch: Patch, extent: Extent) -> Counted:
     )  # fmt: skip
 
 
-def _after(half: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the next half edges (n,) of the same faces."""
-    return np.where(half % 3 == 2, half - 2, half + 1)
+def inner_edges(patch: Patch, links: Links) -> NDArray[np.bool_]:
+    """Tell which edges (e,) of a patch no other has a part in."""
+    return ~at_marked(links, patch.shared)
+
+
+def at_marked(links: Links, marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which edges (e,) end at a vertex of those that are marked (v,)."""
+    order, first = links.edges
+    corner, start = links.faces.reshape(-1), order[first[:-1]]
+    found: NDArray[np.bool_] = marked[corner[start]] | marked[corner[np.where(start % 3 == 2, start - 2, start + 1)]]
+    return found
 
 
 def _borders(

@@ -9,6 +9,8 @@ import numpy as np
 
 from ...measure.shape import Extent
 from ...model.columns import any_of, box, carried, parts_of
+from ..keep import InMemory
+from ..mesh import Piece, SlabMesh
 from .positions import distinct_in
 
 if TYPE_CHECKING:
@@ -16,8 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ...model.mesh import TriMesh
     from ..keep import Kept, Slabs
-    from ..mesh import Piece, SlabMesh
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
@@ -160,6 +162,12 @@ def patches_of(mesh: SlabMesh, along: tuple[float, ...] = (0.0, 0.0, 1.0)) -> Pa
     given = [places[np.searchsorted(shared, numbers)] for numbers in beside]
     kept = slabs.each(_patch, pieces, begins, asked, beside, given)
     return Patches(slabs, kept, mesh.vertex_count, _extent(slabs, kept, mesh.face_count), shared, along)
+
+
+def in_one_patch(mesh: TriMesh) -> Patches:
+    """Return a mesh that is whole in memory as a single patch."""
+    piece = Piece(mesh.vertices, mesh.vertices[:0], mesh.faces, mesh.faces[:0])
+    return patches_of(SlabMesh.of([piece], InMemory()))
 
 
 def _extent(slabs: Slabs, kept: list[Kept], faces: int) -> Extent:

@@ -13,7 +13,7 @@ from ...measure.links import Links
 from ...measure.shape import unfolded
 from ...measure.topology import Topology
 from ...model.mesh import TriMesh
-from .counts import Counted, Rim, Table, counted
+from .counts import Counted, Rim, Table, at_marked, counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,20 +61,17 @@ class Seams:
     def starts(self) -> Ints:
         """The first half edge of each edge, (e,)."""
         order, first = self.links.edges
-        starts: Ints = order[first[:-1]]
-        return starts
+        return np.asarray(order[first[:-1]], np.int32)
 
     @cached_property
     def theirs(self) -> Bools:
         """Which edges (e,) have a shared vertex, and so are counted here and nowhere else."""
-        corner, start = self.links.faces.reshape(-1), self.starts
-        after = np.where(start % 3 == 2, start - 2, start + 1)
-        return self.shared[corner[start]] | self.shared[corner[after]]
+        return at_marked(self.links, self.shared)
 
     @cached_property
     def borders(self) -> Ints:
         """Half edges of these that have no other beside them."""
-        return self.starts[self.theirs & (self.links.uses == 1)]
+        return np.asarray(self.starts[self.theirs & (self.links.uses == 1)], np.int32)
 
     @cached_property
     def misoriented(self) -> int:
