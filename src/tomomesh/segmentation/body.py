@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -125,10 +124,11 @@ def components_of_body(mask: RunMask, volume: Volume, cut: Cut) -> Components:
     """
     body = _body(volume, cut)
     kept = _in_body(mask, body)
-    beside = RunMask.of(part[:] & ~foreign for part, foreign in zip(cut.over(kept.mask), _holders(volume, body), strict=True))
-    if beside.count == kept.mask.count:
+    holders = zip(cut.over(kept.mask), _holders(volume, body), strict=True)
+    without = RunMask.of(part[:] & ~holder for part, holder in holders)
+    if without.count == kept.mask.count:
         return kept
-    return Components(_in_body(beside, body).mask, kept.found, kept.dropped)
+    return Components(_in_body(without, body).mask, kept.found, kept.dropped)
 
 
 def _holders(volume: Volume, body: Coarse) -> Coarse:

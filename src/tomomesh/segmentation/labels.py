@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import EmptyError, UsageError
 from ..isosurface.run_mask import RunMask
-from .slabwise.cut import Cut, Cutting
+from .slabwise.cut import HERE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from ..model.boxes import Box
     from ..model.volume import Volume
+    from .slabwise.cut import Cut, Cutting
 
     Ints = NDArray[np.int64]
 
@@ -38,7 +39,7 @@ NEARLY = 1e-3
 a label would be a mixture of two."""
 
 
-def whole(labels: Volume, cutting: Cutting | None = None) -> Volume:
+def whole(labels: Volume, cutting: Cutting = HERE) -> Volume:
     """Round labels that are nearly whole, as other programs' resampling leaves them (3.0000458), with a note.
 
     Parameters
@@ -57,7 +58,7 @@ def whole(labels: Volume, cutting: Cutting | None = None) -> Volume:
         raise _no_labels(f"{voxels.dtype}, {voxels.ndim - 2} layer(s)")
     if voxels.dtype.kind != "f":
         return labels
-    cut = (cutting or Cutting()).of(voxels)
+    cut = cutting.of(voxels)
     off, worst, counts = zip(*cut.each(_off), strict=True)
     first = int(np.argmax(off))  # of NaN the first
     if not off[first] < NEARLY:
@@ -113,9 +114,9 @@ class Labelled:
     cut: Cut
 
     @classmethod
-    def of(cls, volume: Volume, cutting: Cutting | None = None) -> Labelled:
+    def of(cls, volume: Volume, cutting: Cutting = HERE) -> Labelled:
         """Look at every voxel of a label map once."""
-        cut = (cutting or Cutting()).of(volume.voxels)
+        cut = cutting.of(volume.voxels)
         every, boxes = zip(*cut.each(_labels_of), strict=True)
         numbers, places = np.unique(np.concatenate(every), return_inverse=True)
         found = _none(len(numbers), volume.shape)
@@ -206,7 +207,7 @@ def labels_in(voxels: NDArray[Any]) -> dict[str, int]:
     ----------
     voxels : (K, J, I[, L]) array
     """
-    return labels_counted(Cutting().of(voxels))
+    return labels_counted(HERE.of(voxels))
 
 
 def labels_counted(cut: Cut, every: int = 1) -> dict[str, int]:

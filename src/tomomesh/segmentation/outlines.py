@@ -11,16 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..isosurface.run_mask import RunMask
 from ..kernels.measure.edges import join_pairs
-from ..model.boxes import box_of
-from ..model.sliced import ranges, some_of
 from .signal import SOLID
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from ..model.boxes import Box
-    from ..model.sliced import Sliced
 
     Ints = NDArray[np.int64]
     Floats = NDArray[np.float64]
@@ -168,88 +164,47 @@ class _Runs:
         return roots.astype(np.int64)
 
 
-def outlines_of(mask: Sliced, pixel_mm: tuple[float, float] = (1.0, 1.0), around: Box | None = None) -> Outlines:
+def outlines_of(mask: NDArray[np.bool_] | RunMask, pixel_mm: tuple[float, float] = (1.0, 1.0)) -> Outlines:
     """Tell what each slice of a window is.
 
     Parameters
     ----------
-    mask : (K, J, I) bool array or slices of it
+    mask : (K, J, I) bool array or RunMask
     pixel_mm : (float, float)
         Distance of the columns and of the rows.
-    around : box, optional
-        Of what is true, where that is known: its slices alone are looked at.
     """
-    layers, *box = around or (slice(0, mask.shape[0]), *box_of(mask)[1:])
-    parts = [
-        _Part.of(some_of(mask, start, min(stop + 1, layers.stop))[:, *box], stop - start, pixel_mm)
-        for start, stop in ranges(layers.start, layers.stop)
-    ]
-    *columns, shared = (np.concatenate(each) for each in zip(*(part.columns for part in parts), strict=True))
-    bodies, forks = _bodies(parts), sum(part.forks for part in parts)
-    largest = float(bodies.max(initial=0.0) / max(bodies.sum(), 1.0))
-    return Outlines(*columns, shared[:-1], len(bodies), largest, forks, pixel_mm)
+    inside, outside = _runs(boxed := _boxed(mask if isinstance(mask, RunMask) else RunMask.of([mask])))
+    count, rows = boxed.shape[0], boxed.shape[1] + 2 * FRAME
+    beside, above = inside.meeting(1, 1), inside.meeting(rows)
+    pieces, gaps = inside.joined(beside), outside.joined(outside.meeting(1))
+    held = gaps != gaps[0]  # the outside of all slices is one, through their frames
+    hollow = outside.of(held)
+    bodies = _sum(inside.joined(beside, above), inside.size)
+    bodies = bodies[bodies > 0]
+    return Outlines(
+        *_parts(inside, pieces, count), *_parts(hollow, gaps[held], count), _lengths(inside, beside, count, pixel_mm),
+        _ellipses(inside, rows, count), _sum(inside.slice, _shared(inside, above), count)[:-1], len(bodies),
+        float(bodies.max(initial=0.0) / max(bodies.sum(), 1.0)), _forks(pieces, above), pixel_mm,
+    )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Part:
-    """What some slices are, by the columns of `Outlines`, and the pixels (p,) of their pieces, slice after slice.
-
-    Links (2, q) are pieces that share pixels with those of the next slice, as far as the one that follows the last.
-    """
-
-    columns: list[NDArray[Any]]
-    sizes: Floats
-    links: Ints
-    forks: int
-
-    @classmethod
-    def of(cls, mask: NDArray[np.bool_], own: int, pixel_mm: tuple[float, float]) -> _Part:
-        """Look at some slices (n, J, I), of which the one that follows their `own` only tells how these go on."""
-        inside, outside = _runs(mask)
-        count, rows = len(mask), mask.shape[1] + 2 * FRAME
-        beside, above = inside.meeting(1, 1), inside.meeting(rows)
-        pieces, gaps = inside.joined(beside), outside.joined(outside.meeting(1))
-        held = gaps != gaps[0]  # the outside of all slices is one, through their frames
-        columns = [
-            *_parts(inside, pieces, count), *_parts(outside.of(held), gaps[held], count),
-            _lengths(inside, beside, count, pixel_mm), _ellipses(inside, rows, count),
-            _sum(inside.slice, _shared(inside, above), count),
-        ]  # fmt: skip
-        first, pieces = np.unique(pieces, return_inverse=True)
-        links = np.stack(np.divmod(np.unique(pieces[above[0]] * len(first) + pieces[above[1]]), max(len(first), 1)))
-        known = np.count_nonzero(inside.slice[first] < own)
-        return cls([one[:own] for one in columns], _sum(pieces, inside.size)[:known], links, _forks(links))
+def _boxed(mask: RunMask) -> RunMask:
+    """Leave out the rows and columns that hold nothing of a window; all slices stay."""
+    _, j, i = mask.box
+    return mask.cropped((slice(0, mask.shape[0]), j, i)) if mask.count else mask
 
 
-def _bodies(parts: list[_Part]) -> Floats:
-    """Return the pixels of the pieces in space."""
-    sizes = np.concatenate([part.sizes for part in parts])
-    first = np.cumsum([0, *(len(part.sizes) for part in parts)])
-    roots = np.arange(len(sizes), dtype=np.int32)
-    for part, before in zip(parts, first.tolist(), strict=False):
-        join_pairs(*(part.links + before), roots)
-    found = _sum(roots, sizes)
-    return found[found > 0]
-
-
-def _runs(mask: NDArray[np.bool_]) -> tuple[_Runs, _Runs]:
+def _runs(mask: RunMask) -> tuple[_Runs, _Runs]:
     """Part the rows of slices in a frame into what lies in the window and what lies outside, before and after each."""
-    count, (rows, columns) = len(mask), np.array(mask.shape[1:]) + 2 * FRAME
-    ends = np.concatenate([_changes(one) + k * rows * columns for k, one in enumerate(mask)])  # no copy of the window
-    row = ends[::2] // columns
-    start, stop = ends[::2] - row * columns, ends[1::2] - row * columns
+    count, rows, columns = mask.shape[0], mask.shape[1] + 2 * FRAME, mask.shape[2] + 2 * FRAME
+    k, j = np.divmod(mask.rows, mask.shape[1])
+    row, start, stop = k * rows + j + FRAME, mask.starts + np.int64(FRAME), mask.stops + np.int64(FRAME)
     gap = np.arange(len(row)) + row  # the stretch outside before each inside: every row has one more than insides
     around = np.repeat(np.arange(count * rows), np.bincount(row, minlength=count * rows) + 1)
     after, before = np.zeros_like(around), np.full_like(around, columns)
     after[gap + 1], before[gap] = stop, start
     width = columns + 2 * FRAME
     return _Runs(row, start, stop, row // rows, width), _Runs(around, after, before, around // rows, width)
-
-
-def _changes(pixels: NDArray[np.bool_]) -> Ints:
-    """Return where, row after row of a slice in its frame, the window begins or ends."""
-    flat = np.pad(pixels, FRAME).ravel()
-    return np.flatnonzero(flat[1:] != flat[:-1]) + 1
 
 
 def _sum(where: Ints, values: NDArray[Any], count: int = 0) -> Floats:
@@ -291,6 +246,7 @@ def _ellipses(runs: _Runs, rows: int, count: int) -> Floats:
     return np.where(area > 0, 4 * np.pi * np.sqrt(spread), 0.0)
 
 
-def _forks(links: Ints) -> int:
+def _forks(pieces: Ints, above: tuple[Ints, Ints]) -> int:
     """Count the pieces that go on as several, or come of several."""
+    links = np.stack(np.divmod(np.unique(pieces[above[0]] * len(pieces) + pieces[above[1]]), max(len(pieces), 1)))
     return sum(int(np.count_nonzero(np.bincount(ends) > 1)) for ends in links) if links.size else 0

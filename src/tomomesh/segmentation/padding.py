@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .otsu import two_classes
-from .slabwise.cut import Cutting
+from .slabwise.cut import HERE
 from .slabwise.levels import levels_in
 
 if TYPE_CHECKING:
@@ -77,12 +77,12 @@ class Padding:
 
 def padding(voxels: NDArray[Any]) -> Mask | None:
     """Return which voxels of a study (K, J, I) in memory are padding by their looks; None where none are."""
-    return _whole(guessed_padding(Cutting().of(voxels)), voxels)
+    return _whole(guessed_padding(HERE.of(voxels)), voxels)
 
 
 def all_padding(volume: Volume) -> Mask | None:
     """Return the voxels of a study in memory that are padding by the file's header or by their looks; None for none."""
-    return _whole(padding_in(Cutting().of(volume.voxels), volume.padding, guessed=True), volume.voxels)
+    return _whole(padding_in(HERE.of(volume.voxels), volume.padding, guessed=True), volume.voxels)
 
 
 def _whole(found: Padding | None, voxels: NDArray[Any]) -> Mask | None:
@@ -127,15 +127,16 @@ def guessed_padding(cut: Cut) -> Padding | None:
         return None
     corners = [cut.voxels[end][:: max(1, cut.shape[1] - 1), :: max(1, cut.shape[2] - 1)] for end in (0, -1)]
     levels = levels_in(cut)
-    for level in np.unique(corners).tolist():
-        if LEAST <= levels.count(level) / levels.size <= MOST:
-            found = _standing_out(level, levels, cut)
+    held = np.unique(corners).tolist()
+    for level, count in zip(held, levels.count(held), strict=True):
+        if LEAST <= count / levels.size <= MOST:
+            found = _standing_out(level, count, levels, cut)
             if found is not None:
                 return found
     return None
 
 
-def _standing_out(level: float, levels: Levels, cut: Cut) -> Padding | None:
+def _standing_out(level: float, count: int, levels: Levels, cut: Cut) -> Padding | None:
     """Return what of a level is padding by its distance from the rest, its place, and what the rest is without it."""
     rest = levels.without(level)
     (low, high), (lowest, highest) = rest.bulk(), rest.ends
@@ -146,7 +147,7 @@ def _standing_out(level: float, levels: Levels, cut: Cut) -> Padding | None:
         return None
     axis, lines = _lines(level, cut)
     filled = int(np.count_nonzero(lines)) * cut.shape[axis]
-    if filled < IN_LINES * levels.count(level) and gap <= FAR * span:
+    if filled < IN_LINES * count and gap <= FAR * span:
         return None
     return Padding(level=level, axis=axis, lines=lines) if among else Padding(level=level)
 

@@ -12,11 +12,18 @@ from ..errors import EmptyError, UsageError
 from ..isosurface.run_mask import RunMask
 from ..model.lazy import LazyVoxels
 from .body import (
-    Cleaned, components_of_body, is_dense, largest_component, skin_of, solid, thick_components, without_specks,
+    Cleaned,
+    components_of_body,
+    is_dense,
+    largest_component,
+    skin_of,
+    solid,
+    thick_components,
+    without_specks,
 )  # fmt: skip
 from .contours.labelled import filled_slices, gaps_in
 from .padding import as_background, padding_in
-from .slabwise.cut import Cut, Cutting
+from .slabwise.cut import HERE
 from .slabwise.sources import Drawn
 from .window import otsu_in, window_in, window_limits
 
@@ -28,6 +35,7 @@ if TYPE_CHECKING:
     from ..settings import Settings, WindowSettings
     from .body import Components
     from .labels import Labelled
+    from .slabwise.cut import Cut, Cutting
     from .window import Limit
 
 
@@ -112,7 +120,7 @@ class Chosen:
 
 def choose(
     stack: Volume, labels: Labelled | None, settings: Settings, inside: RunMask | None = None,
-    cutting: Cutting = Cutting(),
+    cutting: Cutting = HERE,
 ) -> Chosen:  # fmt: skip
     """Return what the settings keep of a study.
 

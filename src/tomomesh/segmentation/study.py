@@ -16,7 +16,7 @@ from .crop import crop, inside_roi
 from .grid import onto_grid
 from .labels import Labelled, doubted, labels_counted, whole
 from .selection import Chosen, choose
-from .slabwise.cut import Cutting
+from .slabwise.cut import HERE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ..isosurface.run_mask import RunMask
     from ..settings import Settings
     from .selection import Counts
+    from .slabwise.cut import Cutting
     from .window import Limit
 
 CUT_OFF = 0.25
@@ -81,7 +82,7 @@ class LaidOut:
     labels: Labelled | None
     inside: RunMask | None
     cropped: dict[str, list[int]] | None
-    cutting: Cutting = Cutting()
+    cutting: Cutting = HERE
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -91,7 +92,7 @@ class LaidOut:
 
 
 def lay_out(
-    volume: Volume, labels: Volume | None, settings: Settings, *, labelled: bool, cutting: Cutting = Cutting()
+    volume: Volume, labels: Volume | None, settings: Settings, *, labelled: bool, cutting: Cutting = HERE
 ) -> LaidOut:
     """Turn the slices of a study the way they are asked for, crop them, and lay a label map over them.
 

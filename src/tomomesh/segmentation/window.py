@@ -11,7 +11,7 @@ from ..errors import EmptyError, UsageError
 from ..isosurface.run_mask import RunMask
 from .labels import labels_counted
 from .otsu import otsu_threshold
-from .slabwise.cut import Cutting
+from .slabwise.cut import HERE
 from .slabwise.levels import gathered, levels_in
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def window(volume: Volume, *, lower: Limit = -np.inf, upper: Limit = np.inf, lay
     >>> window(study, lower=2, upper=5).sum(axis=(1, 2))
     array([1, 2])
     """
-    cut = Cutting().of(volume.voxels)
+    cut = HERE.of(volume.voxels)
     return window_in(cut, lower=lower, upper=upper, layers=layers).dense
 
 
@@ -145,13 +145,11 @@ def said(limit: Limit) -> str:
 
 def choose_window(volume: Volume, settings: WindowSettings) -> tuple[Limit, Limit]:
     """Return the limits that the settings ask for of a study in memory that has no padding; see `window_limits`."""
-    cut = Cutting().of(volume.voxels)
+    cut = HERE.of(volume.voxels)
     return window_limits(volume, cut, settings, lambda: otsu_in(cut))
 
 
-def window_limits(
-    volume: Volume, cut: Cut, settings: WindowSettings, otsu: Callable[[], Limit]
-) -> tuple[Limit, Limit]:
+def window_limits(volume: Volume, cut: Cut, settings: WindowSettings, otsu: Callable[[], Limit]) -> tuple[Limit, Limit]:
     """Return the limits that the settings ask for; Otsu's threshold, in each layer its own, where they ask for none.
 
     A layer that has one level alone tells nothing, and is not limited.
@@ -200,10 +198,10 @@ def _check_ct(volume: Volume, cut: Cut, preset: str) -> None:
 
 
 def otsu_thresholds(volume: Volume, padded: NDArray[np.bool_] | None = None) -> Limit:
-    """Return Otsu's threshold of a gray volume in memory, without its padding, or those of the layers of a color one."""
+    """Return Otsu's threshold of a gray volume in memory, without its padding, or those of a color one, (L,)."""
     if padded is not None and volume.voxels.ndim == 3:
         return otsu_threshold(volume.voxels[~padded])
-    return otsu_in(Cutting().of(volume.voxels))
+    return otsu_in(HERE.of(volume.voxels))
 
 
 def otsu_in(cut: Cut, padded: Padding | None = None) -> Limit:

@@ -53,6 +53,10 @@ class Cutting:
         return Cut(voxels, tuple(self.cuts(voxels.shape)), self.slabs)
 
 
+HERE = Cutting()
+"""For studies in memory."""
+
+
 @dataclass(frozen=True)
 class Cut:
     """An array of voxels in slabs.

@@ -7,14 +7,14 @@ counts of first 16 bits, its next from those of the levels that begin alike, and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -80,35 +80,56 @@ def _plain(levels: NDArray[Any]) -> NDArray[Any]:
     return levels.astype(np.float64) if levels.dtype.itemsize > 8 else levels
 
 
-def _keys(levels: NDArray[Any]) -> NDArray[np.unsignedinteger]:
-    """Return integers without a sign that are in the order of levels; NaN lies beyond what is infinite."""
-    kind = levels.dtype
-    bits = levels.view(f"{kind.byteorder}u{kind.itemsize}")
+def _digits(levels: NDArray[Any], begun: Sequence[int], depth: int) -> Ints:
+    """Count levels whose keys begin with some digits by their next digit, (b, 65536); of 8 bits there are 256."""
+    levels = _plain(levels)
+    kind, width = levels.dtype, 8 * levels.dtype.itemsize
+    bits, digit = levels.view(f"{kind.byteorder}u{kind.itemsize}"), min(width, DIGIT)
+    below = width - digit * (depth + 1)
+    heads = bits >> (below + digit) if depth else bits
+    counts = np.empty((len(begun), 1 << digit), np.int64)
+    for n, first in enumerate(begun):
+        held = bits[heads == _turned(first, digit * depth, kind)] if depth else bits
+        held = (held >> below) & ((1 << digit) - 1) if width > digit else held
+        found = np.bincount(held.ravel().astype(np.int64), minlength=1 << digit)
+        counts[n] = _in_order(found, first >> (digit * depth - 1) if depth else None, kind)
+    return counts
+
+
+def _turned(key: int, width: int, kind: np.dtype[Any]) -> int:
+    """Return the first bits of levels, so many, whose keys begin with others.
+
+    Keys are integers without a sign in the order of the levels; NaN lies beyond what is infinite.
+    """
+    first = 1 << (width - 1)
     if kind.kind == "u":
-        return bits
+        return key
+    return key ^ first if kind.kind == "i" or key & first else key ^ (2 * first - 1)
+
+
+def _in_order(counts: Ints, sign: int | None, kind: np.dtype[Any]) -> Ints:
+    """Bring counts of digits into the order of keys: of first digits, or of those of keys whose first bit is known."""
+    if sign is not None:
+        return counts[::-1] if kind.kind == "f" and not sign else counts
+    low, high = np.split(counts, 2)
+    return counts if kind.kind == "u" else np.concatenate([high[::-1] if kind.kind == "f" else high, low])
+
+
+def _key(level: float, kind: np.dtype[Any]) -> int:
+    """Return the key of a level."""
+    bits = int(np.array([level], f"{kind.kind}{kind.itemsize}").view(f"u{kind.itemsize}")[0])
     first = 1 << (8 * kind.itemsize - 1)
-    return bits ^ first if kind.kind == "i" else np.where(bits & first, ~bits, bits | first)
+    return (
+        _turned(bits, 8 * kind.itemsize, kind)
+        if kind.kind != "f"
+        else bits ^ (2 * first - 1 if bits & first else first)
+    )
 
 
 def _level(key: int, kind: np.dtype[Any]) -> float:
     """Return the level of a key."""
-    first = 1 << (8 * kind.itemsize - 1)
-    bits = key if kind.kind == "u" or (kind.kind == "f" and key < first) else key ^ first
-    held = np.array([bits], f"u{kind.itemsize}")
-    return float((~held if kind.kind == "f" and key < first else held).view(f"{kind.kind}{kind.itemsize}")[0])
-
-
-def _digits(levels: NDArray[Any], begun: Sequence[int], depth: int) -> Ints:
-    """Count levels whose keys begin with some digits by their next digit, (b, 65536); short keys have one digit."""
-    keys = _keys(_plain(levels))
-    bits = min(8 * keys.dtype.itemsize, DIGIT)
-    below = 8 * keys.dtype.itemsize - bits * (depth + 1)
-    counts = np.empty((len(begun), 1 << bits), np.int64)
-    for n, first in enumerate(begun):
-        held = keys[keys >> (below + bits) == first] if depth else keys
-        digit = (held >> below) & ((1 << bits) - 1) if depth or below else held
-        counts[n] = np.bincount(digit.ravel().astype(np.int64), minlength=1 << bits)
-    return counts
+    bits = np.array([_turned(key, 8 * kind.itemsize, kind)], f"u{kind.itemsize}")
+    return float(bits.view(f"{kind.kind}{kind.itemsize}")[0])
 
 
 @dataclass(frozen=True)
@@ -150,9 +171,9 @@ class Counted:
         """What is finite of it."""
         return self
 
-    def count(self, level: float) -> int:
-        """Count a level that is held."""
-        return int(self.counts[int(level) - self.base])
+    def count(self, levels: Sequence[float]) -> list[int]:
+        """Count levels that are held."""
+        return [int(self.counts[int(level) - self.base]) for level in levels]
 
     def without(self, level: float) -> Counted:
         """Return all but a level."""
@@ -179,11 +200,14 @@ class Ordered:
     kind : dtype
     each : callable
         As of `gathered`.
+    absent : mapping of int to int
+        Keys of what is left out, and how often each is seen.
     """
 
     heads: Ints
     kind: np.dtype[Any]
     each: Each
+    absent: Mapping[int, int] = field(default_factory=dict)
 
     @cached_property
     def size(self) -> int:
@@ -200,20 +224,21 @@ class Ordered:
         """What is finite of it."""
         if self.kind.kind != "f":
             return self
-        limits = _keys(np.array([-np.inf, np.inf], f"f{self.kind.itemsize}"))
-        low, high = (int(limit) >> (8 * self.kind.itemsize - DIGIT) for limit in limits)
-        inner = np.arange(low + 1, high)
+        low, high = (_key(end, self.kind) >> (8 * self.kind.itemsize - DIGIT) for end in (-np.inf, np.inf))
         heads = np.zeros_like(self.heads)
-        heads[inner] = self.heads[inner]
-        return Ordered(heads, self.kind, self.each)
+        heads[low + 1 : high] = self.heads[low + 1 : high]
+        return replace(self, heads=heads)
 
-    def count(self, level: float) -> int:
-        """Count a level."""
-        return int(sum(self.each(partial(_count, level=level))))
+    def count(self, levels: Sequence[float]) -> list[int]:
+        """Count levels."""
+        return np.sum(self.each(partial(_count, sought=levels)), axis=0).tolist()
 
-    def without(self, level: float) -> Levels:
+    def without(self, level: float) -> Ordered:
         """Return all but a level."""
-        return gathered(lambda work: self.each(partial(_without, work, level)))
+        keys = sorted({_key(one, self.kind) for one in ((0.0, -0.0) if level == 0 else (level,))})
+        bits = [_turned(key, 8 * self.kind.itemsize, self.kind) for key in keys]
+        absent = dict(zip(keys, np.sum(self.each(partial(_count_bits, sought=bits)), axis=0).tolist(), strict=True))
+        return replace(self, heads=self._less(self.heads[None], [0], 0, absent)[0], absent=absent)
 
     def bulk(self, tail: float = TAILS[0]) -> tuple[float, float]:
         """Return the percentiles that leave out so many percent of the levels at each end; levels that are held."""
@@ -237,6 +262,7 @@ class Ordered:
             if depth:
                 begun = sorted(set(keys))
                 counts = np.sum(self.each(partial(_digits, begun=begun, depth=depth)), axis=0)
+                counts = self._less(counts, begun, depth, self.absent)
             number = np.cumsum(counts, axis=1)
             for n, key in enumerate(keys):
                 row = number[begun.index(key)]
@@ -245,17 +271,31 @@ class Ordered:
                 keys[n] = (key << DIGIT) + digit
         return keys
 
+    def _less(self, counts: Ints, begun: Sequence[int], depth: int, absent: Mapping[int, int]) -> Ints:
+        """Take away what is left out from counts of a digit (b, 65536) behind others."""
+        counts = counts.copy()
+        below = 8 * self.kind.itemsize - DIGIT * (depth + 1)
+        for key, number in absent.items():
+            first, digit = divmod(key >> below, 1 << DIGIT)
+            if first in begun:
+                counts[begun.index(first), digit] -= number
+        return counts
+
     def histogram(self, low: float, high: float, bins: int) -> Ints:
         """Count the levels in equal bins."""
-        return np.sum(self.each(partial(_histogram, low=low, high=high, bins=bins)), axis=0)
+        gone = np.array([_level(key, self.kind) for key in self.absent], self.kind)
+        less = np.histogram(gone, bins, (low, high), weights=np.array([*self.absent.values()], np.int64))[0]
+        return np.sum(self.each(partial(_histogram, low=low, high=high, bins=bins)), axis=0) - less.astype(np.int64)
 
 
-def _count(levels: NDArray[Any], *, level: float) -> int:
-    return int(np.count_nonzero(levels == level))
+def _count(levels: NDArray[Any], *, sought: Sequence[float]) -> list[int]:
+    return [int(np.count_nonzero(levels == level)) for level in sought]
 
 
-def _without(work: Looked, level: float, levels: NDArray[Any]) -> Any:
-    return work(levels[levels != level])
+def _count_bits(levels: NDArray[Any], *, sought: Sequence[int]) -> list[int]:
+    levels = _plain(levels)
+    bits = levels.view(f"{levels.dtype.byteorder}u{levels.dtype.itemsize}")
+    return [int(np.count_nonzero(bits == one)) for one in sought]
 
 
 def _histogram(levels: NDArray[Any], *, low: float, high: float, bins: int) -> Ints:
