@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import math
+import os
 import shutil
 import tempfile
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import IO, TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -30,10 +31,17 @@ COPIES = 2
 """Unpacked copies that a process keeps of files that another one opened: a study, and the labels beside it."""
 
 
+class Copy(io.FileIO):
+    """A file without a name, gone as soon as nobody has it."""
+
+    def __del__(self) -> None:
+        self.close()
+
+
 class Part(Protocol):
     """Where numbers stand."""
 
-    def opened(self) -> tuple[Path | IO[bytes], int]:
+    def opened(self) -> tuple[Path | Copy, int]:
         """Return the file that holds them, and the bytes before them."""
 
 
@@ -74,7 +82,7 @@ class Unpacked:
     skip: int
     length: int
     name: str
-    _held: list[IO[bytes]] = field(default_factory=list, compare=False, repr=False)
+    _held: list[Copy] = field(default_factory=list, compare=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_held": []}
@@ -90,18 +98,17 @@ class Unpacked:
         self._held[:] = [_unpacked(self)]
         return self
 
-    def opened(self) -> tuple[IO[bytes], int]:
+    def opened(self) -> tuple[Copy, int]:
         """Return what is unpacked."""
         return (self._held[0] if self._held else _unpacked_again(self)), 0
 
 
-def _unpacked(packed: Unpacked) -> IO[bytes]:
+def _unpacked(packed: Unpacked) -> Copy:
     """Unpack files one behind the other into one that has no name, and is gone with its handle, however that ends."""
     promised = len(packed.files) * packed.length
     if promised > (free := shutil.disk_usage(tempfile.gettempdir()).free):
         raise _no_room(packed, f"at most {free} bytes")
-    with ExitStack() as undone:
-        held = undone.enter_context(tempfile.TemporaryFile(prefix="tomomesh-"))
+    with tempfile.TemporaryFile(prefix="tomomesh-") as held:
 
         def write(data: memoryview) -> None:
             try:
@@ -114,8 +121,7 @@ def _unpacked(packed: Unpacked) -> IO[bytes]:
             with unpacked(seen.unchanged(), packed.packing, file=packed.name, start=start) as stream:
                 pass_over(stream, packed.skip)
                 copy(packed.length, stream, write, file=packed.name)
-        undone.pop_all()
-    return held
+        return Copy(os.dup(held.fileno()), "rb")
 
 
 def _no_room(packed: Unpacked, expected: str = "") -> ResourceError:
@@ -179,7 +185,7 @@ class Numbers:
 
 
 def _copy(
-    target: NDArray[Any], file: Path | IO[bytes], kind: np.dtype[Any], start: int, shape: tuple[int, ...],
+    target: NDArray[Any], file: Path | Copy, kind: np.dtype[Any], start: int, shape: tuple[int, ...],
     box: tuple[slice, ...],
 ) -> None:  # fmt: skip
     """Copy a part of the array that begins at byte `start` of a file; never much of the file is mapped at once."""

@@ -136,6 +136,14 @@ def scaled_dtype(dtype: DTypeLike, scales: list[tuple[float, float]], bits: int 
     return np.dtype(np.float32 if stored.itemsize <= 2 or stored == np.float32 else np.float64)
 
 
+def stays_finite(stored: np.dtype[Any], scale: tuple[float, float], dtype: np.dtype[Any]) -> bool:
+    """Tell whether whatever is stored becomes a finite number: whole numbers do, but for a scale beyond `dtype`."""
+    if dtype.kind != "f" or stored.kind == "f":
+        return dtype.kind != "f"
+    with np.errstate(over="ignore"):
+        return bool(np.isfinite(scaled(np.array([np.iinfo(stored).min, np.iinfo(stored).max]), *scale, dtype)).all())
+
+
 def without_holes(voxels: Voxels, *, file: str) -> tuple[Voxels, tuple[str, ...]]:
     """Set NaN and infinite voxels to the lowest finite gray level, and count them.
 

@@ -12,7 +12,7 @@ from ...model.volume import Volume
 from ..files.detached import beside
 from ..files.source import existing_file, suffix_of
 from ..files.unpack import packing_of, unpacked
-from .gray import scaled, scaled_dtype, without_holes
+from .gray import scaled, scaled_dtype, stays_finite, without_holes
 from .nifti_frame import frame_of
 from .nifti_header import NIFTI_HEADERS, NiftiLayout, layout_of, unpack_header
 from .raster import Raster, read_raster
@@ -87,5 +87,7 @@ def _gray(path: Path, layout: NiftiLayout, name: str) -> tuple[Any, tuple[str, .
     stored = read_raster(raster, file=name)
     if colors:
         return stored[:, :, :, :3], ()
-    dtype = scaled_dtype(stored.dtype, [(layout.slope, layout.intercept)])
-    return without_holes(scaled(stored, layout.slope, layout.intercept, dtype), file=name)
+    scale = layout.slope, layout.intercept
+    dtype = scaled_dtype(stored.dtype, [scale])
+    levels = scaled(stored, *scale, dtype)
+    return (levels, ()) if stays_finite(stored.dtype, scale, dtype) else without_holes(levels, file=name)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ....errors import TomomeshError
 from ...files.limits import require_memory
+from ...files.parts import read_later
 from ...files.source import third_party
 from ..headers.dataset import inflated
 from ..headers.deflated import DEFLATED
@@ -106,7 +107,7 @@ def _opened(frame: ImageFrame, files: ExitStack) -> _Opened:
     else:
         element = pixel_element(file, frame.header, name=frame.path.name)
     layout = layout_of(frame, element.keyword)
-    require_memory(layout.frames * layout.frame_bytes, file=layout.name)
+    require_memory((1 if read_later() else layout.frames) * layout.frame_bytes, file=layout.name)
     if layout.syntax not in NATIVE:
         return _Opened(frame.path, file, element, layout, read_encapsulated(file, element, layout))
     check_native(element, layout)
