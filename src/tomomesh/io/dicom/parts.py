@@ -117,8 +117,7 @@ def opened(stack: Stack, decode: Decoder, *, study: str, all_now: bool) -> Gray:
     """
     slices = Slices(stack.places, decode)
     for n, place in enumerate(stack.places):
-        if n == 0 or all_now or len(place) > 1:
-            slices.at(place)
+        (slices.at if n == 0 or all_now or len(place) > 1 else slices.check)(place)
     if slices.bad or slices.kind is None:
         return Gray(np.empty(0), (), slices.bad)
     places = tuple(tuple((Seen.of(frame.path), frame.number) for frame in place) for place in stack.places)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ...volumes.gray import native, scaled, scaled_dtype, stays_finite, without_
 from .duplicates import difference
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from ..headers.header import ImageFrame
     from ..pixels.decoder import Decoder
     from .stack import Stack
+
+
+Taken = TypeVar("Taken")
 
 
 @dataclass(frozen=True)
@@ -160,16 +164,26 @@ class Slices:
                 raise _two_at_once(found[0][0], frame)
         return found[0][1] if found else None
 
+    def check(self, place: list[ImageFrame]) -> None:
+        """Find out which files at a position are broken, as far as that is known before they are decoded."""
+        for frame in place:
+            self._unless_bad(frame, self._decode.check)
+
     def _one(self, frame: ImageFrame) -> NDArray[Any] | None:
-        if frame.path in self.bad:
-            return None
-        try:
-            stored = native(self._decode(frame), file=frame.path.name)
-        except (FormatError, UnreadableError) as fault:
-            self.bad[frame.path] = fault
+        stored = self._unless_bad(frame, lambda one: native(self._decode(one), file=one.path.name))
+        if stored is None:
             return None
         self.kind = self.kind or Kind.of(stored, frame, self._frames)
         return self.kind.levels(stored, frame)
+
+    def _unless_bad(self, frame: ImageFrame, take: Callable[[ImageFrame], Taken]) -> Taken | None:
+        if frame.path in self.bad:
+            return None
+        try:
+            return take(frame)
+        except (FormatError, UnreadableError) as fault:
+            self.bad[frame.path] = fault
+            return None
 
     def found(self, voxels: Voxels, study: str) -> Gray:
         """Return what the slices make, or which of them are broken."""
