@@ -3,100 +3,81 @@
 from __future__ import annotations
 
 import ctypes
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from .pages import Pages, system
+import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from pathlib import Path
 
 LARGE = 1 << 22
 """Bytes from which an array may lie in a file. Chosen: with a quarter of it a run takes 6 % more time, for no less
 memory that counts."""
+MANY = 1 << 14
+"""Large arrays at once, over which they lie in the memory; less than the 65,530 maps that Linux lets a process have."""
 SET_HANDLER = 304
 """The place of ``PyDataMem_SetHandler`` in NumPy's table of functions, which keeps its order for good."""
 CAPSULE = ctypes.create_string_buffer(b"mem_handler")
 
-_ADDRESS, _SIZE = ctypes.c_void_p, ctypes.c_size_t
-_FUNCTIONS = (
-    ("malloc", ctypes.CFUNCTYPE(_ADDRESS, _ADDRESS, _SIZE)),
-    ("calloc", ctypes.CFUNCTYPE(_ADDRESS, _ADDRESS, _SIZE, _SIZE)),
-    ("realloc", ctypes.CFUNCTYPE(_ADDRESS, _ADDRESS, _ADDRESS, _SIZE)),
-    ("free", ctypes.CFUNCTYPE(None, _ADDRESS, _ADDRESS, _SIZE)),
-)
-
-
-class _Allocator(ctypes.Structure):
-    """``PyDataMemAllocator``."""
-
-    _fields_ = (("ctx", _ADDRESS), *_FUNCTIONS)
-
 
 class _Handler(ctypes.Structure):
-    """``PyDataMem_Handler``, version 1."""
+    """``PyDataMem_Handler``, version 1: a name, and what is called with `state`."""
 
-    _fields_ = (("name", ctypes.c_char * 127), ("version", ctypes.c_uint8), ("allocator", _Allocator))
+    _fields_ = (
+        ("name", ctypes.c_char * 127),
+        ("version", ctypes.c_uint8),
+        *((name, ctypes.c_void_p) for name in ("state", "malloc", "calloc", "realloc", "free")),
+    )
 
 
 class Arrays:
-    """The functions of a handler: large arrays lie in files, but for the first few.
+    """A handler whose large arrays lie in files without a name, but for the first few.
+
+    A file is gone with its array, however the process ends.
 
     Parameters
     ----------
-    pages : Pages
+    folder : path
+        Where the files are, on a disk; nobody else may read them.
     room : int
         Bytes of large arrays that are left in the memory.
     """
 
-    def __init__(self, pages: Pages, room: int) -> None:
-        self.pages, self.room = pages, room
-        self._here: dict[int, int] = {}
-        """Sizes of the large arrays in the memory, by their addresses."""
-        functions = [kind(getattr(self, name)) for name, kind in _FUNCTIONS]
-        self._handler = _Handler(b"tomomesh", 1, _Allocator(None, *functions))
+    def __init__(self, folder: Path, room: int) -> None:
+        self._name = ctypes.create_string_buffer(bytes(folder))
+        self._state = np.zeros(_start() + 2 * MANY, np.int64)
+        self._state[:3] = room, LARGE, ctypes.addressof(self._name)
+        made = {name: entry.address for name, entry in _entries().items()}
+        self._leave = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)(made.pop("leave"))
+        self._handler = _Handler(b"tomomesh", 1, self._state.ctypes.data, **made)
         self.capsule: Any = _api().PyCapsule_New(ctypes.addressof(self._handler), ctypes.addressof(CAPSULE), None)
-        _LASTING.append((self, functions))
+        _api().Py_IncRef(self)  # for good: its arrays may be there until the process ends
 
-    def malloc(self, _: int | None, size: int) -> int | None:
-        """Return the address of so many bytes; None where there are none."""
-        return self._taken(size, lambda: system().malloc(size))
+    @property
+    def fault(self) -> int:
+        """The number of the system's error for which an array found no room last; -1 where no file could be made."""
+        return int(self._state[3])
 
-    def calloc(self, _: int | None, count: int, each: int) -> int | None:
-        """Return the address of so many bytes, all 0."""
-        return self._taken(count * each, lambda: system().calloc(count, each))
-
-    def realloc(self, _: int | None, place: int | None, size: int) -> int | None:
-        """Return the address of as many bytes as are asked for now, with what was there."""
-        before = None if place is None else self.pages.size(place)
-        if before is None or place is None:
-            self.room += self._here.pop(place or 0, 0)
-            return system().realloc(place, size)  # type: ignore[no-any-return]
-        found = self.malloc(None, size)
-        if found is not None:
-            ctypes.memmove(found, place, min(before, size))
-            self.pages.give_back(place)
-        return found
-
-    def free(self, _: int | None, place: int | None, size: int) -> None:
-        """Take bytes back."""
-        if place is not None and self.pages.size(place) is not None:
-            self.pages.give_back(place)
-            return
-        self.room += self._here.pop(place or 0, 0)
-        system().free(place)
-
-    def _taken(self, size: int, here: Callable[[], int | None]) -> int | None:
-        if size >= LARGE and size > self.room:
-            return self.pages.take(size)
-        place = here()
-        if place is not None and size >= LARGE:
-            self._here[place] = size
-            self.room -= size
-        return place
+    def leave(self) -> None:
+        """Let the pages of all files go, which others may be at work on: they are read again where they are needed."""
+        self._leave(self._state.ctypes.data)
 
 
-_LASTING: list[Any] = []
-"""Handlers, and the functions of each: arrays that they made may be there until the process ends."""
+@cache
+def _entries() -> dict[str, Any]:
+    """Compile what NumPy calls; kept for good, as what was made by it."""
+    from ..kernels.native.allocator import entries
+
+    made = entries(_start() + 2 * MANY)
+    _api().Py_IncRef(made)
+    return made
+
+
+def _start() -> int:
+    from ..kernels.native.allocator import FIRST
+
+    return FIRST
 
 
 def swapped(capsule: Any) -> Any:
@@ -109,8 +90,9 @@ def swapped(capsule: Any) -> Any:
 
 
 def _api() -> Any:
-    """Return Python's functions on capsules, typed."""
+    """Return Python's own functions, typed."""
     api = ctypes.pythonapi
+    api.Py_IncRef.argtypes = [ctypes.py_object]
     api.PyCapsule_New.restype = ctypes.py_object
     api.PyCapsule_New.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]
     api.PyCapsule_GetPointer.restype = ctypes.c_void_p

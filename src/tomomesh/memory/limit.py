@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import _thread
 import os
 import re
 import shutil
-import signal
 import sys
 import tempfile
 import threading
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..errors import NO_ROOM, OutputError, ResourceError, UsageError
-from . import arrays
+from ..kernels.compile import COMPILED
 from .arrays import Arrays, swapped
-from .pages import Pages
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from types import FrameType
 
 KEPT = 0.25
 """Share of the limit, over what is taken at first, for large arrays that stay in the memory. Chosen: half of it takes
@@ -37,8 +33,6 @@ UNITS = {"": 1, **{f"{k}{b}": (1024 if b else 1000) ** n for n, k in enumerate("
 """Bytes by unit, in capitals."""
 IN_MEMORY = ("tmpfs", "ramfs")
 """File systems that are no disks."""
-OWN = tuple(str(Path(arrays.__file__).with_name(name)) for name in ("arrays.py", "pages.py"))
-
 _folder: ContextVar[Path | None] = ContextVar("_folder", default=None)
 
 
@@ -58,7 +52,7 @@ def bytes_of(size: str | float) -> int:
     found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*([KMGT]?I?)B?\s*", str(size).upper())
     number = float(found[1]) * UNITS.get(found[2], 0) if found else 0.0
     if not LEAST <= number < 1 << 62:
-        raise UsageError("the limit of the memory", found=str(size), expected="300MiB or more, as 4GB")
+        raise UsageError("that is no limit of the memory", found=f"memory = {size}", expected="300MiB or more, as 4GB")
     return int(number)
 
 
@@ -99,14 +93,17 @@ def memory_limit(limit: str | float | None) -> Iterator[None]:
     most = bytes_of(limit)
     if not sys.platform.startswith("linux"):
         raise UsageError("the memory can be limited on Linux only", found=sys.platform)
-    pages = Pages(_disk())
+    if not COMPILED:
+        raise UsageError("the memory can be limited with compiled kernels only", found="NUMBA_DISABLE_JIT")
+    folder = _disk()
+    made = Arrays(folder, int(KEPT * max(most - _resident(), 0)))
     try:
-        with _lying_in(pages, most):
+        with _lying_in(made, most, folder):
             yield
     except MemoryError:
-        if pages.fault is None:
+        if made.fault == 0:
             raise
-        raise _full(pages) from None
+        raise _full(folder, made.fault) from None
 
 
 def free_disk() -> float | None:
@@ -116,70 +113,31 @@ def free_disk() -> float | None:
 
 
 @contextmanager
-def _lying_in(pages: Pages, most: int) -> Iterator[None]:
-    made = Arrays(pages, int(KEPT * max(most - _resident(), 0)))
+def _lying_in(made: Arrays, most: int, folder: Path) -> Iterator[None]:
     with ExitStack() as stack:
-        stack.enter_context(_watched(pages, int(FULL * most)))
-        stack.callback(_folder.reset, _folder.set(pages.folder))
+        stack.enter_context(_watched(made, int(FULL * most)))
+        stack.callback(_folder.reset, _folder.set(folder))
         stack.callback(swapped, swapped(made.capsule))
         yield
 
 
 @contextmanager
-def _watched(pages: Pages, full: int) -> Iterator[None]:
-    """Let pages go whenever too much is in the memory; hold back signals while NumPy takes and gives back memory."""
-    done, late = threading.Event(), list[int]()
+def _watched(made: Arrays, full: int) -> Iterator[None]:
+    """Let pages go whenever too much is in the memory."""
+    done = threading.Event()
 
     def watch() -> None:
         while not done.wait(LOOK_S):
             if _resident() > full:
-                pages.leave()
-            while late:
-                _thread.interrupt_main(late.pop())
+                made.leave()
 
     watcher = threading.Thread(target=watch, daemon=True)
-    with _held_back(late):
-        watcher.start()
-        try:
-            yield
-        finally:
-            done.set()
-            watcher.join()
-    for number in late:
-        signal.raise_signal(number)
-
-
-@contextmanager
-def _held_back(late: list[int]) -> Iterator[None]:
-    """Note a signal that comes while NumPy asks for memory: an error raised there would be lost, and the memory too."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    told = {number: handler for number, handler in before.items() if callable(handler)}
-
-    def handle(number: int, frame: FrameType | None) -> Any:
-        if _is_ours(frame):
-            late.append(number)
-            return None
-        return told[signal.Signals(number)](number, frame)
-
-    for number in told:
-        signal.signal(number, handle)
+    watcher.start()
     try:
         yield
     finally:
-        for number, handler in told.items():
-            signal.signal(number, handler)
-
-
-def _is_ours(frame: FrameType | None) -> bool:
-    """Tell whether a frame, or one that called it, takes or gives back memory."""
-    while frame is not None:
-        if frame.f_code.co_filename in OWN:
-            return True
-        frame = frame.f_back
-    return False
+        done.set()
+        watcher.join()
 
 
 def _disk() -> Path:
@@ -210,10 +168,10 @@ def _resident() -> int:
     return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def _full(pages: Pages) -> OutputError:
-    fault = pages.fault
-    told = "the disk is full" if fault is not None and fault.errno in NO_ROOM else str(fault and fault.strerror).lower()
+def _full(folder: Path, fault: int) -> OutputError:
+    told = "no file can be made" if fault < 0 else os.strerror(fault).lower()
     return OutputError(
-        "what is beyond the limit of the memory cannot be kept", file=str(pages.folder), found=told,
+        "what is beyond the limit of the memory cannot be kept", file=str(folder),
+        found="the disk is full" if fault in NO_ROOM else told,
         hint="TMPDIR=FOLDER, one on a disk with more room, or a larger limit",
     )  # fmt: skip
