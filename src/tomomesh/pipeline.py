@@ -5,10 +5,12 @@ from __future__ import annotations
 import ctypes
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from .effect import without_effect
 from .finish import compare_with, finish
+from .memory.limit import memory_limit
 from .model.points import PointSet
 from .progress import Progress, silent
 from .segmentation.study import lay_out, select_in
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from .model.volume import Volume
     from .results import Segmentation, Surface
     from .segmentation.study import LaidOut
+    from .stage import Later
     from .ways.way import Way
 
 
@@ -130,6 +133,7 @@ def reconstruct_points(
     points: PointSet | NDArray[np.float64],
     settings: Settings | None = None,
     *,
+    memory: str | float | None = None,
     progress: Progress = silent,
     **changes: Any,
 ) -> Surface:
@@ -139,6 +143,9 @@ def reconstruct_points(
     ----------
     points : PointSet or (n, 3) array
         Positions; their order and repetitions change nothing.
+    memory : str or number, optional
+        Bytes, as ``"4GB"``, that the work is to take at most: see `tomomesh.memory_limit`, which may also be around
+        what comes before and after, as reading and writing.
     settings, progress, **changes
         As in `reconstruct`.
 
@@ -158,18 +165,35 @@ def reconstruct_points(
     >>> round(found.report["quality"]["volume_mm3"] / (4 / 3 * np.pi), 2)
     1.0
     """
+    settings = settled(settings, changes)
+    with memory_limit(memory):
+        made = _of_points(points, settings, changes, progress)
+    if memory is None:
+        return made
+    stages = (one if isinstance(one, Stage) else partial(_limited, memory, one) for one in made.stages)
+    return replace(made, stages=tuple(stages))
+
+
+def _of_points(
+    points: PointSet | NDArray[np.float64], settings: Settings, given: Collection[str], progress: Progress
+) -> Surface:
     from .printing.part import turned
     from .ways.clouds.points import take_points
 
-    settings = settled(settings, changes)
     cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)
     taken = take_points(cloud, settings)
     settings = replace(settings, printing=turned(settings.printing, cloud.frame))
-    begun = _begin(settings, changes, input=taken.value.input)
+    begun = _begin(settings, given, input=taken.value.input)
     made = begun.value.surface(taken.value, settings, progress)
     _give_back()
     done, later = finish(replace(made.value, place=taken.value.place), settings, progress)
     return replace(done.value, way=begun.value.name, settings=settings, stages=(taken, begun, made, done, *later))
+
+
+def _limited(memory: str | float, later: Later) -> Stage[Any]:
+    """Make a stage within a limit of memory."""
+    with memory_limit(memory):
+        return later()
 
 
 def reconstructed(

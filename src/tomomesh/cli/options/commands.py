@@ -83,6 +83,10 @@ def _surface(commands: Any) -> None:
     stage_two.add_argument("cloud", metavar="POINTS", help=f"{CLOUD}, or - with --input-format")
     stage_two.add_argument("-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format")
     add_streams(stage_two, CLOUD_FORMATS, MESH_FORMATS, usual="xyz")
+    stage_two.add_argument(
+        "--memory", metavar="SIZE",
+        help="memory to take at most, as 4GB: arrays beyond it lie on the disk of TMPDIR (Linux; default: no limit)",
+    )  # fmt: skip
     add_outputs(stage_two, "figures")
     add_settings(stage_two, ("cloud", *STAGE_TWO, "run"), without=STUDY_ONLY)
 
