@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .model.mesh import TriMesh
     from .model.volume import Volume
     from .results import Segmentation, Surface
-    from .segmentation.study import LaidOut
+    from .segmentation.study import LaidOut, Selected
     from .stage import Later
     from .ways.way import Way
 
@@ -126,7 +126,7 @@ def segment(
     settings = settled(settings, changes)
     progress("window", 0, 2)
     study = lay_out(volume, labels, settings, labelled=settings.window.select is not None)
-    return _segmented(study, settings, changes, progress)[0]
+    return _segmented(begun_on(study, settings, changes, progress), progress)
 
 
 def reconstruct_points(
@@ -214,9 +214,14 @@ def reconstructed(
     kept : bool
         Whether all stages are kept.
     """
-    study = lay()
-    found, way, taken = _segmented(study, settings, given, progress)
-    del study
+    return finished(begun_on(lay(), settings, given, progress), progress, truth=truth, kept=kept)
+
+
+def finished(begun: Begun, progress: Progress, *, truth: TriMesh | None = None, kept: bool = True) -> Surface:
+    """Take a study whose way is known to a surface; see `reconstructed`."""
+    way, settings, taken = begun.way, begun.settings, begun.taken
+    found = _segmented(begun, progress)
+    del begun
     found = found if kept else found.without_voxels()
     _give_back()
     made = way.surface(found, taken, progress)
@@ -269,17 +274,41 @@ def laid_out(
     return lay_out(volume, labels, settings, labelled=labelled)
 
 
-def _segmented(
-    study: LaidOut, settings: Settings, given: Collection[str], progress: Progress
-) -> tuple[Segmentation[Any], Way, Settings]:
-    """Run stage one; return also the way that it takes, and the settings with nothing about that left open."""
+@dataclass(frozen=True)
+class Begun:
+    """A study of which it is known what is kept and which way it goes.
+
+    Attributes
+    ----------
+    kept : Selected
+    way : Way
+    settings, taken : Settings
+        As they were asked for, and with nothing about the way left open.
+    told : Stage
+        What there is to be told so far.
+    """
+
+    kept: Selected
+    way: Way
+    settings: Settings
+    taken: Settings
+    told: Stage[None]
+
+
+def begun_on(study: LaidOut, settings: Settings, given: Collection[str], progress: Progress) -> Begun:
+    """Choose the voxels of a study that was laid out, and the way to their surface; parameters as `reconstructed`."""
     kept = select_in(study, settings)
     progress("window", 1, 2)
     taken = take_way(kept.value, settings)
     progress("window", 2, 2)
     begun = _begin(taken.value, given, input=_input_of(study.volume))
-    way = begun.value
+    return Begun(kept.value, begun.value, settings, taken.value, folded(None, begun, taken, kept))
+
+
+def _segmented(begun: Begun, progress: Progress) -> Segmentation[Any]:
+    """Run stage one."""
+    way = begun.way
     assert way.segment is not None
-    found = way.segment(kept.value, taken.value, progress)
-    stages = (folded(None, begun, taken, kept, found), *found.value.stages)
-    return replace(found.value, way=way.name, settings=settings, stages=stages), way, taken.value
+    found = way.segment(begun.kept, begun.taken, progress)
+    stages = (folded(None, begun.told, found), *found.value.stages)
+    return replace(found.value, way=way.name, settings=begun.settings, stages=stages)
