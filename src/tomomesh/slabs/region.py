@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .ground import Frame
+    from .frame import Frame
     from .parts import Arrays
     from .place import Place
 

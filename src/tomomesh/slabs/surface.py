@@ -29,8 +29,10 @@ from ..isosurface.thin import GIVEN_BACK
 from ..model.boxes import box_of
 from ..model.trace import Motion, Trace
 from ..progress import Progress, silent
+from .contacts import AROUND, ROUNDS, filled
 from .cuts import Cuts
-from .ground import FEWEST, Frame, cells_from, ground, sample, squares_from, told
+from .frame import Frame
+from .ground import bits_of, cells_from, ground, runs_of, sample, squares_from, told
 from .mesh import SlabMesh
 from .parts import exchanged, told_by
 from .place import HALO, Place
@@ -60,7 +62,7 @@ class Asked:
     voxels : (K, J, I[, L]) array, LazyVoxels or None
         What a volume holds; None where the mask is all there is: then the window is ``0 < k``.
     affine : (4, 4) float array
-    lower, upper, layers
+    lower, upper, layers, surface
         As of `tomomesh.isosurface.voxels.boundary`.
     around : box, optional
         Outside of which no voxel is kept.
@@ -72,6 +74,7 @@ class Asked:
     lower: float | NDArray[np.float64] = -np.inf
     upper: float | NDArray[np.float64] = np.inf
     layers: str = "all"
+    surface: str = "all"
     around: Box | None = None
 
     @property
@@ -165,26 +168,32 @@ def _layers(cuts: Cuts, frame: Frame) -> Cuts:
 
 def _grounded(
     asked: Asked, frame: Frame, layers: Cuts, slabs: Slabs, threads: int
-) -> tuple[list[Kept], list[tuple[int, int, bool, Longs]]]:
-    """Look at the mask, with halos that are wide enough for the rounds of joining that it takes."""
-    halo = FEWEST
-    while True:
-        around = [layers.around(slab, halo) for slab in range(len(layers))]
-        masks = [asked.part(*frame.held(start, stop + 1)) for start, stop in around]
-        work = partial(ground, frame=frame, levels=asked.levels, threads=threads)
-        found = slabs.each(work, masks, [_slices(asked, frame, *one) for one in around], layers.own, around)
-        rounds = slabs.fetch(slabs.each(told, found))
-        if max(one[0] for one in rounds) <= halo - 3 or len(layers) == 1:
-            return found, rounds
-        halo *= 2
+) -> tuple[list[Kept], list[tuple[bool, int, bool, Longs]]]:
+    """Look at the mask, as often as its contacts take rounds of joining, and again if it is to be filled."""
+    around = [layers.around(slab, AROUND) for slab in range(len(layers))]
+    masks = [asked.part(*frame.held(start, stop + 1)) for start, stop in around]
+    columns = masks, [_slices(asked, frame, *one) for one in around], layers.own, around
+    work = partial(ground, frame=frame, levels=asked.levels, threads=threads)
+    rounds, numbers = (ROUNDS if len(layers) > 1 else np.inf), np.arange(layers.places[-1] + 1)
+    nothing = [None] * len(layers)
+    found = slabs.each(partial(work, rounds=rounds), *columns, [()] * len(layers), nothing)
+    while any(one[0] for one in slabs.fetch(slabs.each(told, found))):
+        bits = exchanged(slabs, slabs.each(bits_of, found), layers, numbers, AROUND + 1)
+        found = slabs.each(partial(work, rounds=rounds), *columns, bits, nothing)
+    if asked.surface == "outer":
+        whole = filled(slabs.fetch(slabs.each(partial(runs_of, shape=frame.shape[1:]), found)))
+        bits = exchanged(slabs, slabs.each(bits_of, found), layers, numbers, AROUND + 1)
+        solid = [whole.part(start, stop + 1) for start, stop in around]
+        found = slabs.each(partial(work, rounds=0), *columns, bits, solid)
+    return found, slabs.fetch(slabs.each(told, found))
 
 
 def _slices(asked: Asked, frame: Frame, start: int, stop: int) -> Any:
-    """Return the slices of the volume between those of a frame."""
+    """Return the slices of the volume around layers of a frame."""
     if asked.voxels is None:
         return None
-    low, high = start + frame.low[0], stop + 1 + frame.low[0]
-    return asked.voxels[max(low, 0) : min(high, frame.volume[0])]
+    low, high = frame.looked_at(start, stop)
+    return asked.voxels[low:high]
 
 
 @dataclass(frozen=True)
@@ -200,7 +209,7 @@ class _Numbered:
 
     @classmethod
     def of(
-        cls, layers: Cuts, found: list[Kept], rounds: Sequence[tuple[int, int, bool, Longs]], slabs: Slabs
+        cls, layers: Cuts, found: list[Kept], rounds: Sequence[tuple[bool, int, bool, Longs]], slabs: Slabs
     ) -> _Numbered:
         counts = np.concatenate([one[3] for one in rounds], axis=1)
         vertices, squares = np.concatenate([np.zeros((2, 1), np.int64), np.cumsum(counts, axis=1)], axis=1)
