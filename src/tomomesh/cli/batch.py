@@ -100,9 +100,8 @@ def refuse_for_one(chosen: Namespace) -> None:
     ------
     UsageError
     """
-    given = [name for name in ("force", "workers", "scheduler") if getattr(chosen, name) not in (None, False)]
-    if given:
-        raise UsageError("this option is for many studies", found=f"--{given[0]} without --each", hint="--each")
+    if chosen.force:
+        raise UsageError("this option is for many studies", found="--force without --each", hint="--each")
 
 
 def _checked(chosen: Namespace, settings: Settings) -> Path:

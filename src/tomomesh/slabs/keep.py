@@ -157,9 +157,15 @@ def put_away(value: Any, file: File) -> Any:
     return _changed(value, file.put)
 
 
-def mapped(value: Any) -> Any:
-    """Return a value whose arrays are all to be looked at."""
-    return _changed(value, lambda part: part.mapped() if isinstance(part, _Far) else part)
+def mapped(value: Any, *, own: bool = False) -> Any:
+    """Return a value whose arrays can all be worked on, if asked for those too that another process has sent."""
+
+    def looked_at(part: Any) -> Any:
+        if isinstance(part, _Far):
+            return part.mapped()
+        return part.copy() if own and isinstance(part, np.ndarray) and not part.flags.behaved else part
+
+    return _changed(value, looked_at)
 
 
 def bytes_of(value: Any) -> int:

@@ -29,7 +29,7 @@ from ..isosurface.thin import GIVEN_BACK
 from ..model.boxes import box_of
 from ..model.trace import Motion, Trace
 from ..progress import Progress, silent
-from .contacts import AROUND, ROUNDS, filled
+from .contacts import AROUND, ROUNDS, cavities_in, filled, whole_of
 from .cuts import Cuts
 from .frame import Frame
 from .ground import bits_of, cells_from, ground, runs_of, sample, squares_from, told
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ..isosurface.run_mask import RunMask
     from ..model.boxes import Box
     from ..settings import FitSettings
     from .keep import Kept, Slabs
@@ -105,6 +106,8 @@ class SlabSurface:
     mesh : SlabMesh
     added : int
         Voxels added so that no two touch along an edge or at a corner alone.
+    enclosed, cavities : int
+        Voxels that lie inside, and components of the others that the outside does not reach.
     stepped : bool
         Whether the levels are those of a mask.
     trace : Trace
@@ -113,6 +116,8 @@ class SlabSurface:
 
     mesh: SlabMesh
     added: int
+    enclosed: int
+    cavities: int
     stepped: bool
     trace: Trace
 
@@ -143,6 +148,7 @@ def surface_in_slabs(
     frame = asked.frame
     layers = _layers(cuts, frame)
     found, rounds = _grounded(asked, frame, layers, slabs, threads)
+    solid = _mask_of(found, frame, slabs)
     net = _Numbered.of(layers, found, rounds, slabs)
     even = net.stepped(asked.levels)
     springs = Springs.of(EVENED if even else 0.0, even, settings.stiffness)
@@ -153,7 +159,7 @@ def surface_in_slabs(
     del found, cells
     state, trace = _Rest(net, regions, squares, springs, settings, slabs, progress).reached()
     mesh = _meshed(net, regions, squares, state, asked.affine, slabs)
-    return SlabSurface(mesh, sum(one[1] for one in rounds), even, trace)
+    return SlabSurface(mesh, sum(one[1] for one in rounds), solid.count, cavities_in(solid), even, trace)
 
 
 def _layers(cuts: Cuts, frame: Frame) -> Cuts:
@@ -181,11 +187,16 @@ def _grounded(
         bits = exchanged(slabs, slabs.each(bits_of, found), layers, numbers, AROUND + 1)
         found = slabs.each(partial(work, rounds=rounds), *columns, bits, nothing)
     if asked.surface == "outer":
-        whole = filled(slabs.fetch(slabs.each(partial(runs_of, shape=frame.shape[1:]), found)))
+        whole = filled(_mask_of(found, frame, slabs))
         bits = exchanged(slabs, slabs.each(bits_of, found), layers, numbers, AROUND + 1)
         solid = [whole.part(start, stop + 1) for start, stop in around]
         found = slabs.each(partial(work, rounds=0), *columns, bits, solid)
     return found, slabs.fetch(slabs.each(told, found))
+
+
+def _mask_of(found: list[Kept], frame: Frame, slabs: Slabs) -> RunMask:
+    """Return the whole mask as it is now, in the frame."""
+    return whole_of(slabs.fetch(slabs.each(partial(runs_of, shape=frame.shape[1:]), found)))
 
 
 def _slices(asked: Asked, frame: Frame, start: int, stop: int) -> Any:
