@@ -20,7 +20,7 @@ from .studies.folder import Study, files_of, find_studies
 from .studies.label_names import label_names
 from .studies.label_tables import read_label_names
 from .studies.listing import list_series
-from .studies.read import VOLUME_READERS, read_volume
+from .studies.read import VOLUME_READERS, open_study, read_volume
 from .studies.size import voxel_bytes
 from .volumes.images import read_picture
 from .volumes.labels import LABEL_WRITERS, write_labels
@@ -51,6 +51,7 @@ __all__ = [
     "keeps",
     "label_names",
     "list_series",
+    "open_study",
     "read_label_names",
     "read_mesh",
     "read_picture",

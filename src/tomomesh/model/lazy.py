@@ -92,8 +92,8 @@ class LazyVoxels(NDArrayOperatorsMixin):
     Examples
     --------
     >>> import numpy as np
-    >>> from tomomesh.model.lazy import Held, LazyVoxels
-    >>> stored = LazyVoxels.of(Held(np.arange(24).reshape(4, 3, 2)))
+    >>> from tomomesh.model.lazy import ArraySource, LazyVoxels
+    >>> stored = LazyVoxels.of(ArraySource(np.arange(24).reshape(4, 3, 2)))
     >>> part = stored.transpose((2, 0, 1))[:, ::-1]
     >>> part.shape, part[1].tolist()
     ((2, 4, 3), [[19, 21, 23], [13, 15, 17], [7, 9, 11], [1, 3, 5]])
@@ -182,7 +182,7 @@ Voxels = TypeVar("Voxels", "NDArray[Any]", LazyVoxels)
 
 
 @dataclass(frozen=True)
-class Held:
+class ArraySource:
     """An array in memory, or whatever takes slices as one does, as what is stored.
 
     Attributes
