@@ -123,6 +123,11 @@ class LazyVoxels(NDArrayOperatorsMixin):
         """Of the numbers."""
         return self.source.dtype
 
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Sizes along the axes of what is read together."""
+        return tuple(self.source.chunks[axis] for axis in self.order)
+
     def __len__(self) -> int:
         return self.shape[0]
 
@@ -227,7 +232,7 @@ def slabs(voxels: NDArray[Any] | LazyVoxels) -> Iterator[NDArray[Any]]:
         yield voxels
         return
     depth = max(SLAB_BYTES // max(math.prod(voxels.shape[1:]) * voxels.dtype.itemsize, 1), 1)
-    depth -= depth % min(voxels.source.chunks[voxels.order[0]], depth)
+    depth -= depth % min(voxels.chunks[0], depth)
     for start in range(0, len(voxels), depth):
         yield voxels[start : start + depth].read()
 
