@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 KEPT = 0.25
 """Share of the limit, over what is taken at first, for large arrays that stay in the memory. Chosen: half of it takes
 2 % more time, twice leaves little for the pages of the others."""
-FULL = 0.85
+FULL = 0.8
 """Share of the limit from which pages are let go of: the rest is for what comes before that is seen."""
-LOOK_S = 0.01
-"""How often that is looked at, seconds: in as many a processor fills some 20 MB."""
+LOOK_S = 0.005
+"""How often that is looked at, seconds: a processor fills some 20 MB meanwhile, and more where the machine is busy."""
 LEAST = 400 << 20
 """Smallest limit: Python, NumPy, SciPy and Numba take half of it."""
 UNITS = {"": 1, **{f"{k}{b}": (1024 if b else 1000) ** n for n, k in enumerate("KMGT", 1) for b in ("", "I")}}
