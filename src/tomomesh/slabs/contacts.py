@@ -69,7 +69,7 @@ def packed(mask: Marks, first: int) -> Part:
 
 def drawn_from(parts: Sequence[Part], first: int, last: int, shape: tuple[int, ...]) -> Marks:
     """Draw slices of which there are bits; those of which there are none are empty."""
-    (bits,) = gathered(parts, first, last)
+    (bits,) = gathered(parts, (first, last))
     size = shape[0] * shape[1]
     return np.unpackbits(bits, axis=1, count=size).view(np.bool_).reshape(len(bits), *shape)
 
