@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
 
 BEGINNING = 4
-"""Steps before it is told how fast a net comes to rest. Chosen: levels take 6, masks 10 to 14, and both exchange then."""
+"""Steps before it is told how fast a net comes to rest. Chosen: levels take 6 and masks 10 to 14."""
 
 
 @dataclass(frozen=True)
