@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..isosurface.run_mask import RunMask
 from ..kernels.measure.edges import join_pairs
 from .signal import SOLID
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     Ints = NDArray[np.int64]
     Floats = NDArray[np.float64]
@@ -163,17 +164,17 @@ class _Runs:
         return roots.astype(np.int64)
 
 
-def outlines_of(mask: NDArray[np.bool_], pixel_mm: tuple[float, float] = (1.0, 1.0)) -> Outlines:
+def outlines_of(mask: NDArray[np.bool_] | RunMask, pixel_mm: tuple[float, float] = (1.0, 1.0)) -> Outlines:
     """Tell what each slice of a window is.
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : (K, J, I) bool array or RunMask
     pixel_mm : (float, float)
         Distance of the columns and of the rows.
     """
-    inside, outside = _runs(boxed := _boxed(mask))
-    count, rows = len(boxed), boxed.shape[1] + 2 * FRAME
+    inside, outside = _runs(boxed := _boxed(mask if isinstance(mask, RunMask) else RunMask.of([mask])))
+    count, rows = boxed.shape[0], boxed.shape[1] + 2 * FRAME
     beside, above = inside.meeting(1, 1), inside.meeting(rows)
     pieces, gaps = inside.joined(beside), outside.joined(outside.meeting(1))
     held = gaps != gaps[0]  # the outside of all slices is one, through their frames
@@ -187,35 +188,23 @@ def outlines_of(mask: NDArray[np.bool_], pixel_mm: tuple[float, float] = (1.0, 1
     )  # fmt: skip
 
 
-def _boxed(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _boxed(mask: RunMask) -> RunMask:
     """Leave out the rows and columns that hold nothing of a window; all slices stay."""
-    return mask[:, _reach(mask.any(axis=(0, 2))), _reach(mask.any(axis=(0, 1)))]
+    _, j, i = mask.box
+    return mask.cropped((slice(0, mask.shape[0]), j, i)) if mask.count else mask
 
 
-def _reach(held: ArrayLike) -> slice:
-    """Return the stretch from the first to the last that is true."""
-    places = np.flatnonzero(held)
-    return slice(int(places[0]), int(places[-1]) + 1) if len(places) else slice(0, 1)
-
-
-def _runs(mask: NDArray[np.bool_]) -> tuple[_Runs, _Runs]:
+def _runs(mask: RunMask) -> tuple[_Runs, _Runs]:
     """Part the rows of slices in a frame into what lies in the window and what lies outside, before and after each."""
-    count, (rows, columns) = len(mask), np.array(mask.shape[1:]) + 2 * FRAME
-    ends = np.concatenate([_changes(one) + k * rows * columns for k, one in enumerate(mask)])  # no copy of the window
-    row = ends[::2] // columns
-    start, stop = ends[::2] - row * columns, ends[1::2] - row * columns
+    count, rows, columns = mask.shape[0], mask.shape[1] + 2 * FRAME, mask.shape[2] + 2 * FRAME
+    k, j = np.divmod(mask.rows, mask.shape[1])
+    row, start, stop = k * rows + j + FRAME, mask.starts + np.int64(FRAME), mask.stops + np.int64(FRAME)
     gap = np.arange(len(row)) + row  # the stretch outside before each inside: every row has one more than insides
     around = np.repeat(np.arange(count * rows), np.bincount(row, minlength=count * rows) + 1)
     after, before = np.zeros_like(around), np.full_like(around, columns)
     after[gap + 1], before[gap] = stop, start
     width = columns + 2 * FRAME
     return _Runs(row, start, stop, row // rows, width), _Runs(around, after, before, around // rows, width)
-
-
-def _changes(pixels: NDArray[np.bool_]) -> Ints:
-    """Return where, row after row of a slice in its frame, the window begins or ends."""
-    flat = np.pad(pixels, FRAME).ravel()
-    return np.flatnonzero(flat[1:] != flat[:-1]) + 1
 
 
 def _sum(where: Ints, values: NDArray[Any], count: int = 0) -> Floats:
