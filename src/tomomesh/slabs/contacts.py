@@ -8,7 +8,7 @@ import numpy as np
 
 from ..isosurface.run_mask import RunMask
 from ..isosurface.runs import Runs
-from ..isosurface.well_composed import JOINING, cells_where, joining
+from ..isosurface.well_composed import joining
 from .parts import Part, gathered
 
 if TYPE_CHECKING:
@@ -31,13 +31,15 @@ ROUNDS = AROUND - SURE
 """Rounds after which they are: what is added in a round depends on layers within as many as there have been rounds."""
 
 
-def joined_in(mask: Marks, levels: Levels, low: Ints, own: Span, rounds: float, threads: int = 1) -> tuple[Marks, bool]:
+def joined_in(mask: Marks, cells: Ints, levels: Levels, low: Ints, own: Span, rounds: float) -> tuple[Marks, bool]:
     """Join voxels round after round.
 
     Parameters
     ----------
     mask : (k, J, I) bool array
         What a slab and its halo have.
+    cells : (n, 3) int32 array
+        Those of it whose voxels touch so.
     levels : Levels
     low : (3,) int32 array
         The voxel (x, y, z) of the volume that is its first.
@@ -49,10 +51,10 @@ def joined_in(mask: Marks, levels: Levels, low: Ints, own: Span, rounds: float, 
     Returns
     -------
     joined : (k, J, I) bool array
+        The mask itself where nothing is to be joined.
     unfinished : bool
         Whether one more round would add voxels of the slab's own.
     """
-    cells, _ = cells_where(mask, JOINING > 0, threads)
     joined = mask.copy() if len(cells) else mask
     for count, voxels in enumerate(joining(joined, cells, lambda voxels: levels.excess(voxels + low)), 1):
         if count > rounds:
@@ -69,7 +71,7 @@ def packed(mask: Marks, first: int) -> Part:
 
 def drawn_from(parts: Sequence[Part], first: int, last: int, shape: tuple[int, ...]) -> Marks:
     """Draw slices of which there are bits; those of which there are none are empty."""
-    (bits,) = gathered(parts, first, last)
+    (bits,) = gathered(parts, (first, last))
     size = shape[0] * shape[1]
     return np.unpackbits(bits, axis=1, count=size).view(np.bool_).reshape(len(bits), *shape)
 

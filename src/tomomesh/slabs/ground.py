@@ -11,7 +11,7 @@ from ..isosurface.crossings import BARELY, IN_LINE, Levels
 from ..isosurface.run_mask import RunMask
 from ..isosurface.surface_nets import OWNED, borders_of, steps_of
 from ..isosurface.thin import thin_squares
-from ..isosurface.well_composed import surface_cells
+from ..isosurface.well_composed import JOINING, surface_cells
 from .contacts import drawn_from, joined_in, packed
 from .parts import Part
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..isosurface.means import Span
+    from ..isosurface.well_composed import Cells
     from .frame import Frame
 
     Ints = NDArray[np.int32]
@@ -90,21 +91,37 @@ def ground(
     stretch, low = frame.stretch(held, voxels, halo), frame.lowest + np.array([0, 0, halo[0]], np.int32)
     known, inside = replace(levels, voxels=stretch), (own[0] - halo[0], own[1] - halo[0])
     begun = drawn_from(bits, halo[0], halo[1] + 1, tuple(rows)) if bits else held
-    joined, unfinished = joined_in(begun, known, low, inside, rounds, threads)
+    scanned = surface_cells(begun, threads)
+    joined, unfinished = joined_in(begun, scanned[0][JOINING[scanned[1]] > 0], known, low, inside, rounds)
     slices = slice(*inside)
     found = Ground(packed(joined[slices], own[0]), unfinished)
     if unfinished:
         return found
     added = int(np.count_nonzero(joined[slices])) - int(np.count_nonzero(held[slices]))
-    whole = joined if solid is None else solid[:]
-    cells, cases = surface_cells(whole[inside[0] : inside[1] + 1], threads)
-    cells += np.array([0, 0, own[0]], np.int32)
+    cells, cases = (
+        _own(scanned, inside)
+        if solid is None and joined is begun
+        else _scanned(joined if solid is None else solid[:], inside, threads)
+    )
+    cells = cells + np.array([0, 0, halo[0]], np.int32)
     inner, directions = borders_of(cells + frame.lowest, cases, threads)
     steps, stored = steps_of(directions), np.promote_types(stretch.stored.dtype, np.float16)  # the latter holds NaN
     x, y, z = (inner - low).T
     squares = thin_squares(joined, inner - low, steps, threads), ~held[z, y, x], _lines(known, inner, steps, stored)
     layers = _counted(cells, cases, own)
     return replace(found, added=added, cells=Part(0, (cells, cases)), squares=Part(0, squares), layers=layers)
+
+
+def _own(found: Cells, layers: Span) -> Cells:
+    """Return the cells of some layers."""
+    rows = slice(*np.searchsorted(found[0][:, 2], layers))
+    return found[0][rows], found[1][rows].copy()
+
+
+def _scanned(mask: Marks, layers: Span, threads: int) -> Cells:
+    """Find the cells of some layers of a mask."""
+    cells, cases = surface_cells(mask[layers[0] : layers[1] + 1], threads)
+    return cells + np.array([0, 0, layers[0]], np.int32), cases
 
 
 def _lines(levels: Levels, inner: Ints, steps: Ints, stored: np.dtype[Any]) -> NDArray[Any]:

@@ -47,18 +47,28 @@ def strip(first: int, last: int, part: Part) -> Part:
     return Part(first, tuple(array[rows] for array in part.arrays))
 
 
-def gathered(parts: Sequence[Part], first: int, last: int) -> Arrays:
+def gathered(parts: Sequence[Part], span: tuple[int, int], which: slice = slice(None)) -> Arrays:
     """Put rows side by side, by their numbers in the whole; those that no part has are 0.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        Alike.
+    span : (int, int)
+        The first of these numbers, and the one behind the last.
+    which : slice
+        Of the arrays of each part.
 
     Returns
     -------
     tuple of arrays
         Its own: they may be overwritten.
     """
-    found = tuple(np.zeros((last - first, *one.shape[1:]), one.dtype) for one in parts[0].arrays)
+    first, last = span
+    found = tuple(np.zeros((last - first, *one.shape[1:]), one.dtype) for one in parts[0].arrays[which])
     for part in parts:
         start, stop = max(first, part.first), min(last, part.first + len(part))
-        for whole, rows in zip(found, part.arrays, strict=True):
+        for whole, rows in zip(found, part.arrays[which], strict=True):
             if start < stop:
                 whole[start - first : stop - first] = rows[start - part.first : stop - part.first]
     return found

@@ -36,7 +36,7 @@ from .ground import bits_of, cells_from, ground, runs_of, sample, squares_from, 
 from .mesh import SlabMesh
 from .parts import exchanged, told_by
 from .place import HALO, Place
-from .region import begun, goals_of, put, region, returned, rings_of, start_of, stepped
+from .region import LAST, begun, goals_of, put, region, returned, rings_of, stepped
 from .triangles import chosen, piece
 
 if TYPE_CHECKING:
@@ -50,6 +50,10 @@ if TYPE_CHECKING:
     from .keep import Kept, Slabs
 
     Longs = NDArray[np.int64]
+
+
+BEGINNING = 4
+"""Steps before it is told how fast a net comes to rest. Chosen: levels take 6 and masks 10 to 14."""
 
 
 @dataclass(frozen=True)
@@ -157,8 +161,8 @@ def surface_in_slabs(
     cells = net.exchanged(slabs.each(cells_from, net.first[0], found))
     regions = slabs.each(partial(region, frame=frame, threads=threads), net.places, cells)
     del found, cells
-    state, trace = _Rest(net, regions, squares, springs, settings, slabs, progress).reached()
-    mesh = _meshed(net, regions, squares, state, asked.affine, slabs)
+    state, rest, trace = _Rest(net, regions, squares, springs, settings, slabs, progress).reached()
+    mesh = _meshed(net, regions, squares, state, rest, asked.affine, slabs)
     return SlabSurface(mesh, sum(one[1] for one in rounds), solid.count, cavities_in(solid), even, trace)
 
 
@@ -265,39 +269,53 @@ class _Rest:
     slabs: Slabs
     progress: Progress
 
-    def reached(self) -> tuple[list[Kept], Trace]:
-        """Return a part a slab with where its vertices come to rest, and how."""
+    def reached(self) -> tuple[list[Kept], slice, Trace]:
+        """Return a part a slab, which of its arrays says where the vertices come to rest, and how they did."""
         goals, state = self._begun()
-        rings = self.slabs.each(rings_of, self.regions)
+        rings, where = self.slabs.each(rings_of, self.regions), LAST
         history, rested, most = list[Motion](), False, self.settings.max_steps
         while len(history) < most and not rested:
-            steps = min(HALO // self.springs.reach, most - len(history))
-            begin = self.net.exchanged(state)
-            state, motions = self._stepped(rings, goals, begin, steps)
+            begin, steps = self.net.exchanged(state), min(self._likely(history), most - len(history))
+            state, motions = self._stepped(rings, goals, begin, steps, not history)
             done = next((n for n, one in enumerate(motions, 1) if one.rests(self.settings.tolerance)), 0)
-            if 0 < done < steps:  # the others are not to be taken
-                state, motions = self._stepped(rings, goals, begin, done)
-            history, rested = [*history, *motions], done > 0
+            if 0 < done < steps - 1:  # the others are not to be taken
+                state, motions = self._stepped(rings, goals, begin, done, not history)
+            where = slice(1) if 0 < done == len(motions) - 1 else LAST
+            history, rested = [*history, *motions[: done or None]], done > 0
             self.progress("fit", len(history), most)
         self.progress("fit", max(len(history), 1), max(len(history), 1))
-        return state, Trace.of(history, converged=rested)
+        return state, where, Trace.of(history, converged=rested)
+
+    def _likely(self, history: Sequence[Motion]) -> int:
+        """Return how many steps to take until the next exchange: as many as can be, or as the net is likely to need.
+
+        Moves fall in about equal shares, and steps that go beyond rest have to be taken once more.
+        """
+        if len(history) < 2:
+            return BEGINNING
+        late, last = (max(one.speed, one.acceleration) for one in (history[-min(len(history), 4)], history[-1]))
+        share = (last / late) ** (1 / (min(len(history), 4) - 1)) if 0 < last < late else 1.0
+        left = np.log(self.settings.tolerance / last) / np.log(share) if 0 < share < 1 else np.inf
+        return int(min(max(left, 0.0) + 1, HALO // self.springs.reach))
 
     def _begun(self) -> tuple[list[Kept], list[Kept]]:
         """Return what the vertices are drawn to, those of halos too, and where they begin."""
         springs = self.springs if self.settings.max_steps else Springs.of(0.0, False, 1.0)
         places, give = self.net.places, GIVEN_BACK if springs.evens and self.net.thin else 0
-        parts = self.slabs.each(partial(begun, springs=springs), places, self.regions, self.squares)
+        goals = start = self.slabs.each(partial(begun, springs=springs), places, self.regions, self.squares)
+        near = self.net.exchanged(goals)
         for _ in range(give):
             work = partial(returned, springs=springs)
-            drawn = self.slabs.each(work, places, self.regions, self.squares, self.net.exchanged(parts))
-            parts = self.slabs.each(partial(put, springs=springs), places, self.regions, self.net.exchanged(drawn))
-        return self.slabs.each(goals_of, places, self.net.exchanged(parts)), self.slabs.each(start_of, parts)
+            goals = self.slabs.each(work, places, self.regions, self.squares, goals, self.net.exchanged(start))
+            near = self.net.exchanged(goals)
+            start = self.slabs.each(partial(put, springs=springs), places, self.regions, near)
+        return self.slabs.each(goals_of, places, near), start
 
     def _stepped(
-        self, rings: list[Kept], goals: list[Kept], begin: list[tuple[Kept, ...]], steps: int
+        self, rings: list[Kept], goals: list[Kept], begin: list[tuple[Kept, ...]], steps: int, begins: bool
     ) -> tuple[list[Kept], list[Motion]]:
         """Take steps, and tell how the whole moves in each."""
-        work = partial(stepped, springs=self.springs, steps=steps)
+        work = partial(stepped, springs=self.springs, steps=steps, begins=begins)
         state = self.slabs.each(work, self.net.places, rings, goals, begin)
         longest = np.max(told_by(self.slabs, state), axis=0)
         return state, [Motion(speed, change, 0.0) for speed, change in longest.tolist()]
@@ -308,12 +326,14 @@ def _meshed(
     regions: list[Kept],
     squares: list[tuple[Kept, ...]],
     state: list[Kept],
+    rest: slice,
     affine: NDArray[np.float64],
     slabs: Slabs,
 ) -> SlabMesh:
     """Split the squares into triangles, and give the centers their numbers."""
-    choice = slabs.each(partial(chosen, affine=affine), net.places, regions, squares, net.exchanged(state))
+    work = partial(chosen, rest=rest, affine=affine)
+    choice = slabs.each(work, net.places, regions, squares, net.exchanged(state))
     fours = np.array(told_by(slabs, choice), np.int64)
     first = (int(net.vertices[-1]) + np.cumsum(fours) - fours).tolist()
-    work = partial(piece, affine=affine)
-    return SlabMesh.of(slabs.each(work, net.places, regions, squares, state, choice, first), slabs)
+    last = partial(piece, rest=rest, affine=affine)
+    return SlabMesh.of(slabs.each(last, net.places, regions, squares, state, choice, first), slabs)

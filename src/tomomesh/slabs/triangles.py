@@ -20,11 +20,22 @@ if TYPE_CHECKING:
 
 
 def chosen(
-    place: Place, found: Region, squares: Sequence[Part], parts: Sequence[Part], *, affine: NDArray[np.float64]
-) -> Part:
-    """Choose the diagonals of a slab's own squares (q,); tells how many are split into four."""
-    net, threads, (_, *shares) = found.net, found.rings.threads, gathered(squares, *place.of_squares)
-    position = gathered(parts, *place.of_vertices)[0]
+    place: Place, found: Region, squares: Sequence[Part], parts: Sequence[Part], *, rest: slice,
+    affine: NDArray[np.float64],
+) -> Part:  # fmt: skip
+    """Choose the diagonals of a slab's own squares (q,); tells how many are split into four.
+
+    Parameters
+    ----------
+    place, found, squares
+        As in `tomomesh.slabs.region.begun`.
+    parts : sequence of Part
+    rest : slice
+        The array of each part that says where vertices are.
+    affine : (4, 4) float array
+    """
+    net, threads, (_, *shares) = found.net, found.rings.threads, gathered(squares, place.of_squares)
+    (position,) = gathered(parts, place.of_vertices, rest)
     after, rows = placed(position, affine, threads), place.squares_around
     choice = diagonals(net, position, crossings_of(net, shares), after, rows, threads)
     start, stop = place.own_squares()
@@ -33,14 +44,14 @@ def chosen(
 
 
 def piece(
-    place: Place, found: Region, squares: Sequence[Part], part: Part, choice: Part, first: int, *,
+    place: Place, found: Region, squares: Sequence[Part], part: Part, choice: Part, first: int, *, rest: slice,
     affine: NDArray[np.float64],
 ) -> Piece:  # fmt: skip
-    """Return a slab's piece of the mesh, whose first center has a number in the whole."""
-    net, threads, (_, *shares) = found.net, found.rings.threads, gathered(squares, *place.of_squares)
-    rows, own = slice(*place.own_squares()), choice.arrays[0]
-    shift = place.of_vertices[0]
-    halves, quarters = split(net.quads[rows], own, right_handed(affine), first - shift, threads)
-    centers = crossings_of(net, shares)[rows][fours_of(own)]
+    """Return a slab's piece of the mesh, whose first center has a number in the whole; see `chosen`."""
+    net, threads, (_, *shares) = found.net, found.rings.threads, gathered(squares, place.of_squares)
+    (start, stop), own, shift = place.own_squares(), choice.arrays[0], place.of_vertices[0]
+    halves, quarters = split(net.quads[start:stop], own, right_handed(affine), first - shift, threads)
+    centers = crossings_of(net, shares, start + fours_of(own))
     halves += shift
-    return Piece(placed(part.arrays[0], affine, threads), placed(centers, affine, threads), halves, quarters + shift)
+    (position,) = part.arrays[rest]
+    return Piece(placed(position, affine, threads), placed(centers, affine, threads), halves, quarters + shift)
