@@ -14,7 +14,8 @@ from .files.atomic import check_output, replacing
 from .frames import LENGTHS, RAS_ALONE, Frame, frame_in_file, frame_of_study, in_lps
 from .meshes.encapsulated import ARCHIVED, check_archived, is_archived, write_encapsulated
 from .meshes.frame import frame_of_file
-from .meshes.pieces import write_pieces
+from .meshes.pieces.files import write_pieces
+from .meshes.pieces.neuroglancer import write_neuroglancer
 from .meshes.read import MESH_READERS, read_mesh
 from .meshes.write import MESH_WRITERS, PART_WRITERS, keeps, write_mesh
 from .studies.folder import Study, files_of, find_studies
@@ -66,6 +67,7 @@ __all__ = [
     "write_encapsulated",
     "write_labels",
     "write_mesh",
+    "write_neuroglancer",
     "write_pieces",
     "write_points",
     "write_settings",

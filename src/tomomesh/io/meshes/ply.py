@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from ..fields import Fields
     from .attributes import MeshAttributes
-    from .parts import Parts
+    from .pieces.parts import Parts
 
 TYPE_NAMES = {
     "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
