@@ -244,7 +244,7 @@ def solid(body: RunMask, volume: Volume, cut: Cut) -> RunMask:
 
 def is_dense(mask: RunMask, cut: Cut) -> bool:
     """Tell whether over half of a window of a CT is as dense as a body; one of lungs or airways is not."""
-    return 2 * sum(cut.each(_dense, cut.over(mask))) > mask.count
+    return bool(2 * cut.sum(_dense, cut.over(mask)) > mask.count)
 
 
 def _dense(levels: NDArray[Any], box: Box, mask: RunMask) -> int:
@@ -253,7 +253,7 @@ def _dense(levels: NDArray[Any], box: Box, mask: RunMask) -> int:
 
 def skin_of(cut: Cut) -> RunMask:
     """Return what of a CT is denser than air."""
-    return RunMask.joined(cut.each(_denser))
+    return cut.runs(_denser)
 
 
 def _denser(levels: NDArray[Any], box: Box) -> RunMask:

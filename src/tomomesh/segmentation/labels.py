@@ -78,7 +78,7 @@ def _off(levels: NDArray[Any], box: Box) -> tuple[Any, Any, int]:
 
 
 def _rounded(levels: NDArray[Any], box: Box) -> NDArray[Any]:
-    return np.rint(levels)
+    return np.asarray(np.rint(levels))
 
 
 def _no_labels(found: str) -> UsageError:
@@ -142,8 +142,7 @@ class Labelled:
         boxes = self.boxes[np.isin(self.numbers, wanted)]
         low, high = boxes[:, 0].min(axis=0).tolist(), boxes[:, 1].max(axis=0).tolist()
         box = slice(low[0], high[0]), slice(low[1], high[1]), slice(low[2], high[2])
-        found = self.cut.within(box).each(partial(_chosen, wanted=tuple(wanted)))
-        return RunMask.joined(found).placed(box, self.volume.shape)
+        return self.cut.within(box).runs(partial(_chosen, wanted=tuple(wanted))).placed(box, self.volume.shape)
 
 
 def _chosen(labels: NDArray[Any], box: Box, *, wanted: tuple[int, ...]) -> RunMask:
@@ -214,13 +213,13 @@ def labels_counted(cut: Cut, every: int = 1) -> dict[str, int]:
     """Count the labels of a study in slabs, on every n-th of its slices: see `labels_in`."""
     if cut.voxels.ndim != 3:
         return {}
-    found = cut.each(partial(_neighbors, every=every))
+    found = list(cut.each(partial(_neighbors, every=every)))
     if None in found:
         return {}
     pairs, equal = np.sum(found, axis=0)
     if equal < EVEN * pairs:
         return {}
-    counts = sum(cut.each(partial(_number, every=every)), np.zeros(HIGHEST_LABEL, np.int64))
+    counts = cut.sum(partial(_number, every=every))
     return {str(label): int(counts[label]) for label in np.flatnonzero(counts) if label > 0}
 
 

@@ -103,7 +103,7 @@ def padding_in(cut: Cut, named: tuple[float, float] | None, *, guessed: bool) ->
     found = guessed_padding(cut) if guessed else None
     if named is None:
         return found
-    held = sum(cut.each(partial(_counted, Padding(named))))
+    held = cut.sum(partial(_counted, Padding(named)))
     return replace(found or Padding(), named=named) if 0 < held < np.prod(cut.voxels.shape) else found
 
 
@@ -162,14 +162,14 @@ def _lines(level: float, cut: Cut) -> tuple[int, Mask]:
 
 def _full(levels: NDArray[Any], box: Box, *, level: float) -> list[Mask]:
     held = np.asarray(levels == level)
-    return [held.all(axis=axis, keepdims=True) for axis in range(3)]
+    return [np.asarray(held.all(axis=axis, keepdims=True)) for axis in range(3)]
 
 
 def _drawn(level: float, size: int, cut: Cut) -> bool:
     """Tell whether the levels beside one, so many, have no noise; few of them are looked at, in even steps."""
     every = max(1, size // LOOKED_AT)
     before = accumulate(cut.each(partial(_others, level=level)), initial=0)
-    some = np.concatenate(cut.each(partial(_some, level=level, every=every), list(before)[:-1]))
+    some = np.concatenate(list(cut.each(partial(_some, level=level, every=every), list(before)[:-1])))
     return bool(np.unique(some, return_counts=True)[1].max() > CONSTANT * len(some))
 
 
@@ -193,8 +193,8 @@ def as_background(cut: Cut, padding: Padding) -> tuple[Cut, int, int]:
     """
     lows, highs = zip(*cut.each(partial(_lowest, padding)), strict=True)
     lowest = np.minimum.reduce([low for low in lows if low is not None] + [np.maximum.reduce(highs)])
-    counts = np.sum(cut.each(partial(_changed, padding, lowest)), axis=0)
-    return cut.made(partial(_replaced, padding, lowest), cut.voxels.dtype), int(counts[0]), int(counts[1])
+    changed, named = map(int, cut.sum(partial(_changed, padding, lowest)))
+    return cut.made(partial(_replaced, padding, lowest), cut.voxels.dtype), changed, named
 
 
 def _lowest(padding: Padding, levels: NDArray[Any], box: Box) -> tuple[Any, Any]:
@@ -202,10 +202,10 @@ def _lowest(padding: Padding, levels: NDArray[Any], box: Box) -> tuple[Any, Any]
     return others.min() if others.size else None, levels.max()
 
 
-def _changed(padding: Padding, lowest: Any, levels: NDArray[Any], box: Box) -> tuple[int, int]:
+def _changed(padding: Padding, lowest: Any, levels: NDArray[Any], box: Box) -> NDArray[np.int64]:
     changed = padding.within(levels, box) & (levels != lowest)
     named = np.asarray(False) if padding.named is None else Padding(padding.named).within(levels, box)
-    return int(np.count_nonzero(changed)), int(np.count_nonzero(changed & named))
+    return np.array([np.count_nonzero(changed), np.count_nonzero(changed & named)])
 
 
 def _replaced(padding: Padding, lowest: Any, levels: NDArray[Any], box: Box) -> NDArray[Any]:

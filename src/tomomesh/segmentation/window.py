@@ -85,7 +85,7 @@ def window(volume: Volume, *, lower: Limit = -np.inf, upper: Limit = np.inf, lay
 def window_in(cut: Cut, *, lower: Limit = -np.inf, upper: Limit = np.inf, layers: str = "all") -> RunMask:
     """Return the window of a study in slabs; parameters and errors are those of `window`."""
     _check_limits(cut.voxels, lower, upper)
-    found = RunMask.joined(cut.each(partial(_kept_in, lower=lower, upper=upper, layers=layers)))
+    found = cut.runs(partial(_kept_in, lower=lower, upper=upper, layers=layers))
     if not found.count:
         hint = "--layers any, or " if cut.voxels.ndim == 4 and layers == "all" else ""
         low, high = cut.ends
@@ -214,7 +214,7 @@ def otsu_in(cut: Cut, padded: Padding | None = None) -> Limit:
 
 def _beside(cut: Cut, padded: Padding) -> Levels:
     """Look at the levels that are no padding."""
-    return gathered(lambda work: cut.each(partial(_unpadded, work, padded)))
+    return gathered(lambda work: cut.sum(partial(_unpadded, work, padded)), cut.voxels.dtype)
 
 
 def _unpadded(work: Looked, padded: Padding, levels: NDArray[Any], box: Box) -> Any:

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...isosurface.run_mask import RunMask
 from ...model.lazy import LazyVoxels, in_memory
 from .sources import Made
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from ...isosurface.run_mask import RunMask
     from ...model.boxes import Box
     from ...slabs.keep import Slabs
     from .sources import Making, Voxels
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 TOGETHER = 2**21
 """Voxels of a slab where the study is in memory: what is made of each stays in the cache of a core, and bounds what is
 made besides. No result depends on it."""
+
+
+AT_ONCE = 32
+"""Slabs of which what was found is brought here at once: 16 MiB of counts of levels. No result depends on it."""
 
 
 def thin_cuts(shape: tuple[int, ...]) -> list[int]:
@@ -71,7 +75,7 @@ class Cut:
         As of `Cutting`.
     """
 
-    voxels: Voxels
+    voxels: Any
     cuts: tuple[int, ...]
     slabs: Slabs | None = None
 
@@ -91,8 +95,8 @@ class Cut:
         inner = [place - start for place in self.cuts if start < place < stop]
         return replace(self, voxels=self.voxels[box], cuts=(0, *inner, stop - start))
 
-    def each(self, work: Callable[..., Any], *columns: Iterable[Any]) -> list[Any]:
-        """Return what is found in each slab.
+    def each(self, work: Callable[..., Any], *columns: Iterable[Any]) -> Iterator[Any]:
+        """Hand over what is found in each slab, one after the other.
 
         Parameters
         ----------
@@ -105,8 +109,19 @@ class Cut:
         boxes = self.boxes
         parts = [self.voxels[box[0]] for box in boxes]
         if self.slabs is None:
-            return [work(in_memory(part), *rest) for part, *rest in zip(parts, boxes, *columns, strict=True)]
-        return list(self.slabs.fetch(self.slabs.each(partial(_read_first, work), parts, boxes, *map(list, columns))))
+            yield from (work(in_memory(part), *rest) for part, *rest in zip(parts, boxes, *columns, strict=True))
+            return
+        kept = self.slabs.each(partial(_read_first, work), parts, boxes, *map(list, columns))
+        for first in range(0, len(kept), AT_ONCE):
+            yield from self.slabs.fetch(kept[first : first + AT_ONCE])
+
+    def sum(self, work: Callable[..., Any], *columns: Iterable[Any]) -> Any:
+        """Add up what is found in all slabs: numbers or arrays; parameters are those of `each`."""
+        return reduce(np.add, self.each(work, *columns))
+
+    def runs(self, work: Callable[..., RunMask], *columns: Iterable[Any]) -> RunMask:
+        """Put the masks that are found in all slabs over one another; parameters are those of `each`."""
+        return RunMask.joined(list(self.each(work, *columns)))
 
     def over(self, mask: RunMask) -> list[RunMask]:
         """Return what lies of a mask in each slab: a column."""
@@ -131,7 +146,7 @@ class Cut:
 
     def sampled(self, every: Sequence[int]) -> NDArray[Any]:
         """Return every n-th voxel along each axis (K, J, I), brought here."""
-        return np.concatenate(self.each(partial(_every, every=tuple(every))))
+        return np.concatenate(list(self.each(partial(_every, every=tuple(every)))))
 
     @cached_property
     def ends(self) -> tuple[Any, Any]:
