@@ -194,7 +194,7 @@ def as_background(cut: Cut, padding: Padding) -> tuple[Cut, int, int]:
     lows, highs = zip(*cut.each(partial(_lowest, padding)), strict=True)
     lowest = np.minimum.reduce([low for low in lows if low is not None] + [np.maximum.reduce(highs)])
     changed, named = map(int, cut.sum(partial(_changed, padding, lowest)))
-    return cut.made(partial(_replaced, padding, lowest), cut.voxels.dtype), changed, named
+    return cut.made(partial(_replaced, padding, lowest), lowest.dtype), changed, named
 
 
 def _lowest(padding: Padding, levels: NDArray[Any], box: Box) -> tuple[Any, Any]:

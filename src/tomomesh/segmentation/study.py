@@ -163,7 +163,7 @@ def _fitting(labels: Volume, volume: Volume, cutting: Cutting) -> Volume:
     """Lay a label map onto the study's grid."""
     labels = whole(labels, cutting)
     try:
-        return onto_grid(labels, volume)
+        return onto_grid(labels, volume, cutting)
     except GeometryError as fault:
         if option := volume.other_frame or labels.other_frame:
             whose = "study" if volume.other_frame else "label map"
