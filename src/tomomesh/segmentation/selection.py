@@ -24,7 +24,7 @@ from .body import (
 from .contours.labelled import filled_slices, gaps_in
 from .padding import as_background, padding_in
 from .slabwise.cut import HERE
-from .slabwise.sources import Drawn
+from .slabwise.sources import MaskVoxels
 from .window import otsu_in, window_in, window_limits
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ def _of_labels(stack: Volume, labels: Labelled, asked: WindowSettings) -> Chosen
         return _interpolated(stack, runs, labels.volume)
     gaps = gaps_in(runs)
     told = f"{gaps.told}: --fill-slices interpolates them" if gaps else ""
-    voxels: Any = LazyVoxels.of(Drawn(runs)) if labels.volume.in_parts else runs.dense.view(np.uint8)
+    voxels: Any = LazyVoxels.of(MaskVoxels(runs)) if labels.volume.in_parts else runs.dense.view(np.uint8)
     return Chosen(replace(stack, voxels=voxels), runs, 0.5, np.inf, told=told)
 
 

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ...model.boxes import Box
-    from .cut import Cut
-
     Ints = NDArray[np.int64]
     Looked = Callable[[NDArray[Any]], Any]
     Sum = Callable[[Looked], Any]
@@ -40,11 +37,6 @@ def levels_of(levels: Levels | NDArray[Any]) -> Levels:
     return levels if isinstance(levels, Counted | Ordered) else gathered(lambda work: work(levels), levels.dtype)
 
 
-def levels_in(cut: Cut, layer: int | None = None) -> Levels:
-    """Look at the gray levels of a study, or of one of its layers."""
-    return gathered(lambda work: cut.sum(partial(_alone, work, layer)), cut.voxels.dtype)
-
-
 def gathered(total: Sum, dtype: np.dtype[Any]) -> Levels:
     """Look at gray levels in slabs.
 
@@ -59,10 +51,6 @@ def gathered(total: Sum, dtype: np.dtype[Any]) -> Levels:
     kind, counts = plain(np.empty(0, dtype)).dtype, total(partial(digit_counts, begun=[0], depth=0))[0]
     short = kind.kind in "iu" and 8 * kind.itemsize <= DIGIT
     return Counted(counts, int(np.iinfo(kind).min)) if short else Ordered(counts, kind, total)
-
-
-def _alone(work: Looked, layer: int | None, levels: NDArray[Any], box: Box) -> Any:
-    return work(levels if layer is None else levels[..., layer])
 
 
 @dataclass(frozen=True)

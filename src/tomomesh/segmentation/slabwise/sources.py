@@ -50,7 +50,7 @@ class Made:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class MaskVoxels:
     """A mask of runs as voxels of 1 and 0."""
 
     mask: RunMask
