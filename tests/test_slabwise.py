@@ -13,9 +13,12 @@ from hypothesis import strategies as st
 from conftest import law, seeds
 from tomomesh import Settings, Volume
 from tomomesh.errors import EmptyError, TomomeshError, UsageError
+from tomomesh.isosurface.run_mask import RunMask
 from tomomesh.model.lazy import Held, LazyVoxels, in_memory
+from tomomesh.segmentation.padding import beside
 from tomomesh.segmentation.slabwise.cut import Cutting
 from tomomesh.segmentation.slabwise.levels import TAILS, levels_of
+from tomomesh.segmentation.slabwise.sources import MaskVoxels, Placed
 from tomomesh.segmentation.study import lay_out, select_in
 from tomomesh.slabs.keep import InMemory, OnDisk
 from tomomesh.ways.choice import take_way
@@ -78,7 +81,7 @@ def label_maps(draw: st.DrawFn) -> NDArray[Any]:
     labels[rng.random(SHAPE) < draw(st.sampled_from([0, 0.01]))] = 5
     labels[draw(st.sampled_from([slice(0), slice(4, 6), slice(1, None, 2)]))] = 0
     if draw(st.booleans()):
-        return np.asarray(labels, np.float32) + np.float32(draw(st.sampled_from([0, 1e-5, 0.3]))) * (labels == 1)
+        return np.asarray(labels + draw(st.sampled_from([0, 1e-5, 0.3])) * (labels == 1), np.float32)
     return np.asarray(labels, draw(st.sampled_from(["i4", "u4", "i8"])))
 
 
@@ -235,6 +238,46 @@ class TestBody:
         assert_the_same(study, asked | ({"preset": preset} if preset else {}), cutting)
 
 
+@st.composite
+def sides(draw: st.DrawFn, size: int) -> slice:
+    """Draw some of so many numbers, in either direction."""
+    numbers = range(size)[draw(st.slices(size))]
+    return slice(numbers.start, numbers.stop if numbers.stop >= 0 else None, numbers.step)
+
+
+class TestSources:
+    """Voxels that are made as they are read are those of the array that is made at once."""
+
+    @law(150)
+    @given(
+        low=st.tuples(*[st.integers(0, 4)] * 3), sizes=st.tuples(*[st.integers(1, 4)] * 3),
+        at=st.tuples(*[sides(8)] * 3), here=st.booleans(),
+    )  # fmt: skip
+    def test_of_voxels_in_a_larger_lattice(
+        self, low: tuple[int, ...], sizes: tuple[int, ...], at: tuple[slice, ...], here: bool
+    ) -> None:
+        inner = np.arange(1, 1 + np.prod(sizes)).reshape(sizes)
+        whole = np.zeros((8, 8, 8), inner.dtype)
+        whole[tuple(slice(a, a + size) for a, size in zip(low, sizes, strict=True))] = inner
+        placed = LazyVoxels.of(Placed(inner if here else LazyVoxels.of(Held(inner)), low, (8, 8, 8)))
+        np.testing.assert_array_equal(placed[at].read(), whole[at])
+
+    @law(100)
+    @given(seed=seeds, at=st.tuples(sides(7), sides(6), sides(5)))
+    def test_of_masks_and_of_other_voxels(self, seed: int, at: tuple[slice, ...]) -> None:
+        mask = np.random.default_rng(seed).random((7, 6, 5)) < 0.5
+        drawn = LazyVoxels.of(MaskVoxels(RunMask.of([mask])))
+        np.testing.assert_array_equal(drawn[at].read(), mask[at].view(np.uint8))
+        made = Cutting(whole).of(drawn).made(numbered, np.int64).voxels
+        np.testing.assert_array_equal(made[at].read(), np.indices(mask.shape).sum(axis=0)[at] + mask[at])
+
+
+def numbered(levels: NDArray[Any], box: tuple[slice, ...]) -> NDArray[np.int64]:
+    """Add the numbers of slice, row and column to each voxel."""
+    places = np.ogrid[tuple(slice(side.start, side.stop, side.step) for side in box)]
+    return np.asarray(levels + sum(places), np.int64)
+
+
 class TestLevels:
     @law(150)
     @given(levels=grays(), cutting=cuttings(), level=st.integers(0, 11 * 16 * 17 - 1))
@@ -252,6 +295,15 @@ class TestLevels:
         bits = np.random.default_rng(1).integers(0, 256, 8 * 999, dtype=np.uint8)
         levels = bits.view(kind)
         assert_levels(levels_of(levels).finite, levels[np.isfinite(levels)])
+
+    @law(60)
+    @given(levels=grays(), cutting=cuttings(), every=st.integers(1, 40))
+    def test_some_beside_another_are_taken_in_even_steps(
+        self, levels: NDArray[Any], cutting: Cutting, every: int
+    ) -> None:
+        level = levels[0, 0, 0]
+        found = beside(level.item(), every, cutting.of(levels))
+        np.testing.assert_array_equal(found, levels[levels != level][::every])
 
     def test_longer_floats_and_truths_are_levels_too(self) -> None:
         assert levels_of(np.array([0.5, -1.5], np.longdouble)).ends == (-1.5, 0.5)

@@ -136,7 +136,8 @@ def components_of_body(mask: RunMask, volume: Volume, cut: Cut) -> Components:
 def _holders(volume: Volume, body: Coarse, dense: Mask) -> Coarse:
     """Return what is as dense as the least bone, lies in no body and is larger than its ball, with its rim.
 
-    It is found in voxels as wide as the rim, which tell how dense they are. What is smaller may be a bit of bone in a thin part of the patient.
+    It is found in voxels as wide as the rim, which tell how dense they are. What is smaller may be a bit of bone in a
+    thin part of the patient.
     """
     every, spacing = _coarse(volume, RIM)
     runs = Runs.of(dense, corners=True)

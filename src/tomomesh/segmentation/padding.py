@@ -166,10 +166,14 @@ def _full(levels: NDArray[Any], box: Box, *, level: float) -> list[Mask]:
 
 def _drawn(level: float, size: int, cut: Cut) -> bool:
     """Tell whether the levels beside one, so many, have no noise; few of them are looked at, in even steps."""
-    every = max(1, size // LOOKED_AT)
-    before = accumulate(cut.each(partial(_others, level=level)), initial=0)
-    some = np.concatenate(list(cut.each(partial(_some, level=level, every=every), list(before)[:-1])))
+    some = beside(level, max(1, size // LOOKED_AT), cut)
     return bool(np.unique(some, return_counts=True)[1].max() > CONSTANT * len(some))
+
+
+def beside(level: float, every: int, cut: Cut) -> NDArray[Any]:
+    """Return every n-th of the levels of a study that are not a given one, in their order."""
+    before = accumulate(cut.each(partial(_others, level=level)), initial=0)
+    return np.concatenate(list(cut.each(partial(_some, level=level, every=every), list(before)[:-1])))
 
 
 def _others(levels: NDArray[Any], box: Box, *, level: float) -> int:
