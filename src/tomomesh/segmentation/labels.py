@@ -78,7 +78,7 @@ def _off(levels: NDArray[Any], box: Box) -> tuple[Any, Any, int]:
 
 
 def _rounded(levels: NDArray[Any], box: Box) -> NDArray[Any]:
-    return np.rint(levels)
+    return np.asarray(np.rint(levels))
 
 
 def _no_labels(found: str) -> UsageError:
@@ -142,8 +142,7 @@ class Labelled:
         boxes = self.boxes[np.isin(self.numbers, wanted)]
         low, high = boxes[:, 0].min(axis=0).tolist(), boxes[:, 1].max(axis=0).tolist()
         box = slice(low[0], high[0]), slice(low[1], high[1]), slice(low[2], high[2])
-        found = self.cut.within(box).each(partial(_chosen, wanted=tuple(wanted)))
-        return RunMask.joined(found).placed(box, self.volume.shape)
+        return self.cut.within(box).runs(partial(_chosen, wanted=tuple(wanted))).placed(box, self.volume.shape)
 
 
 def _chosen(labels: NDArray[Any], box: Box, *, wanted: tuple[int, ...]) -> RunMask:
@@ -210,25 +209,23 @@ def labels_in(voxels: NDArray[Any]) -> dict[str, int]:
     return labels_counted(HERE.of(voxels))
 
 
-def labels_counted(cut: Cut, every: int = 1) -> dict[str, int]:
-    """Count the labels of a study in slabs, on every n-th of its slices: see `labels_in`."""
+def labels_counted(cut: Cut) -> dict[str, int]:
+    """Count the labels of a study in slabs: see `labels_in`."""
     if cut.voxels.ndim != 3:
         return {}
-    found = cut.each(partial(_neighbors, every=every))
-    if None in found:
-        return {}
-    pairs, equal = np.sum(found, axis=0)
+    pairs, equal = np.zeros(2, np.int64)
+    for found in cut.each(_neighbors):
+        if found is None:  # as of most studies the first slab tells
+            return {}
+        pairs, equal = pairs + found[0], equal + found[1]
     if equal < EVEN * pairs:
         return {}
-    counts = sum(cut.each(partial(_number, every=every)), np.zeros(HIGHEST_LABEL, np.int64))
+    counts = cut.sum(_number)
     return {str(label): int(counts[label]) for label in np.flatnonzero(counts) if label > 0}
 
 
-def _neighbors(levels: NDArray[Any], box: Box, *, every: int) -> tuple[int, int] | None:
+def _neighbors(levels: NDArray[Any], box: Box) -> tuple[int, int] | None:
     """Count neighbors in rows that are both over 0, and equal ones of them; None where levels are no labels."""
-    levels = levels[-box[0].start % every :: every]
-    if not levels.size:
-        return 0, 0
     if not (levels.min() > -NEARLY and levels.max() < HIGHEST_LABEL):
         return None
     if levels.dtype.kind == "f":
@@ -241,6 +238,5 @@ def _neighbors(levels: NDArray[Any], box: Box, *, every: int) -> tuple[int, int]
     return int(np.count_nonzero(inside)), int(np.count_nonzero((left == right) & inside))
 
 
-def _number(levels: NDArray[Any], box: Box, *, every: int) -> Ints:
-    levels = np.rint(levels[-box[0].start % every :: every])
-    return np.bincount(levels.ravel().astype(np.int64), minlength=HIGHEST_LABEL)
+def _number(levels: NDArray[Any], box: Box) -> Ints:
+    return np.bincount(np.rint(levels).ravel().astype(np.int64), minlength=HIGHEST_LABEL)

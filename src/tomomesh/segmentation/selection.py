@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from .body import (
 from .contours.labelled import filled_slices, gaps_in
 from .padding import as_background, padding_in
 from .slabwise.cut import HERE
-from .slabwise.sources import Drawn
+from .slabwise.sources import MaskVoxels
 from .window import otsu_in, window_in, window_limits
 
 if TYPE_CHECKING:
@@ -156,14 +156,13 @@ def _of_labels(stack: Volume, labels: Labelled, asked: WindowSettings) -> Chosen
         return _interpolated(stack, runs, labels.volume)
     gaps = gaps_in(runs)
     told = f"{gaps.told}: --fill-slices interpolates them" if gaps else ""
-    lazy = isinstance(labels.volume.voxels, LazyVoxels)
-    voxels = LazyVoxels.of(Drawn(runs)) if lazy else runs.dense.view(np.uint8)
+    voxels: Any = LazyVoxels.of(MaskVoxels(runs)) if labels.volume.in_parts else runs.dense.view(np.uint8)
     return Chosen(replace(stack, voxels=voxels), runs, 0.5, np.inf, told=told)
 
 
 def _interpolated(stack: Volume, runs: RunMask, labels: Volume) -> Chosen:
     """Fill the slices between labelled ones, which looks at all of them at once."""
-    if isinstance(labels.voxels, LazyVoxels):
+    if labels.in_parts:
         raise UsageError(
             "slices are filled in memory alone", found="--fill-slices, and a study that is read part by part",
             hint="the same without it, or a study that fits into the memory",
