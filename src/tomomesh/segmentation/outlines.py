@@ -11,16 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..isosurface.run_mask import RunMask
 from ..kernels.measure.edges import join_pairs
-from ..model.boxes import box_of
-from ..model.sliced import ranges, some_of
+from ..model.sliced import ranges
 from .signal import SOLID
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from ..model.boxes import Box
-    from ..model.sliced import Sliced
 
     Ints = NDArray[np.int64]
     Floats = NDArray[np.float64]
@@ -168,21 +165,19 @@ class _Runs:
         return roots.astype(np.int64)
 
 
-def outlines_of(mask: Sliced, pixel_mm: tuple[float, float] = (1.0, 1.0), around: Box | None = None) -> Outlines:
+def outlines_of(mask: NDArray[np.bool_] | RunMask, pixel_mm: tuple[float, float] = (1.0, 1.0)) -> Outlines:
     """Tell what each slice of a window is.
 
     Parameters
     ----------
-    mask : (K, J, I) bool array or slices of it
+    mask : (K, J, I) bool array or RunMask
     pixel_mm : (float, float)
         Distance of the columns and of the rows.
-    around : box, optional
-        Of what is true, where that is known: its slices alone are looked at.
     """
-    layers, *box = around or (slice(0, mask.shape[0]), *box_of(mask)[1:])
+    boxed = _boxed(mask if isinstance(mask, RunMask) else RunMask.of([mask]))
+    count = boxed.shape[0]
     parts = [
-        _Part.of(some_of(mask, start, min(stop + 1, layers.stop))[:, *box], stop - start, pixel_mm)
-        for start, stop in ranges(layers.start, layers.stop)
+        _Part.of(boxed.part(start, min(stop + 1, count)), stop - start, pixel_mm) for start, stop in ranges(0, count)
     ]
     *columns, shared = (np.concatenate(each) for each in zip(*(part.columns for part in parts), strict=True))
     bodies, forks = _bodies(parts), sum(part.forks for part in parts)
@@ -203,10 +198,10 @@ class _Part:
     forks: int
 
     @classmethod
-    def of(cls, mask: NDArray[np.bool_], own: int, pixel_mm: tuple[float, float]) -> _Part:
-        """Look at some slices (n, J, I), of which the one that follows their `own` only tells how these go on."""
+    def of(cls, mask: RunMask, own: int, pixel_mm: tuple[float, float]) -> _Part:
+        """Look at some slices, of which the one that follows their `own` only tells how these go on."""
         inside, outside = _runs(mask)
-        count, rows = len(mask), mask.shape[1] + 2 * FRAME
+        count, rows = mask.shape[0], mask.shape[1] + 2 * FRAME
         beside, above = inside.meeting(1, 1), inside.meeting(rows)
         pieces, gaps = inside.joined(beside), outside.joined(outside.meeting(1))
         held = gaps != gaps[0]  # the outside of all slices is one, through their frames
@@ -232,24 +227,23 @@ def _bodies(parts: list[_Part]) -> Floats:
     return found[found > 0]
 
 
-def _runs(mask: NDArray[np.bool_]) -> tuple[_Runs, _Runs]:
+def _boxed(mask: RunMask) -> RunMask:
+    """Leave out the rows and columns that hold nothing of a window; all slices stay."""
+    _, j, i = mask.box
+    return mask.cropped((slice(0, mask.shape[0]), j, i)) if mask.count else mask
+
+
+def _runs(mask: RunMask) -> tuple[_Runs, _Runs]:
     """Part the rows of slices in a frame into what lies in the window and what lies outside, before and after each."""
-    count, (rows, columns) = len(mask), np.array(mask.shape[1:]) + 2 * FRAME
-    ends = np.concatenate([_changes(one) + k * rows * columns for k, one in enumerate(mask)])  # no copy of the window
-    row = ends[::2] // columns
-    start, stop = ends[::2] - row * columns, ends[1::2] - row * columns
+    count, rows, columns = mask.shape[0], mask.shape[1] + 2 * FRAME, mask.shape[2] + 2 * FRAME
+    k, j = np.divmod(mask.rows, mask.shape[1])
+    row, start, stop = k * rows + j + FRAME, mask.starts + np.int64(FRAME), mask.stops + np.int64(FRAME)
     gap = np.arange(len(row)) + row  # the stretch outside before each inside: every row has one more than insides
     around = np.repeat(np.arange(count * rows), np.bincount(row, minlength=count * rows) + 1)
     after, before = np.zeros_like(around), np.full_like(around, columns)
     after[gap + 1], before[gap] = stop, start
     width = columns + 2 * FRAME
     return _Runs(row, start, stop, row // rows, width), _Runs(around, after, before, around // rows, width)
-
-
-def _changes(pixels: NDArray[np.bool_]) -> Ints:
-    """Return where, row after row of a slice in its frame, the window begins or ends."""
-    flat = np.pad(pixels, FRAME).ravel()
-    return np.flatnonzero(flat[1:] != flat[:-1]) + 1
 
 
 def _sum(where: Ints, values: NDArray[Any], count: int = 0) -> Floats:

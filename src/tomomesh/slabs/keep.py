@@ -1,0 +1,149 @@
+"""Who works on slabs, and where what they make stays until it is asked for again."""
+
+from __future__ import annotations
+
+import mmap
+import tempfile
+from dataclasses import dataclass, fields, is_dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from ..errors import NO_ROOM, OutputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+Kept = Any
+"""What stands for a value that was made of a slab: handed in again, or fetched; nothing else is done with it."""
+LARGE = 1 << 16
+"""Bytes from which an array is kept in a file. Chosen: smaller ones are less than the pages that map them."""
+
+
+class Slabs(Protocol):
+    """Works on slabs, and keeps what it makes of them.
+
+    Work is a function of a module, or a `functools.partial` of one, without effects: it changes none of its arguments.
+    Values are frozen dataclasses, tuples and lists of arrays and of what else can be pickled.
+    """
+
+    def each(self, work: Callable[..., Any], *columns: Sequence[Any]) -> list[Kept]:
+        """Call some work once a slab, with one entry of each column; what is kept is handed in as its value.
+
+        Parameters
+        ----------
+        work : callable
+        columns : sequences of one length
+            Of values, of what `each` returned, and of tuples and lists of the latter.
+        """
+
+    def fetch(self, kept: Sequence[Kept]) -> list[Any]:
+        """Bring values here: small ones, or one after another."""
+
+
+class InMemory:
+    """Works at once, and keeps values as they are."""
+
+    def each(self, work: Callable[..., Any], *columns: Sequence[Any]) -> list[Kept]:
+        """Call some work once a slab, see `Slabs`."""
+        return [work(*entries) for entries in zip(*columns, strict=True)]
+
+    def fetch(self, kept: Sequence[Kept]) -> list[Any]:
+        """Return the values."""
+        return list(kept)
+
+
+@dataclass(frozen=True)
+class OnDisk:
+    """Works on one slab after another, and keeps large arrays in files without a name: no crash leaves any behind.
+
+    A file holds what one call of `each` made, and is gone with the last value that is kept of it.
+
+    Attributes
+    ----------
+    folder : path
+        Where the files are; nobody else may read them.
+    """
+
+    folder: Path
+
+    def each(self, work: Callable[..., Any], *columns: Sequence[Any]) -> list[Kept]:
+        """Call some work once a slab, see `Slabs`.
+
+        Raises
+        ------
+        OutputError
+            Where the disk is full.
+        """
+        file = _File(self.folder)
+        return [_changed(work(*map(_mapped, entries)), file.put) for entries in zip(*columns, strict=True)]
+
+    def fetch(self, kept: Sequence[Kept]) -> list[Any]:
+        """Return the values; what is large is read from its file where it is looked at."""
+        return [_mapped(value) for value in kept]
+
+
+@dataclass(frozen=True)
+class _Far:
+    """An array in a file, from a byte on that a page begins with."""
+
+    file: _File
+    offset: int
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+
+    def mapped(self) -> np.ndarray[Any, Any]:
+        """Return it as memory that is its own: what is written there is never in the file."""
+        size = self.dtype.itemsize * int(np.prod(self.shape))
+        pages = mmap.mmap(self.file.handle.fileno(), size, access=mmap.ACCESS_COPY, offset=self.offset)
+        return np.frombuffer(pages, self.dtype).reshape(self.shape)
+
+
+class _File:
+    """A file without a name that arrays are put into one behind the other."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.end = 0
+        self.handle: Any = None
+
+    def put(self, array: Any) -> Any:
+        """Write an array; one that is small, and what is no array, stays as it is."""
+        if not isinstance(array, np.ndarray) or array.nbytes < LARGE:
+            return array.copy() if isinstance(array, np.ndarray) and array.base is not None else array
+        try:
+            return self._written(np.ascontiguousarray(array))
+        except OSError as fault:
+            told = "the disk is full" if fault.errno in NO_ROOM else str(fault.strerror).lower()
+            raise OutputError(
+                "what was made of a slab cannot be kept", file=str(self.folder), found=told,
+                hint="TMPDIR on a disk with more room, or more memory and thicker slabs",
+            ) from None  # fmt: skip
+
+    def _written(self, array: np.ndarray[Any, Any]) -> _Far:
+        self.handle = self.handle or tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115 - closed with its last map
+        self.handle.seek(self.end)
+        left = array.reshape(-1).view(np.uint8)
+        while len(left):
+            left = left[self.handle.write(left) :]
+        found = _Far(self, self.end, array.dtype, array.shape)
+        self.end += -(-array.nbytes // mmap.ALLOCATIONGRANULARITY) * mmap.ALLOCATIONGRANULARITY
+        return found
+
+
+def _mapped(value: Any) -> Any:
+    return _changed(value, lambda part: part.mapped() if isinstance(part, _Far) else part)
+
+
+def _changed(value: Any, change: Callable[[Any], Any]) -> Any:
+    """Return a value with other parts: those of tuples, lists and dataclasses, however deep."""
+    if isinstance(value, _Far) or (not isinstance(value, tuple | list) and not is_dataclass(value)):
+        return change(value)
+    if isinstance(value, tuple | list):
+        parts = [_changed(part, change) for part in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else type(value)(parts)
+    made = object.__new__(type(value))  # as unpickling does: what is checked at the beginning was
+    for field in fields(value):
+        object.__setattr__(made, field.name, _changed(getattr(value, field.name), change))
+    return made
