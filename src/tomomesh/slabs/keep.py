@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mmap
 import tempfile
+import weakref
 from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -122,7 +123,9 @@ class _File:
             ) from None  # fmt: skip
 
     def _written(self, array: np.ndarray[Any, Any]) -> _Far:
-        self.handle = self.handle or tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115 - closed with its last map
+        if self.handle is None:
+            self.handle = tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115 - closed when no map of it is left
+            weakref.finalize(self, self.handle.close)
         self.handle.seek(self.end)
         left = array.reshape(-1).view(np.uint8)
         while len(left):
