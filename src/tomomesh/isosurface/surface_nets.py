@@ -91,6 +91,15 @@ class Net:
         """Steps from the voxels inside to those outside, (q, 3)."""
         return np.take(np.array(DIRECTIONS, np.int32), self.directions, axis=0)
 
+    @property
+    def corners(self) -> NDArray[np.int32]:
+        """The corners of each square that no other surface goes through, (q, 4): all of them."""
+        return self.quads
+
+    def goals(self, places: Floats, threads: int) -> Floats:
+        """Return where the vertices are drawn to whose squares are drawn to places (q, 3): to their mean."""
+        return means(places, self.fans, threads)
+
 
 def net_around(
     mask: NDArray[np.bool_], threads: int = 0, lowest: NDArray[np.int32] = BELOW, known: Cells | None = None
@@ -169,7 +178,7 @@ def settle(
     -------
     NetFit
     """
-    start = means(crossings.positions, net.fans, threads)
+    start = net.goals(crossings.positions, threads)
     steps = _NetSteps(net, Rings.of(net, threads), crossings, start, settings, threads)
     state, trace = iterate(steps, settings.max_steps, progress)
     return NetFit(start, state.position, trace)

@@ -74,5 +74,5 @@ def given_back(net: Net, crossings: LevelCrossings, places: Floats, threads: int
         len(lost), block=BLOCK, threads=threads,
     )  # fmt: skip
     for _ in range(ROUNDS):
-        lost = means(means(lost, net.fans, threads), net.quads, threads)
+        lost = means(means(lost, net.fans, threads), net.corners, threads)
     return np.where(crossings.thin, lost, 0.0)
