@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from .effect import without_effect
+from .errors import UsageError
 from .finish import compare_with, finish
 from .model.points import PointSet
 from .progress import Progress, silent
@@ -211,9 +212,13 @@ def _give_back() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
-def settled(settings: Settings | None, changes: dict[str, Any]) -> Settings:
-    """Return the settings of a run; refuse those whose packages are not installed."""
+def settled(settings: Settings | None, changes: dict[str, Any], *, every: bool = False) -> Settings:
+    """Return the settings of a run; refuse those whose packages are not installed, or that are for every label."""
     settings = (settings or Settings()).replace(**changes)
+    if settings.cubes.shared_walls and not every:
+        raise UsageError(
+            "walls are shared among all labels of a map", found="--shared-walls for one mesh", hint="--each-label"
+        )
     if settings.printing.asked:
         from .printing.part import require_printing
 

@@ -125,7 +125,7 @@ def choose(
     chosen = _of_levels(stack, asked) if labels is None else _of_labels(stack, labels, asked)
     chosen = chosen if inside is None else replace(chosen, mask=_within(chosen.mask, inside))
     chosen = _parts(chosen.counted(chosen.mask, window=chosen.kept), stack, asked)
-    if asked.keep == "all":
+    if asked.keep == "all" or settings.cubes.shared_walls:  # a speck left out of one label would be a gap
         return chosen
     cleaned = without_specks(chosen.mask, chosen.around)
     return replace(chosen, mask=cleaned.mask, cleaned=cleaned)
