@@ -105,9 +105,7 @@ class _Done:
         return done(study, chosen, settings, folder, lambda *asked: self.make(number, *asked)) | label
 
 
-def _labels(
-    chosen: Namespace, settings: Settings, given: Mapping[str, Any], work: Work
-) -> tuple[Sequence[int], Make]:
+def _labels(chosen: Namespace, settings: Settings, given: Mapping[str, Any], work: Work) -> tuple[Sequence[int], Make]:
     """Return the labels, and what makes the surface of one."""
     read = {name: _absolute(getattr(chosen, name)) for name in ("study", "labels_in")}
     made = _InOnePass(chosen, settings, given, uuid4().hex)
@@ -138,7 +136,7 @@ def _absolute(named: str | tuple[str, ...] | None) -> str | tuple[str, ...] | No
 class _EachAlone:
     """Reads the map for each label anew."""
 
-    read: Mapping[str, Any]
+    read: dict[str, Any]
     work: Work
 
     def __call__(self, number: int, asked: Namespace, own: Settings) -> Surface:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.volume import Volume
+    from ..progress import Progress
     from ..settings import Settings
-    from .bars import Bars
 
 
 ALL = "all"
@@ -119,7 +119,7 @@ def sources_of(chosen: Namespace, settings: Settings) -> list[str]:
     return sources
 
 
-def read_study(chosen: Namespace, settings: Settings, progress: Bars) -> tuple[Volume, Volume | None]:
+def read_study(chosen: Namespace, settings: Settings, progress: Progress) -> tuple[Volume, Volume | None]:
     """Read the study, and the label map where there is one beside it."""
     total = 2 if chosen.study and chosen.labels_in else 1
     progress("read", 0, total)

@@ -1,4 +1,4 @@
-"""Every label of a map beside its neighbors: the squares that bound it of the net over the walls between all -> mesh."""
+"""A label of a map among its neighbors: the squares that bound it, of the net over the walls between all -> mesh."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 
 from ..errors import EmptyError, UsageError
 from ..followed import Followed
-from ..isosurface.walls.walls import WallBoundary
 from ..results import Segmentation, Surface
 from ..segmentation.sample import Sampling
 from ..settings import option_of
@@ -18,6 +17,7 @@ from .sections import boundary_found, points_found
 from .way import POINTS, Way, parameters
 
 if TYPE_CHECKING:
+    from ..isosurface.walls.walls import WallBoundary
     from ..progress import Progress
     from ..segmentation.study import Selected
     from ..settings import Settings

@@ -84,7 +84,8 @@ class LabelBlock:
         if len(numbers) > MOST_LABELS:
             raise UsageError("too many labels share walls", found=str(len(numbers)), expected=f"at most {MOST_LABELS}")
         labels, low = _framed(found, numbers, inside)
-        ranks = _ranks(np.bincount(labels.ravel(), minlength=len(numbers) + 1))
+        counts = sum(np.bincount(plane.ravel(), minlength=len(numbers) + 1) for plane in labels)
+        ranks = _ranks(np.asarray(counts))
         return cls(labels, low, numbers, *_composed(labels, ranks, threads))
 
     def index(self, number: int) -> int:
@@ -94,7 +95,7 @@ class LabelBlock:
 
 
 def _framed(found: Labelled, numbers: NDArray[np.int64], inside: NDArray[np.bool_] | None) -> tuple[Labels, Ints]:
-    """Number the labels in the box that holds them, with a layer of background around it; slice by slice."""
+    """Return numbers for the labels in the box that holds them, with a layer of background around it."""
     boxes = found.boxes[found.numbers != 0]
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     labels = np.zeros(high - low + 2, np.uint16)
@@ -181,9 +182,7 @@ def _with_contacts(labels: Labels, cells: Ints, threads: int) -> Ints:
     return cells[found]
 
 
-def _given(
-    labels: Labels, cells: Ints, ranks: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _given(labels: Labels, cells: Ints, ranks: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the voxels (m,) that are given away in cells with a contact, and the ranks of the labels they go to.
 
     Of the voxels that would join two others, those of the lowest rank go to their label; where all of them rank higher
