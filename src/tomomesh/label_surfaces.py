@@ -62,11 +62,12 @@ class LabelSurfaces(Mapping[int, "Surface"]):
         from .isosurface.walls.walls import walls_between
 
         study, settings = self._study, self._settings
-        assert study.labels is not None
-        walls = walls_between(
-            study.labels, settings.fit, inside=study.inside, threads=settings.run.threads, progress=progress
-        )
-        return replace(study, walls=walls)
+        labels = study.labels
+        assert labels is not None
+        if labels.walls is not None:
+            return study
+        walls = walls_between(labels, settings.fit, inside=study.inside, threads=settings.run.threads, progress=progress)
+        return replace(study, labels=replace(labels, walls=walls))
 
     def __iter__(self) -> Iterator[int]:
         return iter(dict.fromkeys(self._numbers))
@@ -84,7 +85,7 @@ class LabelSurfaces(Mapping[int, "Surface"]):
     def surface(self, number: int, progress: Progress) -> Surface:
         """Return the same, with a progress of its own."""
         settings = self._settings.replace(select=(number,))
-        if settings.cubes.shared_walls and self._study.walls is None:
+        if settings.cubes.shared_walls:
             self._study = self._with_walls(progress)
         return reconstructed(lambda: self._study, settings, self._given, progress, kept=self._kept)
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ..isosurface.walls.walls import Walls
     from ..model.boxes import Box
     from ..model.volume import Volume
 
@@ -80,6 +81,8 @@ class Labelled:
         Its labels in order, 0 among them where it has it.
     boxes : (n, 2, 3) int64 array
         First slice, row and column of each, and those behind its last.
+    walls : Walls or None
+        Between all of them, where neighbors share them.
 
     Examples
     --------
@@ -92,6 +95,7 @@ class Labelled:
     volume: Volume
     numbers: Ints
     boxes: Ints
+    walls: Walls | None = None
 
     @classmethod
     def of(cls, volume: Volume) -> Labelled:

@@ -18,6 +18,7 @@ from .window import PRESETS_HU, choose_window, window
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..isosurface.walls.walls import Walls
     from ..model.boxes import Box
     from ..model.volume import Volume
     from ..settings import Settings, WindowSettings
@@ -76,6 +77,8 @@ class Chosen:
         What is to be said of slices without labels.
     around : box or None
         Outside of which no voxel is kept, where that is known.
+    walls : Walls or None
+        Of all labels, where neighbors share them.
     """
 
     volume: Volume
@@ -86,6 +89,7 @@ class Chosen:
     cleaned: Cleaned | None = None
     told: str = ""
     around: Box | None = None
+    walls: Walls | None = None
 
     @cached_property
     def box(self) -> Box:
@@ -138,7 +142,8 @@ def _of_labels(stack: Volume, labels: Labelled, asked: WindowSettings) -> Chosen
         return Chosen(volume, volume.voxels > 0, 0.0, np.inf, told=told)
     gaps = gaps_in(mask, box)
     told = f"{gaps.told}: --fill-slices interpolates them" if gaps else ""
-    return Chosen(replace(stack, voxels=mask.view(np.uint8)), mask, 0.5, np.inf, told=told, around=box)
+    voxels = replace(stack, voxels=mask.view(np.uint8))
+    return Chosen(voxels, mask, 0.5, np.inf, told=told, around=box, walls=labels.walls)
 
 
 def _of_levels(stack: Volume, asked: WindowSettings) -> Chosen:

@@ -19,7 +19,6 @@ from .selection import Chosen, choose
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..isosurface.walls.walls import Walls
     from ..settings import Settings
     from .selection import Counts
     from .window import Limit
@@ -43,14 +42,11 @@ class Selected:
         Of the slices: axial, coronal or sagittal.
     chosen : Chosen
         The voxels that are kept.
-    walls : Walls or None
-        Those of all labels, where neighbors share them.
     """
 
     study: Volume
     plane: str
     chosen: Chosen
-    walls: Walls | None = None
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -73,8 +69,6 @@ class LaidOut:
     inside : (K, J, I) bool array or None
         The voxels that may be chosen, where not all may.
     cropped : dict or None
-    walls : Walls or None
-        As those of `Selected`.
     """
 
     volume: Volume
@@ -82,7 +76,6 @@ class LaidOut:
     labels: Labelled | None
     inside: NDArray[np.bool_] | None
     cropped: dict[str, list[int]] | None
-    walls: Walls | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -146,7 +139,7 @@ def select_in(study: LaidOut, settings: Settings) -> Stage[Selected]:
     doubt = () if study.labels is None else doubted(study.labels)
     warnings = (*_doubts(chosen.value, settings), *doubt)
     window = {"window": _window(chosen.value, settings)}
-    selected = Selected(study.volume, study.plane, chosen.value, study.walls)
+    selected = Selected(study.volume, study.plane, chosen.value)
     return folded(selected, Stage(None, {"study": section}), chosen, Stage(None, window, warnings))
 
 

@@ -35,7 +35,8 @@ NOTHING = np.empty(0)
 def segment_by_walls(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[WallBoundary]]:
     """Take the boundary of a label as it lies between those of all others."""
     (number,) = settings.window.select or (0,)
-    bounded = None if kept.walls is None else kept.walls.of(number)
+    walls = kept.chosen.walls
+    bounded = None if walls is None else walls.of(number)
     if bounded is None:
         raise EmptyError(
             "nothing is left of the label: its voxels touch at edges or corners alone, as those of others there",
@@ -89,7 +90,7 @@ def _require(settings: Settings) -> None:
 WAY = Way(
     applies=lambda settings, input: settings.cubes.shared_walls and input not in POINTS,
     because=lambda settings, input: f"with {OPTION}",
-    reads=parameters("surface", "stiffness", "shared_walls"),
+    reads=parameters("surface", "stiffness"),
     segment=segment_by_walls,
     surface=surface_by_walls,
     require=_require,
