@@ -66,7 +66,9 @@ class LabelSurfaces(Mapping[int, "Surface"]):
         assert labels is not None
         if labels.walls is not None:
             return study
-        walls = walls_between(labels, settings.fit, inside=study.inside, threads=settings.run.threads, progress=progress)
+        walls = walls_between(
+            labels, settings.fit, inside=study.inside, threads=settings.run.threads, progress=progress
+        )
         return replace(study, labels=replace(labels, walls=walls))
 
     def __iter__(self) -> Iterator[int]:
