@@ -13,8 +13,8 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from each_label import label_map
 
+from each_label import label_map
 from tomomesh import Volume, reconstruct, reconstruct_labels
 from tomomesh.isosurface.walls.walls import walls_between
 from tomomesh.measure.report import area_samples

@@ -301,6 +301,40 @@ def off(mesh: Any, solid: Solid) -> float:
     return float(np.abs(solid(area_samples(mesh, 20_000).T)).mean())
 
 
+class TestThick:
+    @law(40)
+    @given(label_maps(), st.sampled_from([0, 1, 2]), st.sampled_from([1.6, 2.7, 4.0]))
+    def test_divided_labels_keep_the_promise(self, voxels: NDArray[Any], axis: int, thick: float) -> None:
+        affine = np.diag(np.where(np.arange(4) == axis, thick, 1.0))
+        walls = walls_between(labelled(voxels, affine), FIT, divide=True)
+        assert walls.block.parts == round(thick)
+        for one in boundaries(walls).values():
+            check_promise(one.made.mesh, cavities=one.cavities)
+        assert not CrossingFaces()(walls.mesh).any()
+
+    @pytest.mark.parametrize("thick", [2, 4])
+    def test_a_label_by_itself_is_divided_as_alone(self, thick: int) -> None:
+        volume = Volume.from_stored(map_of([ball(15)])[::thick], np.diag([1.0, 1.0, thick, 1.0]))
+        alone = reconstruct(volume, select=(1,), way="voxels", keep="all", remesh=False)
+        shared = reconstruct_labels(volume, shared_walls=True)[1]
+        assert shared.report["voxels"] == alone.report["voxels"]
+        assert shared.mesh.faces.shape == alone.mesh.faces.shape
+        apart = np.abs(shared.mesh.vertices - alone.mesh.vertices).max(axis=1)
+        assert np.percentile(apart, 90) < 0.005  # shares have 16 bits
+        assert apart.max() < 0.2  # beside voxels that are kept with less than half
+
+    @pytest.mark.parametrize("name", ["halves", "thirds", "core"])
+    @pytest.mark.parametrize("thick", [2, 4])
+    def test_no_mesh_is_a_tenth_farther_than_alone(self, name: str, thick: int) -> None:
+        volume = Volume.from_stored(map_of(SOLIDS[name])[::thick], np.diag([1.0, 1.0, thick, 1.0]))
+        shared = reconstruct_labels(volume, shared_walls=True)
+        for number, solid in enumerate(SOLIDS[name], 1):
+            alone = reconstruct(volume, select=(number,), way="voxels", keep="all", remesh=False)
+            scaled = [in_voxels(surface.mesh, volume) for surface in (shared[number], alone)]
+            one, other = (off(mesh.moved(mesh.vertices * [1, 1, thick]), solid) for mesh in scaled)
+            assert one < 1.1 * other < 0.1 * thick
+
+
 class TestExact:
     @pytest.mark.parametrize("name", SOLIDS)
     def test_no_mesh_is_a_tenth_farther_than_alone(self, name: str) -> None:

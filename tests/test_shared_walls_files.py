@@ -179,5 +179,5 @@ class TestRefused:
             assert [row["exit_code"] for row in csv.DictReader(file)] == ["6", "0"]
 
     def test_what_changes_nothing_is_told(self) -> None:
-        found = reconstruct_labels(Volume.from_stored(organs(), AFFINE), shared_walls=True, divide=False, stiffness=0.2)
-        assert found[2].report["warnings"] == ["--no-divide has no effect with --shared-walls"]
+        found = reconstruct_labels(Volume.from_stored(organs(), AFFINE), shared_walls=True, closing=2, stiffness=0.2)
+        assert found[2].report["warnings"] == ["--closing has no effect with --shared-walls"]

@@ -67,7 +67,12 @@ class LabelSurfaces(Mapping[int, "Surface"]):
         if labels.walls is not None:
             return study
         walls = walls_between(
-            labels, settings.fit, inside=study.inside, threads=settings.run.threads, progress=progress
+            labels,
+            settings.fit,
+            inside=study.inside,
+            divide=settings.cubes.divide,
+            threads=settings.run.threads,
+            progress=progress,
         )
         return replace(study, labels=replace(labels, walls=walls))
 

@@ -90,7 +90,7 @@ def _require(settings: Settings) -> None:
 WAY = Way(
     applies=lambda settings, input: settings.cubes.shared_walls and input not in POINTS,
     because=lambda settings, input: f"with {OPTION}",
-    reads=parameters("surface", "stiffness"),
+    reads=parameters("surface", "stiffness", "divide"),
     segment=segment_by_walls,
     surface=surface_by_walls,
     require=_require,

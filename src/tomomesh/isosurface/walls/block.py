@@ -18,7 +18,9 @@ from ...errors import ResourceError, UsageError
 from ...kernels.isosurface.walls import count_mixed, find_contacts, list_mixed
 from ...kernels.threads import in_blocks
 from ..means import BLOCK
+from ..thick_slices import finer, parts_of
 from ..well_composed import CORNERS, JOINING, LAYERS, MOST_CELLS
+from .thick import MARGIN, divided
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,6 +60,14 @@ class LabelBlock:
         Its first voxel (x, y, z) in the map.
     numbers : (n,) int64 array
         The labels, in order.
+    affine : (4, 4) float array
+        Indices of the map's voxels, or of the parts of thick ones, to millimeters.
+    shape : tuple of int
+        Of the map in these.
+    shares : (K, J, I) float16 array or None
+        How much of each part its label has; NaN beyond the map.
+    parts : int
+        Into how many each voxel was divided.
     given : (m,) int64 array
         Voxels of `labels`, flat and in order, that were given to another label, so that none touches itself along an
         edge or at a corner alone.
@@ -68,12 +78,20 @@ class LabelBlock:
     labels: Labels
     low: Ints
     numbers: NDArray[np.int64]
+    affine: NDArray[np.float64]
+    shape: tuple[int, ...]
+    shares: NDArray[np.float16] | None
+    parts: int
     given: NDArray[np.int64]
     before: Labels
 
     @classmethod
-    def of(cls, found: Labelled, inside: NDArray[np.bool_] | None = None, threads: int = 0) -> LabelBlock:
+    def of(
+        cls, found: Labelled, inside: NDArray[np.bool_] | None = None, *, divide: bool = False, threads: int = 0
+    ) -> LabelBlock:
         """Take all labels of a map but 0, of the voxels that are inside; what is changed in it is a copy.
+
+        With `divide`, voxels of thick slices are divided first.
 
         Raises
         ------
@@ -83,10 +101,22 @@ class LabelBlock:
         numbers = found.numbers[found.numbers != 0]
         if len(numbers) > MOST_LABELS:
             raise UsageError("too many labels share walls", found=str(len(numbers)), expected=f"at most {MOST_LABELS}")
-        labels, low = _framed(found, numbers, inside)
+        axis, times = parts_of(found.volume.affine) if divide else (0, 1)
+        labels, low = _numbered(found, numbers, inside, MARGIN if times > 1 else 0)
+        shares, affine, scale = None, found.volume.affine, np.ones(3, np.int64)
+        if times > 1:
+            labels, shares = divided(labels, affine, threads)
+            affine, scale[2 - axis] = finer(affine, axis, times), times
+            shares = np.pad(shares, 1, constant_values=np.nan)
+        labels = np.pad(labels, 1)
         counts = sum(np.bincount(plane.ravel(), minlength=len(numbers) + 1) for plane in labels)
-        ranks = _ranks(np.asarray(counts))
-        return cls(labels, low, numbers, *_composed(labels, ranks, threads))
+        given, before = _composed(labels, _ranks(np.asarray(counts)), threads)
+        if shares is not None:
+            shares.reshape(-1)[given] = 0.5  # all but in the label that it had
+        shape = tuple((np.array(found.volume.shape) * scale).tolist())
+        return cls(
+            labels, ((low * scale)[::-1] - 1).astype(np.int32), numbers, affine, shape, shares, times, given, before
+        )
 
     def index(self, number: int) -> int:
         """Return what stands for a label; 0 where the map does not have it."""
@@ -94,17 +124,20 @@ class LabelBlock:
         return place + 1 if place < len(self.numbers) and self.numbers[place] == number else 0
 
 
-def _framed(found: Labelled, numbers: NDArray[np.int64], inside: NDArray[np.bool_] | None) -> tuple[Labels, Ints]:
-    """Return numbers for the labels in the box that holds them, with a layer of background around it."""
+def _numbered(
+    found: Labelled, numbers: NDArray[np.int64], inside: NDArray[np.bool_] | None, margin: int
+) -> tuple[Labels, NDArray[np.int64]]:
+    """Return numbers for the labels in the box that holds them with a margin, and its first slice, row and column."""
     boxes = found.boxes[found.numbers != 0]
-    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-    labels = np.zeros(high - low + 2, np.uint16)
+    low, high = boxes[:, 0].min(axis=0) - margin, boxes[:, 1].max(axis=0) + margin
+    low, high = np.maximum(low, 0), np.minimum(high, found.volume.shape)
+    labels = np.empty(high - low, np.uint16)
     side = tuple(map(slice, low[1:], high[1:]))
     for k in range(low[0], high[0]):
         plane = found.volume.voxels[k][side]
         own = (np.searchsorted(numbers, plane) + 1) * (plane != 0)
-        labels[k - low[0] + 1, 1:-1, 1:-1] = own if inside is None else own * inside[k][side]
-    return labels, (low[::-1] - 1).astype(np.int32)
+        labels[k - low[0]] = own if inside is None else own * inside[k][side]
+    return labels, low
 
 
 def _ranks(counts: NDArray[np.int64]) -> NDArray[np.int64]:

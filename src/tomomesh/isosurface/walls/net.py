@@ -20,7 +20,7 @@ from ...kernels.isosurface.voxels import link_cells
 from ...kernels.isosurface.walls import end_within, list_sheets, list_squares
 from ...kernels.threads import in_blocks
 from ...model.points import CROSSING
-from ..crossings import EVENED, LevelCrossings
+from ..crossings import CLOSEST, EVENED, LevelCrossings
 from ..means import BLOCK
 from ..surface_nets import Net
 from ..thin import DEPTH
@@ -120,13 +120,31 @@ def net_between(block: LabelBlock, threads: int = 0) -> WallNet:
     return WallNet(low, felt, fans, quads, twins, inner, directions, labels, junctions)
 
 
-def half_way(net: WallNet, block: LabelBlock, threads: int = 0) -> LevelCrossings:
-    """Return the places half way between the voxels of a net, and where a label is thin on either side of them."""
+def places_between(net: WallNet, block: LabelBlock, threads: int = 0) -> LevelCrossings:
+    """Return where squares are drawn to, and where a label is thin on either side of them."""
     thin = _ends(block, net.inner - block.low, -net.steps, threads)
     ahead = np.flatnonzero(net.labels[:, 1])
     thin[ahead] |= _ends(block, (net.inner + net.steps - block.low)[ahead], net.steps[ahead], threads)
     kinds = np.full(len(thin), CROSSING, np.uint8)
-    return LevelCrossings(net.inner + 0.5 * net.steps, kinds, stepped=True, bending=EVENED, thin=thin)
+    places = net.inner + _ways(net, block)[:, None] * net.steps
+    return LevelCrossings(places, kinds, stepped=True, bending=EVENED, thin=thin)
+
+
+def _ways(net: WallNet, block: LabelBlock) -> Floats:
+    """Return at which share of the way between its voxels each square's two labels have equal shares, (q,).
+
+    Half way, where voxels were not divided, beyond the map, and where a label has less than half of its own voxel. Two
+    labels are taken to be all that there are: what one does not have is the other's.
+    """
+    if block.shares is None:
+        return np.full(len(net.quads), 0.5)
+    inner = net.inner - block.low
+    mine, other = (
+        block.shares[tuple(voxels.T[::-1])].astype(np.float64) - 0.5 for voxels in (inner, inner + net.steps)
+    )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ways = mine / (mine + other)
+    return np.where((mine >= 0) & (other >= 0) & np.isfinite(ways), np.clip(ways, CLOSEST, 1 - CLOSEST), 0.5)
 
 
 def _ends(block: LabelBlock, places: Ints, steps: Ints, threads: int) -> Marks:

@@ -16,7 +16,7 @@ from ..diagonals import triangulated
 from ..surface_nets import Net, settle
 from ..voxels import Boundary, VoxelSurface
 from .block import LabelBlock
-from .net import half_way, net_between
+from .net import net_between, places_between
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -55,9 +55,6 @@ class Walls:
 
     Attributes
     ----------
-    affine : (4, 4) float array
-    shape : tuple of int
-        Of the map.
     block : LabelBlock
     net : WallNet
     crossings : LevelCrossings
@@ -70,8 +67,6 @@ class Walls:
         Squares label by label, and how many there are of those before.
     """
 
-    affine: NDArray[np.float64]
-    shape: tuple[int, ...]
     block: LabelBlock
     net: WallNet
     crossings: LevelCrossings
@@ -93,11 +88,11 @@ class Walls:
         crossings = LevelCrossings(
             self.crossings.positions[squares], self._kinds(net), stepped=True, bending=self.crossings.bending
         )  # fmt: skip
-        behind = self.net.labels[squares, np.where(turned, 0, 1)]
+        beyond = np.append(0, self.block.numbers)[self.net.labels[squares, np.where(turned, 0, 1)]]
+        made, lost = self._made(squares, turned, used, net), int(np.count_nonzero(self.block.before == index))
         return WallBoundary(
-            self.affine, net, crossings, self._given_to(index), made=self._made(squares, turned, used, net),
-            beyond=np.append(0, self.block.numbers)[behind],
-            lost=int(np.count_nonzero(self.block.before == index)),
+            self.block.affine, net, crossings, self._given_to(index), self.block.parts, made=made, beyond=beyond,
+            lost=lost,
         )  # fmt: skip
 
     def _net(self, squares: Ints, turned: Marks) -> tuple[NDArray[np.int32], Net]:
@@ -128,7 +123,7 @@ class Walls:
 
     def _kinds(self, net: Net) -> NDArray[np.uint8]:
         """Tell what the crossings of a label's net are."""
-        outer, last = net.inner + net.steps, np.array(self.shape[::-1], np.int32) - 1
+        outer, last = net.inner + net.steps, np.array(self.block.shape[::-1], np.int32) - 1
         beyond = any_of((outer < 0) | (outer > last))
         voxels = np.ravel_multi_index(tuple((net.inner - self.block.low).T[::-1]), self.block.labels.shape)
         return np.where(np.isin(voxels, self.block.given), ADDED, np.where(beyond, BORDER, CROSSING)).astype(np.uint8)
@@ -138,7 +133,7 @@ class Walls:
 
 
 def walls_between(
-    labels: Labelled, settings: FitSettings, *, inside: Marks | None = None, threads: int = 0,
+    labels: Labelled, settings: FitSettings, *, inside: Marks | None = None, divide: bool = False, threads: int = 0,
     progress: Progress = silent,
 ) -> Walls:  # fmt: skip
     """Let the walls between all labels of a map come to rest half way between their voxels.
@@ -150,6 +145,8 @@ def walls_between(
         Stiffness, tolerance and most steps.
     inside : (K, J, I) bool array, optional
         The voxels that may have a label.
+    divide : bool
+        Whether voxels of thick slices are divided first.
     threads : int
     progress : callable
 
@@ -157,15 +154,15 @@ def walls_between(
     -------
     Walls
     """
-    block = LabelBlock.of(labels, inside, threads)
+    block = LabelBlock.of(labels, inside, divide=divide, threads=threads)
     net = net_between(block, threads)
-    crossings, affine = half_way(net, block, threads), labels.volume.affine
+    crossings = places_between(net, block, threads)
     fit = settle(net, crossings, settings, threads=threads, progress=progress)
-    start, mesh, fours = triangulated(net, fit, crossings, affine, threads)
+    start, mesh, fours = triangulated(net, fit, crossings, block.affine, threads)
     both = net.labels.T.ravel()
     order = np.argsort(both, kind="stable") % len(net.quads)
     first = np.append(0, np.cumsum(np.bincount(both, minlength=len(block.numbers) + 1)))
-    return Walls(affine, labels.volume.shape, block, net, crossings, fit, start, mesh, fours, order, first)
+    return Walls(block, net, crossings, fit, start, mesh, fours, order, first)
 
 
 def _links(low: NDArray[np.float64], quads: NDArray[np.int32]) -> NDArray[np.int32]:
