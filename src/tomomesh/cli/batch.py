@@ -107,6 +107,8 @@ def refuse_for_one(chosen: Namespace) -> None:
 def _checked(chosen: Namespace, settings: Settings) -> Path:
     """Return the folder of the results; refuse what does not go with many studies."""
     refuse_with("--each", SINGLE, chosen)
+    if settings.cubes.shared_walls:
+        raise UsageError("walls are shared among the labels of one map", found="--shared-walls", hint="--each-label")
     if not isinstance(chosen.study, str):
         raise UsageError("there is no folder of studies", expected="one STUDY, with --each")
     check_workers(chosen)
