@@ -97,12 +97,13 @@ def cuts_of(data: st.DataObject, slices: int) -> Cuts:
 
 
 def assert_same(found: Any, study: Study) -> None:
-    """The mesh, how many voxels were added, what the levels are and how the net came to rest are those in memory."""
+    """The mesh, what it encloses, what was added to the mask and how the net came to rest are as in memory."""
     bounded, surface = study.in_memory()
     mesh, expected = found.mesh.joined(), surface.mesh
     assert mesh.faces.tobytes() == expected.faces.tobytes()
     assert mesh.vertices.tobytes() == expected.vertices.tobytes()
     assert (found.added, found.stepped) == (bounded.added, bounded.crossings.stepped)
+    assert (found.enclosed, found.cavities) == (bounded.volumes.sum(), bounded.cavities)
     trace, before = found.trace, surface.net_fit.trace
     assert trace.speed.tolist() == before.speed.tolist()
     assert trace.converged == before.converged

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -139,9 +139,18 @@ def _counted(cells: Ints, cases: NDArray[np.uint8], own: Span) -> NDArray[np.int
     return np.array([np.bincount(layer, minlength=count), np.bincount(layer, OWNED[cases], count)]).astype(np.int64)
 
 
-def told(found: Ground) -> tuple[bool, int, bool, NDArray[np.int64]]:
-    """Return what the driver asks: whether it is unfinished, voxels added, whether anything is thin, counts."""
-    return found.unfinished, found.added, bool(found.squares.arrays[0].any()), found.layers
+class Told(NamedTuple):
+    """What the driver asks of a slab; see `Ground`."""
+
+    unfinished: bool
+    added: int
+    thin: bool
+    layers: NDArray[np.int64]
+
+
+def told_of(found: Ground) -> Told:
+    """Return it; whether the mask is thin anywhere with it."""
+    return Told(found.unfinished, found.added, bool(found.squares.arrays[0].any()), found.layers)
 
 
 def bits_of(found: Ground) -> Part:
