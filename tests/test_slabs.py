@@ -162,7 +162,7 @@ class TestContacts:
     @given(seed=seeds, share=st.sampled_from([0.12, 0.2, 0.35]), thickness=st.integers(2, 12))
     def test_noise_takes_more_rounds_than_one_halo_allows(self, seed: int, share: float, thickness: int) -> None:
         gray = np.random.default_rng(seed).random((64, size(16, 8), size(16, 8)))
-        study, slabs = Study(volume_of(gray), gray > 1 - share, 1 - share), Counted()
+        study, slabs = Study(volume_of(gray), gray > 1 - share, 1 - share), CountedSlabs()
         found = study.in_slabs(Cuts.every(64, thickness), slabs)
         assert slabs.grounds > 1
         assert_same(found, study)
@@ -176,7 +176,7 @@ class TestContacts:
         assert_same(outer.in_slabs(cuts_of(data, len(study.mask)), Shuffled(0)), outer)
 
 
-class Counted(InMemory):
+class CountedSlabsSlabs(InMemory):
     """Counts how often the slabs were looked at."""
 
     grounds = 0

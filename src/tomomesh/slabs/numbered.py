@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .parts import exchanged
-from .place import HALO, Place
+from .place import HALO, Extent
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,9 +46,9 @@ class Numbered:
         return cls(layers, vertices, squares, slabs)
 
     @property
-    def places(self) -> list[Place]:
+    def places(self) -> list[Extent]:
         """Where the slabs lie."""
-        return [Place.of(self.layers, slab, self.vertices, self.squares) for slab in range(len(self.layers))]
+        return [Extent.of(self.layers, slab, self.vertices, self.squares) for slab in range(len(self.layers))]
 
     @property
     def first(self) -> tuple[list[int], list[int]]:

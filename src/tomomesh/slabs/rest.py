@@ -28,7 +28,7 @@ BEGINNING = 4
 
 
 @dataclass(frozen=True)
-class Rest:
+class Settling:
     """A net on its way to rest.
 
     Attributes

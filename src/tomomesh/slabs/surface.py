@@ -29,13 +29,13 @@ from ..model.boxes import box_of
 from ..progress import Progress, silent
 from .contacts import AROUND, ROUNDS, cavities_in, filled, whole_of
 from .cuts import Cuts
-from .frame import Frame
+from .frame import MaskFrame
 from .ground import bits_of, cells_from, ground, runs_of, sample, squares_from, told_of
 from .mesh import SlabMesh
 from .numbered import Numbered
 from .parts import exchanged, told_by
 from .region import region
-from .rest import Rest
+from .rest import Settling
 from .triangles import chosen, piece
 
 if TYPE_CHECKING:
@@ -75,12 +75,12 @@ class Asked:
     around: Box | None = None
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> MaskFrame:
         """The box of the mask."""
         box = self.mask.box if hasattr(self.mask, "box") else box_of(self.mask, self.around)
         sizes = (box[0].stop - box[0].start, box[1].stop - box[1].start, box[2].stop - box[2].start)
         low = (box[0].start - 1, box[1].start - 1, box[2].start - 1)
-        return Frame(low, (sizes[0] + 2, sizes[1] + 2, sizes[2] + 2), tuple(self.mask.shape))
+        return MaskFrame(low, (sizes[0] + 2, sizes[1] + 2, sizes[2] + 2), tuple(self.mask.shape))
 
     @property
     def levels(self) -> Levels:
@@ -154,13 +154,13 @@ def surface_in_slabs(
     regions = slabs.each(partial(region, frame=frame, threads=threads), net.places, cells)
     del found, cells  # they would take the disk
     thin = any(one.thin for one in told)
-    state, rest, trace = Rest(net, regions, squares, thin, springs, settings, slabs, progress).reached()
+    state, rest, trace = Settling(net, regions, squares, thin, springs, settings, slabs, progress).reached()
     mesh = _meshed(net, regions, squares, state, rest, asked.affine, slabs)
     added = sum(one.added for one in told)
     return SlabSurface(mesh, added, solid.count, cavities_in(solid), even, trace)
 
 
-def _layers(cuts: Cuts, frame: Frame) -> Cuts:
+def _layers(cuts: Cuts, frame: MaskFrame) -> Cuts:
     """Return where the layers of cells of a frame are cut: those between a slab's slices and their next ones are its.
 
     The layer below its first slice is the first slab's; slabs that have none are left out.
@@ -170,18 +170,18 @@ def _layers(cuts: Cuts, frame: Frame) -> Cuts:
     return Cuts(tuple(sorted({0, *places, last})))
 
 
-def _grounded(asked: Asked, frame: Frame, layers: Cuts, slabs: Slabs, threads: int) -> tuple[list[Kept], RunMask]:
+def _grounded(asked: Asked, frame: MaskFrame, layers: Cuts, slabs: Slabs, threads: int) -> tuple[list[Kept], RunMask]:
     """Look at the mask, as often as its contacts take rounds of joining, and again if it is to be filled.
 
     Returns
     -------
     found : list
-        What is kept of a `Ground` a slab.
+        What is kept of a `SlabMask` a slab.
     solid : RunMask
         The mask whose boundary it is, in the frame.
     """
     around = [layers.around(slab, AROUND) for slab in range(len(layers))]
-    masks = [asked.part(*frame.held(start, stop + 1)) for start, stop in around]
+    masks = [asked.part(*frame.mask_slices(start, stop + 1)) for start, stop in around]
     columns = masks, [_slices(asked, frame, *one) for one in around], layers.own, around
     work = partial(ground, frame=frame, levels=asked.levels, threads=threads)
     joins, numbers = partial(work, rounds=ROUNDS if len(layers) > 1 else np.inf), np.arange(layers.places[-1] + 1)
@@ -201,16 +201,16 @@ def _grounded(asked: Asked, frame: Frame, layers: Cuts, slabs: Slabs, threads: i
     return slabs.each(partial(work, rounds=0), *columns, bits(), solid), whole
 
 
-def _mask_of(found: list[Kept], frame: Frame, slabs: Slabs) -> RunMask:
+def _mask_of(found: list[Kept], frame: MaskFrame, slabs: Slabs) -> RunMask:
     """Return the whole mask as it is now, in the frame."""
     return whole_of(slabs.fetch(slabs.each(partial(runs_of, shape=frame.shape[1:]), found)))
 
 
-def _slices(asked: Asked, frame: Frame, start: int, stop: int) -> Any:
+def _slices(asked: Asked, frame: MaskFrame, start: int, stop: int) -> Any:
     """Return the slices of the volume around layers of a frame."""
     if asked.voxels is None:
         return None
-    low, high = frame.looked_at(start, stop)
+    low, high = frame.level_slices(start, stop)
     return asked.voxels[low:high]
 
 
