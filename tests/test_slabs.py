@@ -176,7 +176,7 @@ class TestContacts:
         assert_same(outer.in_slabs(cuts_of(data, len(study.mask)), Shuffled(0)), outer)
 
 
-class CountedSlabsSlabs(InMemory):
+class CountedSlabs(InMemory):
     """Counts how often the slabs were looked at."""
 
     grounds = 0

@@ -62,8 +62,8 @@ class SlabMask:
 
 
 def ground(
-    mask: Any, voxels: Any, own: Span, halo: Span, bits: Sequence[Part], solid: Any, *, frame: MaskFrame, levels: Levels,
-    rounds: float, threads: int = 1,
+    mask: Any, voxels: Any, own: Span, halo: Span, bits: Sequence[Part], solid: Any, *, frame: MaskFrame,
+    levels: Levels, rounds: float, threads: int = 1,
 ) -> SlabMask:  # fmt: skip
     """Look at a slab and its halo.
 
@@ -72,7 +72,7 @@ def ground(
     mask : (k, J, I) bool array, or RunMask
         The slices of the volume that are `MaskFrame.mask_slices` between those of the halo.
     voxels : (k, J, I[, L]) array, LazyVoxels or None
-        The slices of the volume that are `MaskFrame.level_slices` around the halo; with None the levels are the mask's own.
+        The slices of the volume that are `MaskFrame.level_slices` around the halo; with None the mask is all there is.
     own, halo : (int, int)
         Layers of cells in the frame: those of the slab, and those and its halo. A layer's cells lie between the voxels
         of a slice with its number and those of the next.
