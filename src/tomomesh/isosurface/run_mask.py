@@ -138,9 +138,9 @@ class RunMask:
         if not len(self.starts):
             return slice(0, 0), slice(0, 0), slice(0, 0)
         j = np.unique(self.rows % self.shape[1])
-        ends = (self.rows[0], self.rows[-1]) // np.int64(self.shape[1])
+        first, last = (int(row) // self.shape[1] for row in self.rows[[0, -1]])
         columns = slice(int(self.starts.min()), int(self.stops.max()))
-        return slice(int(ends[0]), int(ends[1]) + 1), slice(int(j[0]), int(j[-1]) + 1), columns
+        return slice(first, last + 1), slice(int(j[0]), int(j[-1]) + 1), columns
 
     def areas(self, axis: int = 0) -> Longs:
         """Count its voxels on each plane across an axis of (K, J, I)."""

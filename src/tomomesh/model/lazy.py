@@ -92,8 +92,8 @@ class LazyVoxels(NDArrayOperatorsMixin):
     Examples
     --------
     >>> import numpy as np
-    >>> from tomomesh.model.lazy import Held, LazyVoxels
-    >>> stored = LazyVoxels.of(Held(np.arange(24).reshape(4, 3, 2)))
+    >>> from tomomesh.model.lazy import ArraySource, LazyVoxels
+    >>> stored = LazyVoxels.of(ArraySource(np.arange(24).reshape(4, 3, 2)))
     >>> part = stored.transpose((2, 0, 1))[:, ::-1]
     >>> part.shape, part[1].tolist()
     ((2, 4, 3), [[19, 21, 23], [13, 15, 17], [7, 9, 11], [1, 3, 5]])
@@ -122,6 +122,11 @@ class LazyVoxels(NDArrayOperatorsMixin):
     def dtype(self) -> np.dtype[Any]:
         """Of the numbers."""
         return self.source.dtype
+
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Sizes along the axes of what is read together."""
+        return tuple(self.source.chunks[axis] for axis in self.order)
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -182,7 +187,7 @@ Voxels = TypeVar("Voxels", "NDArray[Any]", LazyVoxels)
 
 
 @dataclass(frozen=True)
-class Held:
+class ArraySource:
     """An array in memory, or whatever takes slices as one does, as what is stored.
 
     Attributes
@@ -227,7 +232,7 @@ def slabs(voxels: NDArray[Any] | LazyVoxels) -> Iterator[NDArray[Any]]:
         yield voxels
         return
     depth = max(SLAB_BYTES // max(math.prod(voxels.shape[1:]) * voxels.dtype.itemsize, 1), 1)
-    depth -= depth % min(voxels.source.chunks[voxels.order[0]], depth)
+    depth -= depth % min(voxels.chunks[0], depth)
     for start in range(0, len(voxels), depth):
         yield voxels[start : start + depth].read()
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from .otsu import two_classes
 from .slabwise.cut import HERE
-from .slabwise.levels import levels_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,10 +64,10 @@ class Padding:
     def within(self, levels: NDArray[Any], box: Box) -> Mask:
         """Return which levels (k, j, i[, L]) of a box of the study are padding."""
         named = None if self.named is None else (levels >= self.named[0]) & (levels <= self.named[1])
-        found = self._by_looks(levels, box)
+        found = self._guessed(levels, box)
         return np.asarray(found if named is None else named if found is None else named | found)
 
-    def _by_looks(self, levels: NDArray[Any], box: Box) -> Mask | None:
+    def _guessed(self, levels: NDArray[Any], box: Box) -> Mask | None:
         if self.lines is None:
             return None if self.level is None else np.asarray(levels == self.level)
         places = tuple(slice(None) if axis == self.axis else side for axis, side in enumerate(box))
@@ -103,7 +102,7 @@ def padding_in(cut: Cut, named: tuple[float, float] | None, *, guessed: bool) ->
     found = guessed_padding(cut) if guessed else None
     if named is None:
         return found
-    held = sum(cut.each(partial(_counted, Padding(named))))
+    held = cut.sum(partial(_counted, Padding(named)))
     return replace(found or Padding(), named=named) if 0 < held < np.prod(cut.voxels.shape) else found
 
 
@@ -126,7 +125,7 @@ def guessed_padding(cut: Cut) -> Padding | None:
     if cut.voxels.ndim != 3:
         return None
     corners = [cut.voxels[end][:: max(1, cut.shape[1] - 1), :: max(1, cut.shape[2] - 1)] for end in (0, -1)]
-    levels = levels_in(cut)
+    levels = cut.levels
     held = np.unique(corners).tolist()
     for level, count in zip(held, levels.count(held), strict=True):
         if LEAST <= count / levels.size <= MOST:
@@ -162,15 +161,19 @@ def _lines(level: float, cut: Cut) -> tuple[int, Mask]:
 
 def _full(levels: NDArray[Any], box: Box, *, level: float) -> list[Mask]:
     held = np.asarray(levels == level)
-    return [held.all(axis=axis, keepdims=True) for axis in range(3)]
+    return [np.asarray(held.all(axis=axis, keepdims=True)) for axis in range(3)]
 
 
 def _drawn(level: float, size: int, cut: Cut) -> bool:
     """Tell whether the levels beside one, so many, have no noise; few of them are looked at, in even steps."""
-    every = max(1, size // LOOKED_AT)
-    before = accumulate(cut.each(partial(_others, level=level)), initial=0)
-    some = np.concatenate(cut.each(partial(_some, level=level, every=every), list(before)[:-1]))
+    some = beside(level, max(1, size // LOOKED_AT), cut)
     return bool(np.unique(some, return_counts=True)[1].max() > CONSTANT * len(some))
+
+
+def beside(level: float, every: int, cut: Cut) -> NDArray[Any]:
+    """Return every n-th of the levels of a study that are not a given one, in their order."""
+    before = accumulate(cut.each(partial(_others, level=level)), initial=0)
+    return np.concatenate(list(cut.each(partial(_some, level=level, every=every), list(before)[:-1])))
 
 
 def _others(levels: NDArray[Any], box: Box, *, level: float) -> int:
@@ -193,8 +196,8 @@ def as_background(cut: Cut, padding: Padding) -> tuple[Cut, int, int]:
     """
     lows, highs = zip(*cut.each(partial(_lowest, padding)), strict=True)
     lowest = np.minimum.reduce([low for low in lows if low is not None] + [np.maximum.reduce(highs)])
-    counts = np.sum(cut.each(partial(_changed, padding, lowest)), axis=0)
-    return cut.made(partial(_replaced, padding, lowest), cut.voxels.dtype), int(counts[0]), int(counts[1])
+    changed, named = map(int, cut.sum(partial(_changed, padding, lowest)))
+    return cut.made(partial(_replaced, padding, lowest), lowest.dtype), changed, named
 
 
 def _lowest(padding: Padding, levels: NDArray[Any], box: Box) -> tuple[Any, Any]:
@@ -202,10 +205,10 @@ def _lowest(padding: Padding, levels: NDArray[Any], box: Box) -> tuple[Any, Any]
     return others.min() if others.size else None, levels.max()
 
 
-def _changed(padding: Padding, lowest: Any, levels: NDArray[Any], box: Box) -> tuple[int, int]:
+def _changed(padding: Padding, lowest: Any, levels: NDArray[Any], box: Box) -> NDArray[np.int64]:
     changed = padding.within(levels, box) & (levels != lowest)
     named = np.asarray(False) if padding.named is None else Padding(padding.named).within(levels, box)
-    return int(np.count_nonzero(changed)), int(np.count_nonzero(changed & named))
+    return np.array([np.count_nonzero(changed), np.count_nonzero(changed & named)])
 
 
 def _replaced(padding: Padding, lowest: Any, levels: NDArray[Any], box: Box) -> NDArray[Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import GeometryError, UsageError
 from ..model.volume import AXES, Volume, order_along
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured
 from .body import Cleaned
 from .crop import crop, inside_roi
 from .grid import onto_grid
@@ -137,15 +137,9 @@ def _check_labelled(labels: Volume | None, settings: Settings, *, labelled: bool
 
 
 def select_in(study: LaidOut, settings: Settings) -> Stage[Selected]:
-    """Choose voxels of a study by gray level or label.
-
-    Raises
-    ------
-    UsageError, EmptyError
-        As `choose`.
-    """
-    chosen = _choose(study, settings)
-    notes = study.notes + _dropped(chosen, settings) + _sparse(chosen) + _cut_off(chosen.value)
+    """Choose voxels of a study by gray level or label; raises as `choose` does."""
+    chosen = measured("window", choose, study.volume, study.labels, settings, study.inside, study.cutting)
+    notes = study.notes + _dropped(chosen.value, settings) + _cut_off(chosen.value)
     section = _section(study.volume, study.plane, study.cropped, notes)
     doubt = () if study.labels is None else doubted(study.labels)
     warnings = (*_doubts(chosen.value, settings, study.cutting), *doubt)
@@ -169,18 +163,13 @@ def _fitting(labels: Volume, volume: Volume, cutting: Cutting) -> Volume:
     """Lay a label map onto the study's grid."""
     labels = whole(labels, cutting)
     try:
-        return onto_grid(labels, volume)
+        return onto_grid(labels, volume, cutting)
     except GeometryError as fault:
         if option := volume.other_frame or labels.other_frame:
             whose = "study" if volume.other_frame else "label map"
             fault.args = (f"{fault} Or: {option}, for the {whose} holds two frames that disagree.",)
             fault.flags += (option.split()[0],)
         raise
-
-
-@timed("window")
-def _choose(study: LaidOut, settings: Settings) -> Stage[Chosen]:
-    return Stage(choose(study.volume, study.labels, settings, study.inside, study.cutting))
 
 
 def _section(study: Volume, plane: str, cropped: dict[str, list[int]] | None, notes: tuple[str, ...]) -> dict[str, Any]:
@@ -206,14 +195,15 @@ def _cropped(box: tuple[slice, ...], sizes: tuple[int, int, int]) -> dict[str, l
     return None if whole else dict(zip(("slices", "rows", "columns"), kept, strict=True))
 
 
-def _dropped(chosen: Stage[Chosen], settings: Settings) -> tuple[str, ...]:
-    """Say which components a guess has left out."""
-    found = chosen.value.counts
+def _dropped(chosen: Chosen, settings: Settings) -> tuple[str, ...]:
+    """Say which components a guess has left out, and what there is to say of slices without labels."""
+    found, told = chosen.counts, (chosen.told,) if chosen.told else ()
     if not found.dropped or settings.window.keep != "auto":
-        return ()
+        return told
     return (
         f"{found.dropped} of {found.components} components of the window ({found.dropped_voxels} voxels) were "
         "left out, which lie in nothing that is 12 mm thick, as a scanner's table: --keep all keeps them",
+        *told,
     )
 
 
@@ -224,10 +214,6 @@ def _cut_off(chosen: Chosen) -> tuple[str, ...]:
     return (
         (f"the window is cut off at the {' and the '.join(ends)} slice: the surface is closed there",) if ends else ()
     )
-
-
-def _sparse(chosen: Stage[Chosen]) -> tuple[str, ...]:
-    return (chosen.value.told,) if chosen.value.told else ()
 
 
 def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:
@@ -297,7 +283,7 @@ def _doubts(chosen: Chosen, settings: Settings, cutting: Cutting) -> list[str]:
             f"most of the window ({counts.spared_voxels} of {counts.window} voxels) lies in nothing that is "
             "12 mm thick, and was kept for all that: --keep body leaves it out"
         )
-    if chosen_by(settings) == "otsu" and len(labels_counted(cutting.of(chosen.volume.voxels), APART)) > 1:
+    if chosen_by(settings) == "otsu" and len(labels_counted(cutting.of(chosen.volume.voxels[::APART]))) > 1:
         warnings.append("labels of a label map were taken for gray levels: --select chooses labels")
     if any(_edges(chosen)[2:]):
         warnings.append("the window touches the border of the slices: the surface is closed along it")

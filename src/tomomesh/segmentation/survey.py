@@ -33,7 +33,7 @@ OBLONG = 0.01
 """Part by which the sides of a pixel may differ without a remark. Only a remark depends on it."""
 FAR = 4.0
 """How many times as wide as the bulk of the levels (`segmentation.slabwise.levels.TAILS`) their whole range is from
-which on the histogram is that of the bulk. Only a picture depends on it: the bulk keeps a quarter of the bars at least."""
+which on the histogram is that of the bulk. Only a picture depends on it: a quarter of the bars at least is its."""
 AIR = PRESETS_HU["skin"][0]
 """Where 2 % of the levels are below this, those without a unit may be Hounsfield units. Only suggestions need it."""
 THICK = 5
@@ -106,11 +106,8 @@ def _windows(volume: Volume, measured: Levels, padded: NDArray[np.bool_] | None)
             limit = otsu_levels(measured, classes)[-1]
             limits |= {} if limit in limits.values() else {f"otsu of {classes}": limit}
     windows = {name: (limit, np.inf) for name, limit in limits.items()}
-    windows |= (
-        PRESETS_HU
-        if may_be_ct(volume, volume.voxels.min()) and (volume.unit == "HU" or measured.bulk()[0] < AIR)
-        else {}
-    )
+    ct = may_be_ct(volume, volume.voxels.min()) and (volume.unit == "HU" or measured.bulk()[0] < AIR)
+    windows |= PRESETS_HU if ct else {}
     return {name: _window(volume.voxels, *bounds) for name, bounds in windows.items()}
 
 

@@ -12,7 +12,7 @@ from ..isosurface.run_mask import RunMask
 from .labels import labels_counted
 from .otsu import otsu_threshold
 from .slabwise.cut import HERE
-from .slabwise.levels import gathered, levels_in
+from .slabwise.levels import gathered
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -85,7 +85,7 @@ def window(volume: Volume, *, lower: Limit = -np.inf, upper: Limit = np.inf, lay
 def window_in(cut: Cut, *, lower: Limit = -np.inf, upper: Limit = np.inf, layers: str = "all") -> RunMask:
     """Return the window of a study in slabs; parameters and errors are those of `window`."""
     _check_limits(cut.voxels, lower, upper)
-    found = RunMask.joined(cut.each(partial(_kept_in, lower=lower, upper=upper, layers=layers)))
+    found = cut.runs(partial(_kept_in, lower=lower, upper=upper, layers=layers))
     if not found.count:
         hint = "--layers any, or " if cut.voxels.ndim == 4 and layers == "all" else ""
         low, high = cut.ends
@@ -207,14 +207,14 @@ def otsu_thresholds(volume: Volume, padded: NDArray[np.bool_] | None = None) -> 
 def otsu_in(cut: Cut, padded: Padding | None = None) -> Limit:
     """Return Otsu's threshold of a gray study in slabs, without its padding, or those of the layers of a color one."""
     if cut.voxels.ndim == 3:
-        return otsu_threshold(levels_in(cut) if padded is None else _beside(cut, padded))
-    layers = [levels_in(cut, n) for n in range(cut.voxels.shape[3])]
+        return otsu_threshold(cut.levels if padded is None else _beside(cut, padded))
+    layers = [cut.layer(n) for n in range(cut.voxels.shape[3])]
     return np.array([otsu_threshold(one) if one.ends[0] < one.ends[1] else -np.inf for one in layers])
 
 
 def _beside(cut: Cut, padded: Padding) -> Levels:
     """Look at the levels that are no padding."""
-    return gathered(lambda work: cut.each(partial(_unpadded, work, padded)))
+    return gathered(lambda work: cut.sum(partial(_unpadded, work, padded)), cut.voxels.dtype)
 
 
 def _unpadded(work: Looked, padded: Padding, levels: NDArray[Any], box: Box) -> Any:

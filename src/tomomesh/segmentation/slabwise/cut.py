@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...isosurface.run_mask import RunMask
 from ...model.lazy import LazyVoxels, in_memory
+from .levels import Counted, gathered
 from .sources import Made
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from ...isosurface.run_mask import RunMask
     from ...model.boxes import Box
     from ...slabs.keep import Slabs
+    from .levels import Levels, Looked
     from .sources import Making, Voxels
 
 TOGETHER = 2**21
 """Voxels of a slab where the study is in memory: what is made of each stays in the cache of a core, and bounds what is
 made besides. No result depends on it."""
+
+
+AT_ONCE = 32
+"""Slabs of which what was found is brought here at once: 16 MiB of counts of levels. No result depends on it."""
 
 
 def thin_cuts(shape: tuple[int, ...]) -> list[int]:
@@ -71,7 +77,7 @@ class Cut:
         As of `Cutting`.
     """
 
-    voxels: Voxels
+    voxels: Any
     cuts: tuple[int, ...]
     slabs: Slabs | None = None
 
@@ -91,8 +97,8 @@ class Cut:
         inner = [place - start for place in self.cuts if start < place < stop]
         return replace(self, voxels=self.voxels[box], cuts=(0, *inner, stop - start))
 
-    def each(self, work: Callable[..., Any], *columns: Iterable[Any]) -> list[Any]:
-        """Return what is found in each slab.
+    def each(self, work: Callable[..., Any], *columns: Iterable[Any]) -> Iterator[Any]:
+        """Hand over what is found in each slab, one after the other.
 
         Parameters
         ----------
@@ -105,8 +111,19 @@ class Cut:
         boxes = self.boxes
         parts = [self.voxels[box[0]] for box in boxes]
         if self.slabs is None:
-            return [work(in_memory(part), *rest) for part, *rest in zip(parts, boxes, *columns, strict=True)]
-        return list(self.slabs.fetch(self.slabs.each(partial(_read_first, work), parts, boxes, *map(list, columns))))
+            yield from (work(in_memory(part), *rest) for part, *rest in zip(parts, boxes, *columns, strict=True))
+            return
+        kept = self.slabs.each(partial(_read_first, work), parts, boxes, *map(list, columns))
+        for first in range(0, len(kept), AT_ONCE):
+            yield from self.slabs.fetch(kept[first : first + AT_ONCE])
+
+    def sum(self, work: Callable[..., Any], *columns: Iterable[Any]) -> Any:
+        """Add up what is found in all slabs: numbers or arrays; parameters are those of `each`."""
+        return reduce(np.add, self.each(work, *columns))
+
+    def runs(self, work: Callable[..., RunMask], *columns: Iterable[Any]) -> RunMask:
+        """Put the masks that are found in all slabs over one another; parameters are those of `each`."""
+        return RunMask.joined(list(self.each(work, *columns)))
 
     def over(self, mask: RunMask) -> list[RunMask]:
         """Return what lies of a mask in each slab: a column."""
@@ -129,24 +146,38 @@ class Cut:
             found[box[0]] = work(self.voxels[box[0]], box)
         return replace(self, voxels=found)
 
-    def sampled(self, every: Sequence[int]) -> NDArray[Any]:
-        """Return every n-th voxel along each axis (K, J, I), brought here."""
-        return np.concatenate(self.each(partial(_every, every=tuple(every))))
+    def sampled(self, *every: Sequence[int]) -> list[NDArray[Any]]:
+        """Return every n-th voxel along each axis (K, J, I), brought here, for one or several choices of n."""
+        return [np.concatenate(parts) for parts in zip(*self.each(partial(_every, every=every)), strict=True)]
 
     @cached_property
-    def ends(self) -> tuple[Any, Any]:
+    def levels(self) -> Levels:
+        """What percentiles and histograms of all gray levels follow from."""
+        return self.layer(None)
+
+    def layer(self, number: int | None) -> Levels:
+        """Return the same of one layer of a study in color."""
+        return gathered(lambda work: self.sum(partial(_alone, work, number)), self.voxels.dtype)
+
+    @cached_property
+    def ends(self) -> tuple[float, float]:
         """The lowest and the highest level, NaN where any is NaN."""
+        if isinstance(self.levels, Counted):
+            return self.levels.ends
         lows, highs = zip(*self.each(_ends), strict=True)
-        return np.minimum.reduce(lows), np.maximum.reduce(highs)
+        return float(np.minimum.reduce(lows)), float(np.maximum.reduce(highs))
 
 
 def _read_first(work: Callable[..., Any], part: Voxels, *rest: Any) -> Any:
     return work(in_memory(part), *rest)
 
 
-def _every(levels: NDArray[Any], box: Box, *, every: tuple[int, ...]) -> NDArray[Any]:
-    first = -box[0].start % every[0]
-    return np.array(levels[first :: every[0], :: every[1], :: every[2]])
+def _every(levels: NDArray[Any], box: Box, *, every: Sequence[Sequence[int]]) -> list[NDArray[Any]]:
+    return [np.array(levels[-box[0].start % k :: k, ::j, ::i]) for k, j, i in every]
+
+
+def _alone(work: Looked, layer: int | None, levels: NDArray[Any], box: Box) -> Any:
+    return work(levels if layer is None else levels[..., layer])
 
 
 def _ends(levels: NDArray[Any], box: Box) -> tuple[Any, Any]:

@@ -9,25 +9,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+
+from .keys import DIGIT, bits_of, count_bits, digit_counts, key_of, level_of, plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from ...model.boxes import Box
-    from .cut import Cut
-
     Ints = NDArray[np.int64]
     Looked = Callable[[NDArray[Any]], Any]
-    Each = Callable[[Looked], list[Any]]
-    Levels = "Counted | Ordered"
+    Sum = Callable[[Looked], Any]
+    Levels: TypeAlias = "Counted | Ordered"
 
-DIGIT = 16
-"""Bits that are looked at in one pass: counts of all of them take 512 KiB, and stay in the cache of a core."""
 TAILS = (2.0, 0.01)
 """Percents of the levels at each end that have no say in the range of the histogram, tried in turn. 2 % are twice the
 hot or metal voxels that the threshold must withstand. Where the rest is one class, a small object may lie in the tails:
@@ -37,99 +34,23 @@ than a bin."""
 
 def levels_of(levels: Levels | NDArray[Any]) -> Levels:
     """Look at gray levels in memory, of any shape; what was looked at stays as it is."""
-    return levels if isinstance(levels, Counted | Ordered) else gathered(lambda work: [work(levels)])
+    return levels if isinstance(levels, Counted | Ordered) else gathered(lambda work: work(levels), levels.dtype)
 
 
-def levels_in(cut: Cut, layer: int | None = None) -> Levels:
-    """Look at the gray levels of a study, or of one of its layers."""
-    return gathered(lambda work: cut.each(partial(_alone, work, layer)))
-
-
-def gathered(each: Each) -> Levels:
+def gathered(total: Sum, dtype: np.dtype[Any]) -> Levels:
     """Look at gray levels in slabs.
 
     Parameters
     ----------
-    each : callable
+    total : callable
         Has a function of a module, or a partial of one, look at the levels of every slab, one slab at least, in an
-        array of any shape; hands over what is found.
+        array of any shape; adds up the arrays of numbers that are found.
+    dtype : dtype
+        Of the levels.
     """
-    looks = each(_look)
-    counts = np.sum([counts for _, counts in looks], axis=0)
-    kind = looks[0][0]
-    return Counted(counts, int(np.iinfo(kind).min)) if _is_short(kind) else Ordered(counts, kind, each)
-
-
-def _alone(work: Looked, layer: int | None, levels: NDArray[Any], box: Box) -> Any:
-    return work(levels if layer is None else levels[..., layer])
-
-
-def _is_short(kind: np.dtype[Any]) -> bool:
-    return kind.kind in "iu" and 8 * kind.itemsize <= DIGIT
-
-
-def _look(levels: NDArray[Any]) -> tuple[np.dtype[Any], Ints]:
-    """Count levels by the first bits of their keys, which are all that short integers have."""
-    levels = _plain(levels)
-    return levels.dtype, _digits(levels, [0], 0)[0]
-
-
-def _plain(levels: NDArray[Any]) -> NDArray[Any]:
-    """Take truths for numbers, and longer floats than of 64 bits for those."""
-    levels = levels.view(np.uint8) if levels.dtype.kind == "b" else levels
-    return levels.astype(np.float64) if levels.dtype.itemsize > 8 else levels
-
-
-def _digits(levels: NDArray[Any], begun: Sequence[int], depth: int) -> Ints:
-    """Count levels whose keys begin with some digits by their next digit, (b, 65536); of 8 bits there are 256."""
-    levels = _plain(levels)
-    kind, width = levels.dtype, 8 * levels.dtype.itemsize
-    bits, digit = levels.view(f"{kind.byteorder}u{kind.itemsize}"), min(width, DIGIT)
-    below = width - digit * (depth + 1)
-    heads = bits >> (below + digit) if depth else bits
-    counts = np.empty((len(begun), 1 << digit), np.int64)
-    for n, first in enumerate(begun):
-        held = bits[heads == _turned(first, digit * depth, kind)] if depth else bits
-        held = (held >> below) & ((1 << digit) - 1) if width > digit else held
-        found = np.bincount(held.ravel().astype(np.int64), minlength=1 << digit)
-        counts[n] = _in_order(found, first >> (digit * depth - 1) if depth else None, kind)
-    return counts
-
-
-def _turned(key: int, width: int, kind: np.dtype[Any]) -> int:
-    """Return the first bits of levels, so many, whose keys begin with others.
-
-    Keys are integers without a sign in the order of the levels; NaN lies beyond what is infinite.
-    """
-    first = 1 << (width - 1)
-    if kind.kind == "u":
-        return key
-    return key ^ first if kind.kind == "i" or key & first else key ^ (2 * first - 1)
-
-
-def _in_order(counts: Ints, sign: int | None, kind: np.dtype[Any]) -> Ints:
-    """Bring counts of digits into the order of keys: of first digits, or of those of keys whose first bit is known."""
-    if sign is not None:
-        return counts[::-1] if kind.kind == "f" and not sign else counts
-    low, high = np.split(counts, 2)
-    return counts if kind.kind == "u" else np.concatenate([high[::-1] if kind.kind == "f" else high, low])
-
-
-def _key(level: float, kind: np.dtype[Any]) -> int:
-    """Return the key of a level."""
-    bits = int(np.array([level], f"{kind.kind}{kind.itemsize}").view(f"u{kind.itemsize}")[0])
-    first = 1 << (8 * kind.itemsize - 1)
-    return (
-        _turned(bits, 8 * kind.itemsize, kind)
-        if kind.kind != "f"
-        else bits ^ (2 * first - 1 if bits & first else first)
-    )
-
-
-def _level(key: int, kind: np.dtype[Any]) -> float:
-    """Return the level of a key."""
-    bits = np.array([_turned(key, 8 * kind.itemsize, kind)], f"u{kind.itemsize}")
-    return float(bits.view(f"{kind.kind}{kind.itemsize}")[0])
+    kind, counts = plain(np.empty(0, dtype)).dtype, total(partial(digit_counts, begun=[0], depth=0))[0]
+    short = kind.kind in "iu" and 8 * kind.itemsize <= DIGIT
+    return Counted(counts, int(np.iinfo(kind).min)) if short else Ordered(counts, kind, total)
 
 
 @dataclass(frozen=True)
@@ -198,7 +119,7 @@ class Ordered:
     heads : (65536,) int64 array
         How many levels there are by the first 16 bits of their keys.
     kind : dtype
-    each : callable
+    total : callable
         As of `gathered`.
     absent : mapping of int to int
         Keys of what is left out, and how often each is seen.
@@ -206,7 +127,7 @@ class Ordered:
 
     heads: Ints
     kind: np.dtype[Any]
-    each: Each
+    total: Sum
     absent: Mapping[int, int] = field(default_factory=dict)
 
     @cached_property
@@ -224,20 +145,20 @@ class Ordered:
         """What is finite of it."""
         if self.kind.kind != "f":
             return self
-        low, high = (_key(end, self.kind) >> (8 * self.kind.itemsize - DIGIT) for end in (-np.inf, np.inf))
+        low, high = (key_of(end, self.kind) >> (8 * self.kind.itemsize - DIGIT) for end in (-np.inf, np.inf))
         heads = np.zeros_like(self.heads)
         heads[low + 1 : high] = self.heads[low + 1 : high]
         return replace(self, heads=heads)
 
     def count(self, levels: Sequence[float]) -> list[int]:
         """Count levels."""
-        return np.sum(self.each(partial(_count, sought=levels)), axis=0).tolist()
+        return [int(count) for count in self.total(partial(_count, sought=levels))]
 
     def without(self, level: float) -> Ordered:
         """Return all but a level."""
-        keys = sorted({_key(one, self.kind) for one in ((0.0, -0.0) if level == 0 else (level,))})
-        bits = [_turned(key, 8 * self.kind.itemsize, self.kind) for key in keys]
-        absent = dict(zip(keys, np.sum(self.each(partial(_count_bits, sought=bits)), axis=0).tolist(), strict=True))
+        keys = sorted({key_of(one, self.kind) for one in ((0.0, -0.0) if level == 0 else (level,))})
+        bits = [bits_of(key, 8 * self.kind.itemsize, self.kind) for key in keys]
+        absent = dict(zip(keys, self.total(partial(count_bits, sought=bits)).tolist(), strict=True))
         return replace(self, heads=self._less(self.heads[None], [0], 0, absent)[0], absent=absent)
 
     def bulk(self, tail: float = TAILS[0]) -> tuple[float, float]:
@@ -249,7 +170,7 @@ class Ordered:
         tails = (0.0, *TAILS)
         shares = np.array([(tail, 100 - tail) for tail in tails]) / 100
         ranks = np.ceil(shares * self.size - 1).clip(0).astype(np.int64)
-        levels = [_level(key, self.kind) for key in self._keys_at(ranks.ravel())]
+        levels = [level_of(key, self.kind) for key in self._keys_at(ranks.ravel())]
         if np.isnan([levels[0], levels[1]]).any():  # as NaN lies beyond all others
             levels = [np.nan] * len(levels)
         return dict(zip(tails, zip(levels[::2], levels[1::2], strict=True), strict=True))
@@ -261,7 +182,7 @@ class Ordered:
         for depth in range(8 * self.kind.itemsize // DIGIT):
             if depth:
                 begun = sorted(set(keys))
-                counts = np.sum(self.each(partial(_digits, begun=begun, depth=depth)), axis=0)
+                counts = self.total(partial(digit_counts, begun=begun, depth=depth))
                 counts = self._less(counts, begun, depth, self.absent)
             number = np.cumsum(counts, axis=1)
             for n, key in enumerate(keys):
@@ -283,19 +204,14 @@ class Ordered:
 
     def histogram(self, low: float, high: float, bins: int) -> Ints:
         """Count the levels in equal bins."""
-        gone = np.array([_level(key, self.kind) for key in self.absent], self.kind)
+        gone = np.array([level_of(key, self.kind) for key in self.absent], self.kind)
         less = np.histogram(gone, bins, (low, high), weights=np.array([*self.absent.values()], np.int64))[0]
-        return np.sum(self.each(partial(_histogram, low=low, high=high, bins=bins)), axis=0) - less.astype(np.int64)
+        every = self.total(partial(_histogram, low=low, high=high, bins=bins))
+        return np.asarray(every - less.astype(np.int64))
 
 
-def _count(levels: NDArray[Any], *, sought: Sequence[float]) -> list[int]:
-    return [int(np.count_nonzero(levels == level)) for level in sought]
-
-
-def _count_bits(levels: NDArray[Any], *, sought: Sequence[int]) -> list[int]:
-    levels = _plain(levels)
-    bits = levels.view(f"{levels.dtype.byteorder}u{levels.dtype.itemsize}")
-    return [int(np.count_nonzero(bits == one)) for one in sought]
+def _count(levels: NDArray[Any], *, sought: Sequence[float]) -> Ints:
+    return np.array([np.count_nonzero(levels == level) for level in sought])
 
 
 def _histogram(levels: NDArray[Any], *, low: float, high: float, bins: int) -> Ints:

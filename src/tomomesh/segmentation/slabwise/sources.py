@@ -1,4 +1,4 @@
-"""Voxels that are made once they are read: of others in the same place, or of a mask of runs."""
+"""Voxels that are made once they are read: of others in the same place or elsewhere, or of a mask of runs."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from ...model.lazy import in_memory
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -48,7 +50,7 @@ class Made:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class MaskVoxels:
     """A mask of runs as voxels of 1 and 0."""
 
     mask: RunMask
@@ -67,3 +69,46 @@ class Drawn:
         """Draw a part of it."""
         slices = self.mask[box[0].start : box[0].stop]
         return np.asarray(slices[(slice(None, None, box[0].step), *box[1:])]).view(np.uint8)
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Voxels in a larger lattice that holds 0 around them.
+
+    Attributes
+    ----------
+    voxels : (k, j, i) array
+        In memory, or read part by part.
+    low : (int, int, int)
+        Where the first of them lies.
+    shape : (int, int, int)
+        Of the lattice.
+    """
+
+    voxels: Voxels
+    low: tuple[int, ...]
+    shape: tuple[int, ...]
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """That of the voxels."""
+        return self.voxels.dtype
+
+    def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
+        """Return the voxels of a part."""
+        places = [range(self.shape[axis])[side] for axis, side in enumerate(box)]
+        found = np.zeros(tuple(map(len, places)), self.dtype)
+        sides = list(zip(places, self.low, self.voxels.shape, strict=True))
+        held = [slice(_from(place, low), _from(place, low + size)) for place, low, size in sides]
+        inner = [place[part] for place, part in zip(places, held, strict=True)]
+        if all(map(len, inner)):
+            own = (
+                slice(one.start - low, one[-1] + 1 - low, one.step) for one, low in zip(inner, self.low, strict=True)
+            )
+            found[tuple(held)] = in_memory(self.voxels[tuple(own)])
+        return found
+
+
+def _from(places: range, low: int) -> int:
+    """Return how many places lie before one."""
+    return min(max(0, -((places.start - low) // places.step)), len(places))
