@@ -156,20 +156,12 @@ def put_away(value: Any, file: File) -> Any:
 
 
 def mapped(value: Any, *, own: bool = False) -> Any:
-<<<<<<< HEAD
-    """Return a value whose arrays are all to be looked at; where asked for, those too that came from elsewhere."""
-=======
     """Return a value whose arrays can all be worked on, if asked for those too that another process has sent."""
->>>>>>> m
 
     def looked_at(part: Any) -> Any:
         if isinstance(part, _Far):
             return part.mapped()
-<<<<<<< HEAD
-        return part.copy() if own and isinstance(part, np.ndarray) and not part.flags.writeable else part
-=======
         return part.copy() if own and isinstance(part, np.ndarray) and not part.flags.behaved else part
->>>>>>> m
 
     return _changed(value, looked_at)
 
