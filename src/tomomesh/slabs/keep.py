@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mmap
 import tempfile
-import weakref
 from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -138,7 +137,6 @@ class File:
     def _written(self, array: np.ndarray[Any, Any]) -> _Far:
         if self.handle is None:
             self.handle = tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115 - closed with its last user
-            weakref.finalize(self, self.handle.close)
         self.handle.seek(self.end)
         left = array.reshape(-1).view(np.uint8)
         while len(left):
