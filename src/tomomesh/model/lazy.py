@@ -12,7 +12,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from ..errors import ResourceError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import DTypeLike, NDArray
 
@@ -228,15 +228,13 @@ def in_memory(voxels: NDArray[Any] | LazyVoxels) -> NDArray[Any]:
     return voxels.read() if isinstance(voxels, LazyVoxels) else voxels
 
 
-def slabs(voxels: NDArray[Any] | LazyVoxels) -> Iterator[NDArray[Any]]:
-    """Go through voxels along their first axis: an array at once, others by `SLAB_BYTES`, in whole chunks if any."""
+def slabs(voxels: Voxels) -> list[Voxels]:
+    """Cut voxels along their first axis: an array not at all, others by `SLAB_BYTES`, in whole chunks if any fits."""
     if not isinstance(voxels, LazyVoxels):
-        yield voxels
-        return
+        return [voxels]
     depth = max(SLAB_BYTES // max(math.prod(voxels.shape[1:]) * voxels.dtype.itemsize, 1), 1)
     depth -= depth % min(voxels.chunks[0], depth)
-    for start in range(0, len(voxels), depth):
-        yield voxels[start : start + depth].read()
+    return [voxels[start : start + depth] for start in range(0, len(voxels), depth)]
 
 
 def _rising(side: range) -> slice:
