@@ -12,7 +12,7 @@ from tomomesh.io.meshes.cells import weld
 from tomomesh.io.meshes.pieces.octree import along_curve
 from tomomesh.measure.topology import topology
 from tomomesh.model.mesh import TriMesh
-from tomomesh.slabs.patches.clipping import Grid, cut_along
+from tomomesh.slabs.patches.clipping import CellGrid, cut_along
 
 
 class TestCutting:
@@ -21,7 +21,7 @@ class TestCutting:
     def test_keeps_a_surface_closed_and_its_volume(self, seed: int, share: float, side: float, shift: int) -> None:
         mesh = isosurface(seed, share)
         # planes through vertices, which lie at whole and at broken numbers
-        grid = Grid(np.floor(mesh.vertices.min(axis=0)) - shift / 2, side if shift else float(np.ceil(side)))
+        grid = CellGrid(np.floor(mesh.vertices.min(axis=0)) - shift / 2, side if shift else float(np.ceil(side)))
         corners = cut_along(mesh.corners, grid)
         low = grid.origin + grid.cells(corners) * grid.side
         assert (corners >= low[:, None] - 1e-9).all()
@@ -40,7 +40,7 @@ class TestCutting:
     def test_cuts_an_edge_in_the_same_places_in_all_faces(self, seed: int, side: float) -> None:
         rng = np.random.default_rng(seed)
         one, other, a, b = rng.normal(size=(4, 3)) * 3
-        grid = Grid(rng.normal(size=3) - 9, side)
+        grid = CellGrid(rng.normal(size=3) - 9, side)
         on_edge = [
             {tuple(place) for place in cut_along(np.array([face]), grid).reshape(-1, 3).tolist()}
             for face in ([one, other, a], [other, one, b])
@@ -55,7 +55,7 @@ class TestCutting:
     def test_leaves_faces_in_a_cell_as_they_are(self) -> None:
         corners = np.random.default_rng(0).random((20, 3, 3))
         np.testing.assert_array_equal(
-            np.sort(cut_along(corners, Grid(np.zeros(3), 1.0)), axis=0), np.sort(corners, axis=0)
+            np.sort(cut_along(corners, CellGrid(np.zeros(3), 1.0)), axis=0), np.sort(corners, axis=0)
         )
 
 

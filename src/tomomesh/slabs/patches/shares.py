@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .patch import Patch, Patches
+    from .patch import MeshPatch, Patches
 
     Ints = NDArray[np.int64]
 
@@ -42,14 +42,14 @@ def shares(patches: Patches, count: int) -> Iterator[TriMesh]:
         yield _share(patches, np.flatnonzero((spans[:, 0] < stop) & (spans[:, 1] >= start)), start, stop)
 
 
-def _lowest(patch: Patch) -> Ints:
+def _lowest(patch: MeshPatch) -> Ints:
     """Return the lowest vertex of every face, (f,)."""
     a, b, c = patch.numbers[patch.faces.T]
     lowest: Ints = np.minimum(np.minimum(a, b), c)
     return lowest
 
 
-def _spread(patch: Patch, total: int) -> tuple[tuple[int, int], Ints]:
+def _spread(patch: MeshPatch, total: int) -> tuple[tuple[int, int], Ints]:
     """Return the lowest and the highest of the faces' lowest vertices, and how many faces have theirs in each bin."""
     lowest = _lowest(patch)
     bins = np.bincount(lowest * BINS // max(total, 1), minlength=BINS)
@@ -67,7 +67,7 @@ def _share(patches: Patches, some: NDArray[np.intp], start: int, stop: int) -> T
     return TriMesh(places[first], np.searchsorted(once, np.concatenate([halves, quarters])))
 
 
-def _between(patch: Patch, start: int, stop: int) -> tuple[Ints, Ints, Ints, NDArray[np.float64]]:
+def _between(patch: MeshPatch, start: int, stop: int) -> tuple[Ints, Ints, Ints, NDArray[np.float64]]:
     """Return the faces of a patch whose lowest vertex lies in a range, and the numbers and places of all they use."""
     lowest = _lowest(patch)
     some = (lowest >= start) & (lowest < stop)
