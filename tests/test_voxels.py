@@ -14,10 +14,10 @@ from scipy import ndimage
 from conftest import composed, law, seeds, solids
 from isosurfaces import ball, cubes_marched, mean_turn, volume_of
 from studies import AFFINES
-from tomomesh.isosurface import surface_nets as nets
+from tomomesh.isosurface import means, settle
 from tomomesh.isosurface.crossings import CLOSEST
 from tomomesh.isosurface.diagonals import _is_odd
-from tomomesh.isosurface.surface_nets import MARGIN, TENSION
+from tomomesh.isosurface.settle import MARGIN, TENSION
 from tomomesh.isosurface.voxels import Boundary, VoxelSurface, boundary, voxel_surface
 from tomomesh.isosurface.well_composed import without_contacts
 from tomomesh.measure.intersections import self_intersections
@@ -120,7 +120,8 @@ class TestLaws:
     def test_threads_change_no_byte(self, gray: Floats) -> None:
         volume, mask = volume_of(gray), gray > 0
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(nets, "BLOCK", 7)
+            patch.setattr(means, "BLOCK", 7)
+            patch.setattr(settle, "BLOCK", 7)
             patch.setattr("tomomesh.isosurface.well_composed.LAYERS", 1)
             found = [boundary(volume, mask, lower=0.0, threads=n) for n in (1, 3)]
             made = [voxel_surface(one, FitSettings(), threads=n) for one, n in zip(found, (1, 3), strict=True)]

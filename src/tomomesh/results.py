@@ -12,6 +12,7 @@ from .measure.tree import Tree
 from .model.columns import any_of
 from .model.mesh import QuadMesh
 from .model.points import CAP
+from .model.sliced import areas_of
 from .report import Reported
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ class Enclosed:
     @classmethod
     def window(cls, found: Segmentation[Any]) -> Enclosed:
         """Return the volume of the voxels of a window, mm^3."""
-        return cls("window", np.count_nonzero(found.mask) * found.volume.voxel_mm3)
+        return cls("window", int(areas_of(found.mask).sum()) * found.volume.voxel_mm3)
 
     def or_more(self, other: Enclosed) -> Enclosed:
         """Return the larger of two."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import io
 from ..errors import UsageError, printable
+from ..memory.limit import memory_limit
 from ..settings import Settings, option_of, parameters
 from . import summary
 from .against import compared, is_mesh
@@ -148,13 +149,14 @@ def _surface(chosen: Namespace) -> None:
     check_outputs(chosen, io.MESH_WRITERS, chosen.cloud)
     from ..pipeline import reconstruct_points
 
-    with Bars(quiet=chosen.quiet) as progress:
+    with memory_limit(chosen.memory), Bars(quiet=chosen.quiet) as progress:
         progress("read", 0, 1)
         points = io.read_points(chosen.cloud, settings=settings.cloud)
         progress("read", 1, 1)
         surface = reconstruct_points(points, settings, progress=progress, **given_of(chosen))
         surface = write_surface(chosen, surface, settings, progress)
-    _tell(chosen, surface.report, summary.of_surface(surface.report, _shown(chosen)))
+        report = surface.report
+    _tell(chosen, report, summary.of_surface(report, _shown(chosen)))
 
 
 def _network(chosen: Namespace) -> None:

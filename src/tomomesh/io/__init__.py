@@ -14,6 +14,7 @@ from .files.atomic import check_output, replacing
 from .frames import LENGTHS, RAS_ALONE, Frame, frame_in_file, frame_of_study, in_lps
 from .meshes.encapsulated import ARCHIVED, check_archived, is_archived, write_encapsulated
 from .meshes.frame import frame_of_file
+from .meshes.pieces import write_pieces
 from .meshes.read import MESH_READERS, read_mesh
 from .meshes.write import MESH_WRITERS, keeps, write_mesh
 from .studies.folder import Study, files_of, find_studies
@@ -63,6 +64,7 @@ __all__ = [
     "write_encapsulated",
     "write_labels",
     "write_mesh",
+    "write_pieces",
     "write_points",
     "write_settings",
     "write_table",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,12 +11,16 @@ from ..kernels.isosurface.voxels import leave_window
 from ..kernels.threads import in_blocks
 from ..model.columns import any_of
 from ..model.points import ADDED, BORDER, CROSSING
+from ..model.sliced import some_of
 from .means import BLOCK
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-    from .thick_slices import Columns, Thinned
+    from ..model.sliced import Sliced
+    from .thick_slices import Thinned
 
 CLOSEST = 0.01
 """A crossing comes no nearer to a voxel's center than this share of the way to its neighbor. Chosen: half of it changes
@@ -35,22 +39,58 @@ are looked at to tell. Measured: studies have 0.4 to 0.6, the built-in head 0.66
 
 
 @dataclass(frozen=True)
+class Stretch:
+    """Voxels of a part of a volume, indexed as all would be; what lies beyond the part is as its nearest voxel.
+
+    Attributes
+    ----------
+    stored : (k, j, i) or (k, j, i, L) array
+    low : (int, int, int)
+        Its first voxel.
+    shape : tuple of int
+        Of the volume.
+    """
+
+    stored: NDArray[Any]
+    low: tuple[int, int, int]
+    shape: tuple[int, ...]
+
+    def __getitem__(self, places: tuple[NDArray[np.int32], ...]) -> NDArray[Any]:
+        """Return what voxels hold, given as indices along the three axes."""
+        sizes = self.stored.shape[:3]
+        near = [np.clip(n - low, 0, size - 1) for n, low, size in zip(places, self.low, sizes, strict=True)]
+        return np.asarray(self.stored[tuple(near)])
+
+
+IN_LINE = (-1, 0, 1, 2)
+"""Steps from the voxel inside to the four in a line across a border."""
+
+
+@dataclass(frozen=True)
 class Levels:
     """The gray levels of a study, and a window on them.
 
     Attributes
     ----------
-    voxels : (K, J, I) or (K, J, I, L) array, or Columns
+    voxels : (K, J, I) or (K, J, I, L) array, planes that are read as they are asked for, Columns or Stretch
     lower, upper : float or (L,) float array
         A layer is in its window where lower < k <= upper.
     layers : {"all", "any"}
         A voxel is inside where all its layers are in their windows, or one at least.
     """
 
-    voxels: NDArray[Any] | Columns
+    voxels: NDArray[Any] | Sliced
     lower: float | NDArray[np.float64]
     upper: float | NDArray[np.float64]
     layers: str = "all"
+
+    def on(self, *slices: int) -> Levels:
+        """Return the levels of some slices alone, which are then numbered from 0."""
+        return replace(self, voxels=np.stack([self.voxels[k] for k in slices]))
+
+    def part(self, start: int, stop: int) -> Levels:
+        """Return the levels of a range of slices alone, which are then numbered from 0; a view of an array."""
+        return replace(self, voxels=some_of(self.voxels, start, stop))
 
     def nearest(self, places: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the voxels that are nearest to places (n, 3), which are (x, y, z) and may lie beyond the border."""
@@ -87,7 +127,10 @@ class Levels:
         Levels are interpolated linearly. Of several layers the first to leave its window counts; where one inside is
         enough, the last of those that were. Where a level is not known the border is half way.
         """
-        inside, outside = self.at(inner), self.at(outer)
+        return self.left(self.at(inner), self.at(outer), threads)
+
+    def left(self, inside: NDArray[np.float64], outside: NDArray[np.float64], threads: int = 0) -> NDArray[np.float64]:
+        """Return those shares by the levels (n, L) inside and outside, see `crossed`."""
         lower, upper = (np.full(inside.shape[1], bound, np.float64) for bound in (self.lower, self.upper))
         leaves = np.empty(len(inside))
         in_blocks(
@@ -104,31 +147,49 @@ class Levels:
         at four voxels in a line, two inside and two outside, where all four are in the volume. Sampled by anything that
         has an extent, a border takes about half of its height between the middle two; in a mask it takes all of it.
         """
-        every = -(-len(inner) // SAMPLES) or 1
+        every = sampled(len(inner))
         inner, steps = inner[::every], steps[::every]
-        if self.are_two(inner, inner + steps) and self._are_all(inner, steps):
+        return self.are_stepped([self.at(inner + n * steps) for n in IN_LINE])
+
+    def are_stepped(self, lines: Sequence[NDArray[np.float64]]) -> bool:
+        """Tell that by the levels (n, L) at the four places `IN_LINE` across a border, see `stepped`."""
+        if _are_two(lines[1], lines[2]) and _are_two_alone(lines):
             return True
-        whole, step, clear = self._heights(inner, steps)
+        whole, step, clear = self._heights(*lines)
         known, shares = np.isfinite(whole + step), step[clear] / whole[clear]
         return bool(2 * len(shares) > np.count_nonzero(known) and np.median(shares) > STEPPED)
 
     def are_two(self, inner: NDArray[np.int32], outer: NDArray[np.int32]) -> bool:
         """Tell whether voxels inside (n, 3) all have one level, and those outside another, as those of a mask do."""
-        sides = [levels[np.isfinite(levels).all(axis=1)] for levels in (self.at(inner), self.at(outer))]
-        return all(len(levels) and not np.ptp(levels, axis=0).any() for levels in sides)
-
-    def _are_all(self, inner: NDArray[np.int32], steps: NDArray[np.int32]) -> bool:
-        """Tell whether four voxels in a line have two levels alone: distances from a box are two beside it alone."""
-        levels = np.concatenate([self.at(inner + n * steps) for n in (-1, 0, 1, 2)])
-        return len(np.unique(levels[np.isfinite(levels).all(axis=1)], axis=0)) <= 2
+        return _are_two(self.at(inner), self.at(outer))
 
     def _heights(
-        self, inner: NDArray[np.int32], steps: NDArray[np.int32]
+        self,
+        before: NDArray[np.float64],
+        inside: NDArray[np.float64],
+        outside: NDArray[np.float64],
+        after: NDArray[np.float64],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
         """Return the height of a border between four voxels and between two, and where the outer are clear of it."""
-        before, inside, outside, after = (self.at(inner + n * steps) for n in (-1, 0, 1, 2))
         whole, step = (np.abs(one - other).sum(axis=1) for one, other in ((before, after), (inside, outside)))
         return whole, step, self.inside(before) & ~self.inside(after) & (whole > 0)
+
+
+def sampled(count: int) -> int:
+    """Return every how many of so many crossings one is looked at."""
+    return -(-count // SAMPLES) or 1
+
+
+def _are_two(inside: NDArray[np.float64], outside: NDArray[np.float64]) -> bool:
+    """Tell whether levels inside (n, L) are one, and those outside another, as those of a mask are."""
+    sides = [levels[np.isfinite(levels).all(axis=1)] for levels in (inside, outside)]
+    return all(len(levels) and not np.ptp(levels, axis=0).any() for levels in sides)
+
+
+def _are_two_alone(lines: Sequence[NDArray[np.float64]]) -> bool:
+    """Tell whether voxels in a line (n, L) have two levels alone: distances from a box are two beside it alone."""
+    levels = np.concatenate(lines)
+    return len(np.unique(levels[np.isfinite(levels).all(axis=1)], axis=0)) <= 2
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.isosurface.diagonals import NEITHER, OPEN, allow_diagonals, choose_diagonals, list_normals, split_squares
-from ..kernels.threads import in_blocks
 from ..model.mesh import TriMesh
-from .means import BLOCK
+from .means import over, whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .crossings import LevelCrossings
-    from .surface_nets import Net, NetFit
+    from .means import Rows, Span
+    from .settle import NetFit
+    from .surface_nets import Net
+
+    Floats = NDArray[np.float64]
 
 ROUNDS = (0, 1, 0)
 """Squares at even and at odd places choose in turn, with regard to those that have chosen. Measured: one round less, or
@@ -49,36 +52,44 @@ def triangulated(
         The squares that are split into four.
     """
     before, after = (placed(indices, affine, threads) for indices in (made.start, made.positions))
-    choice = _diagonals(net, made, crossings, after, threads)
-    fours, outward = np.flatnonzero(choice == NEITHER).astype(np.int32), right_handed(affine)
-    halves = _halves(net.quads, choice, outward, threads)
-    quarters = _quarters(net.quads[fours], len(after))[:, :, slice(None, None, 1 if outward else -1)]
-    halves[fours] = quarters[:, :2]
-    faces = np.concatenate([halves.reshape(-1, 3), quarters[:, 2:].reshape(-1, 3)])
+    choice = diagonals(net, made.positions, crossings.positions, after, whole(len(net.quads)), threads)
+    fours = fours_of(choice)
+    faces = np.concatenate(split(net.quads, choice, right_handed(affine), len(after), threads))
     added = placed(crossings.positions[fours], affine, threads)
     start, mesh = (TriMesh(np.concatenate([vertices, added]), faces) for vertices in (before, after))
     return start, mesh, fours
 
 
-def _diagonals(
-    net: Net, made: NetFit, crossings: LevelCrossings, after: NDArray[np.float64], threads: int
+def diagonals(
+    net: Net, positions: Floats, borders: Floats, after: Floats, squares: Rows, threads: int = 0
 ) -> NDArray[np.uint8]:
-    """Choose a diagonal for every square, (q,): 0, 1 or `NEITHER`."""
-    allowed = np.empty(len(net.quads), np.uint8)
+    """Choose a diagonal for every square that is wanted, (q,): 0, 1 or `NEITHER`.
 
-    def allow(start: int, stop: int) -> None:
-        allow_diagonals(made.positions, net.quads, crossings.positions, net.directions, allowed, start, stop)
-
-    in_blocks(allow, len(allowed), block=BLOCK, threads=threads)
-    choice, odd = np.where(allowed > 0, np.uint8(OPEN), np.uint8(NEITHER)), _is_odd(net)
+    Parameters
+    ----------
+    net : Net
+    positions, after : (n, 3) float array
+        The vertices, as voxel indices and in space.
+    borders : (q, 3) float array
+        The crossings, as voxel indices.
+    squares : callable
+        The squares that have to be known.
+    threads : int
+    """
+    allowed, most = np.zeros(len(net.quads), np.uint8), squares(len(ROUNDS) - 1)
     normals = np.empty((len(allowed), 4, 3), np.float32)
-    in_blocks(
-        lambda start, stop: list_normals(after, net.quads, normals, start, stop), len(normals), block=BLOCK,
-        threads=threads,
-    )  # fmt: skip
+    over(lambda a, b: allow_diagonals(positions, net.quads, borders, net.directions, allowed, a, b), most, threads)
+    over(lambda a, b: list_normals(after, net.quads, normals, a, b), most, threads)
+    choice, odd = np.where(allowed > 0, np.uint8(OPEN), np.uint8(NEITHER)), _is_odd(net)
     for count, parity in enumerate(ROUNDS):
-        choice = _chosen(net, normals, allowed, choice, odd == parity, threads, alone=count == 0)
+        span = squares(len(ROUNDS) - 1 - count)
+        choice = _chosen(net, normals, allowed, choice, odd == parity, span, threads, alone=count == 0)
     return choice
+
+
+def fours_of(choice: NDArray[np.uint8]) -> NDArray[np.int32]:
+    """Return which squares neither of their diagonals may split, (f,)."""
+    return np.flatnonzero(choice == NEITHER).astype(np.int32)
 
 
 def _is_odd(net: Net) -> NDArray[np.bool_]:
@@ -92,28 +103,48 @@ def _chosen(
     allowed: NDArray[np.uint8],
     choice: NDArray[np.uint8],
     turns: NDArray[np.bool_],
+    span: Span,
     threads: int,
     *,
     alone: bool,
 ) -> NDArray[np.uint8]:
     """Let some of the squares choose, each alone or with regard to its neighbors."""
     chosen = np.empty_like(choice)
-
-    def work(start: int, stop: int) -> None:
-        choose_diagonals(normals, net.twins, allowed, choice, turns, alone, chosen, start, stop)
-
-    in_blocks(work, len(choice), block=BLOCK, threads=threads)
+    over(
+        lambda start, stop: choose_diagonals(normals, net.twins, allowed, choice, turns, alone, chosen, start, stop),
+        span, threads,
+    )  # fmt: skip
     return chosen
 
 
-def _halves(quads: NDArray[np.int32], choice: NDArray[np.uint8], outward: bool, threads: int) -> NDArray[np.int64]:
-    """Split squares (q, 4) by the diagonal from corner 0 or 1 into two triangles each, (q, 2, 3); or turn them over."""
-    halves = np.empty((len(quads), 2, 3), np.int64)
-    in_blocks(
-        lambda start, stop: split_squares(quads, choice, outward, halves, start, stop),
-        len(quads), block=BLOCK, threads=threads,
-    )  # fmt: skip
-    return halves
+def split(
+    quads: NDArray[np.int32], choice: NDArray[np.uint8], outward: bool, first: int, threads: int = 0
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Split squares into triangles.
+
+    Parameters
+    ----------
+    quads : (q, 4) int32 array
+    choice : (q,) uint8 array
+        Of `diagonals`.
+    outward : bool
+        Whether the squares are counter-clockwise from outside; else they are turned over.
+    first : int
+        Number of the first of the vertices in the middle of squares that are split into four.
+    threads : int
+
+    Returns
+    -------
+    halves : (2 q, 3) int64 array
+        Two triangles a square.
+    quarters : (2 f, 3) int64 array
+        The other two of those that are split into four.
+    """
+    fours, halves = fours_of(choice), np.empty((len(quads), 2, 3), np.int64)
+    over(lambda start, stop: split_squares(quads, choice, outward, halves, start, stop), (0, len(quads)), threads)
+    quarters = _quarters(quads[fours], first)[:, :, slice(None, None, 1 if outward else -1)]
+    halves[fours] = quarters[:, :2]
+    return halves.reshape(-1, 3), quarters[:, 2:].reshape(-1, 3)
 
 
 def _quarters(quads: NDArray[np.int32], first: int) -> NDArray[np.int64]:
@@ -130,7 +161,7 @@ def placed(indices: NDArray[np.float64], affine: NDArray[np.float64], threads: i
         np.matmul(indices[start:stop], turn, out=found[start:stop])
         found[start:stop] += affine[:3, 3]
 
-    in_blocks(work, len(indices), block=BLOCK, threads=threads)
+    over(work, (0, len(indices)), threads)
     return found
 
 

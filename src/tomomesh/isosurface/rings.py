@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..kernels.isosurface.surface_nets import add_term, lean, list_rings
-from ..kernels.threads import in_blocks
-from .means import BLOCK
+from .means import over
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from .means import Rows, Span
     from .surface_nets import Net
 
     Floats = NDArray[np.float64]
@@ -38,25 +38,22 @@ class Rings:
     threads: int
 
     @classmethod
-    def of(cls, net: Net, threads: int) -> Rings:
-        """Look around."""
+    def of(cls, net: Net, threads: int, span: Span | None = None) -> Rings:
+        """Look around all vertices, or those in a span."""
         (beside, aslant), shares = np.empty((2, *net.links.shape), np.uint32), np.empty(len(net.links))
-        in_blocks(
+        over(
             lambda start, stop: list_rings(net.links, net.fans, net.quads, beside, aslant, shares, start, stop),
-            len(shares), block=BLOCK, threads=threads,
+            span or (0, len(shares)), threads,
         )  # fmt: skip
         return cls(beside, aslant, shares, threads)
 
-    def lean(self, values: Floats) -> Floats:
-        """Return by how much the mean of the neighbors' values (n, 3) is more than a vertex' own."""
-        leaning = np.empty_like(values)
-        in_blocks(
-            lambda start, stop: lean(values, self.beside, self.shares, leaning, start, stop),
-            len(values), block=BLOCK, threads=self.threads,
-        )  # fmt: skip
+    def lean(self, values: Floats, span: Span) -> Floats:
+        """Return by how much the mean of the neighbors' values (n, 3) is more than a vertex' own; in a span."""
+        leaning = np.zeros(values.shape)
+        over(lambda start, stop: lean(values, self.beside, self.shares, leaning, start, stop), span, self.threads)
         return leaning
 
-    def evened(self, values: Floats, bending: float) -> Floats:
+    def evened(self, values: Floats, bending: float, rows: Rows) -> Floats:
         """Return where a net would rest that is drawn to values (n, 3) and resists bends, all but exactly.
 
         Squares and springs together are  1 - l + b l^2  there, l as an operator that takes a mean from what it is of:
@@ -65,20 +62,20 @@ class Rings:
         coefficients = np.polynomial.chebyshev.chebinterpolate(
             lambda mean: (1 / resistance(1 - mean, bending) - 1) / (mean - 1), TERMS,
         )  # fmt: skip
-        last = self.lean(values)
+        last = self.lean(values, rows(TERMS))
         total: Floats = values + coefficients[0] * last
         before = last.copy()
         for n, coefficient in enumerate(coefficients[1:]):
-            self._add(last, before, 2.0 if n else 1.0, coefficient, total)
+            self._add(last, before, 2.0 if n else 1.0, coefficient, total, rows(TERMS - 1 - n))
             last, before = before, last
         return total
 
-    def _add(self, last: Floats, before: Floats, times: float, coefficient: float, total: Floats) -> None:
-        in_blocks(
+    def _add(self, last: Floats, before: Floats, times: float, coefficient: float, total: Floats, span: Span) -> None:
+        over(
             lambda start, stop: add_term(
                 last, before, self.beside, self.shares, times, coefficient, total, start, stop
             ),
-            len(total), block=BLOCK, threads=self.threads,
+            span, self.threads,
         )  # fmt: skip
 
 

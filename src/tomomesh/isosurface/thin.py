@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.isosurface.surface_nets import end_soon, fall_short
-from ..kernels.threads import in_blocks
-from .means import BLOCK, means
+from .means import means, over
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .crossings import LevelCrossings
+    from .means import Rows
     from .surface_nets import Net
 
     Floats = NDArray[np.float64]
@@ -49,30 +48,34 @@ def thin_squares(mask: Marks, inner: NDArray[np.int32], steps: NDArray[np.int32]
     threads : int
     """
     found = np.empty(len(inner), np.bool_)
-    in_blocks(
-        lambda start, stop: end_soon(mask, inner, steps, DEPTH, found, start, stop), len(found), block=BLOCK,
-        threads=threads,
-    )  # fmt: skip
+    over(lambda start, stop: end_soon(mask, inner, steps, DEPTH, found, start, stop), (0, len(found)), threads)
     return found
 
 
-def given_back(net: Net, crossings: LevelCrossings, places: Floats, threads: int = 0) -> Floats:
+def given_back(
+    net: Net, borders: Floats, thin: Marks, places: Floats, vertices: Rows, squares: Rows, threads: int = 0
+) -> Floats:
     """Return how far squares (q,) have to be drawn out for what the net lost around those that are thin.
 
     Parameters
     ----------
     net : Net
-    crossings : LevelCrossings
-        Where the mask has its border, and where it is thin.
+    borders : (q, 3) float array
+        Where the mask has its border.
+    thin : (q,) bool array
+        Where it is thin.
     places : (n, 3) float array
         Where the vertices are.
+    vertices, squares : callable
+        The rows of both that have to be known.
     threads : int
     """
     lost = np.empty(len(net.quads))
-    in_blocks(
-        lambda start, stop: fall_short(places, net.quads, crossings.positions, net.directions, lost, start, stop),
-        len(lost), block=BLOCK, threads=threads,
+    over(
+        lambda start, stop: fall_short(places, net.quads, borders, net.directions, lost, start, stop),
+        squares(ROUNDS), threads,
     )  # fmt: skip
-    for _ in range(ROUNDS):
-        lost = means(means(lost, net.fans, threads), net.quads, threads)
-    return np.where(crossings.thin, lost, 0.0)
+    for left in range(ROUNDS, 0, -1):
+        around = means(lost, net.fans, threads, vertices(left))
+        lost = means(around, net.quads, threads, squares(left - 1))
+    return np.where(thin, lost, 0.0)

@@ -17,7 +17,8 @@ from .crossings import LevelCrossings, Levels, crossings
 from .diagonals import placed, right_handed, triangulated
 from .run_mask import RunMask
 from .runs import Runs
-from .surface_nets import Net, NetFit, net_around, settle
+from .settle import NetFit, settle
+from .surface_nets import Net, net_around
 from .thick_slices import thinned
 from .thin import thin_squares
 from .well_composed import surface_cells, without_contacts
@@ -65,7 +66,7 @@ class Boundary:
         """The faces themselves."""
         net = self.net
         outward = slice(None, None, 1 if right_handed(self.affine) else -1)
-        corners = placed(net.low + 0.5, self.affine)
+        corners = placed(net.low + np.float64(0.5), self.affine)
         return QuadMesh(corners, net.quads[:, outward].astype(np.int64))
 
     @cached_property

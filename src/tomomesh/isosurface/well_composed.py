@@ -125,12 +125,36 @@ def without_contacts(
     found, cases = surface_cells(mask, threads) if known is None else known
     cells = found[JOINING[cases] > 0]
     joined = mask.copy() if len(cells) else mask
-    while len(cells):
-        voxels = _once_each([_nearest_to_window(part, joined, excess) for part in _parts(cells)], mask.shape)
-        x, y, z = voxels.T
-        joined[z, y, x] = True
-        cells = _once_each([_touching_around(part, joined) for part in _parts(voxels)], mask.shape)
+    for _ in joining(joined, cells, excess):
+        pass
     return joined
+
+
+def joining(
+    mask: NDArray[np.bool_], cells: NDArray[np.int32], excess: Callable[[NDArray[np.int32]], NDArray[np.float64]]
+) -> Iterator[NDArray[np.int32]]:
+    """Add voxels to a mask, in place, round after round, until none touch along an edge or at a corner only.
+
+    What is added at a place depends on what was within so many voxels around it as rounds have been made.
+
+    Parameters
+    ----------
+    mask, excess
+        As of `without_contacts`.
+    cells : (n, 3) int32 array
+        Those whose voxels do.
+
+    Yields
+    ------
+    (m, 3) int32 array
+        The voxels (x, y, z) that were added in a round.
+    """
+    while len(cells):
+        voxels = _once_each([_nearest_to_window(part, mask, excess) for part in _parts(cells)], mask.shape)
+        x, y, z = voxels.T
+        mask[z, y, x] = True
+        yield voxels
+        cells = _once_each([_touching_around(part, mask) for part in _parts(voxels)], mask.shape)
 
 
 def _parts(places: NDArray[np.int32]) -> Iterator[NDArray[np.int32]]:
@@ -151,8 +175,9 @@ def _nearest_to_window(
 
 
 def _touching_around(voxels: NDArray[np.int32], mask: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Return the cells with a contact that have one of the voxels as a corner."""
+    """Return the cells with a contact that have one of the voxels as a corner, as far as the mask has their slices."""
     around = (voxels[:, None, :] - CORNERS).reshape(-1, 3)
+    around = around[(around[:, 2] >= 0) & (around[:, 2] < len(mask) - 1)]
     return np.asarray(around[JOINING[_cases_of(mask, around)] > 0])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -12,9 +12,19 @@ from ..kernels.measure.edges import count_misoriented, join_borders, join_corner
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..model.mesh import TriMesh
-
     Ints = NDArray[np.int32]
+
+
+class Triangles(Protocol):
+    """What has vertices (n, 3) and faces (m, 3): a mesh, or a part of one."""
+
+    @property
+    def vertices(self) -> NDArray[np.float64]:
+        """Positions."""
+
+    @property
+    def faces(self) -> NDArray[np.integer[Any]]:
+        """Vertex numbers."""
 
 
 class Links:
@@ -28,7 +38,7 @@ class Links:
     faces : (m, 3) int32 array
     """
 
-    def __init__(self, mesh: TriMesh) -> None:
+    def __init__(self, mesh: Triangles) -> None:
         self.vertices = np.ascontiguousarray(mesh.vertices, np.float64)
         self.faces = np.ascontiguousarray(mesh.faces, np.int32)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NoReturn, Protocol
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeVar
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
@@ -11,9 +12,13 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from ..errors import ResourceError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import DTypeLike, NDArray
+
+
+SLAB_BYTES = 2**26
+"""Bytes of voxels that are read together where all are gone through: as many as `io.files.numbers` maps together."""
 
 
 class Stored(Protocol):
@@ -29,6 +34,10 @@ class Stored(Protocol):
     @property
     def dtype(self) -> np.dtype[Any]:
         """Of the numbers that `read` returns."""
+
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Sizes along all axes of what is read together, however little of it is wanted."""
 
     def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Return the numbers of a part, a new array: a slice an axis, none of them empty, of steps above 0."""
@@ -55,6 +64,11 @@ class Mapped:
     def shape(self) -> tuple[int, ...]:
         """Sizes of all axes."""
         return self.inner.shape
+
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Sizes of what is read together."""
+        return self.inner.chunks
 
     def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Return the numbers of a part."""
@@ -163,6 +177,10 @@ class LazyVoxels(NDArrayOperatorsMixin):
         raise AttributeError(name)
 
 
+Voxels = TypeVar("Voxels", "NDArray[Any]", LazyVoxels)
+"""Voxels of one kind in, and of the same kind out."""
+
+
 @dataclass(frozen=True)
 class Held:
     """An array in memory, or whatever takes slices as one does, as what is stored.
@@ -170,9 +188,12 @@ class Held:
     Attributes
     ----------
     array : array
+    chunks : tuple of int
+        Sizes of what is read together.
     """
 
     array: Any
+    chunks: tuple[int, ...] = ()
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -190,9 +211,25 @@ class Held:
         return np.array(self.array[box])
 
 
+def layer_of(voxels: Voxels, number: int) -> Voxels:
+    """Return a view of one layer (K, J, I) of voxels (K, J, I, L)."""
+    return voxels.layer(number) if isinstance(voxels, LazyVoxels) else voxels[..., number]
+
+
 def in_memory(voxels: NDArray[Any] | LazyVoxels) -> NDArray[Any]:
     """Return voxels as an array: read where they lie in a file, else as they are."""
     return voxels.read() if isinstance(voxels, LazyVoxels) else voxels
+
+
+def slabs(voxels: NDArray[Any] | LazyVoxels) -> Iterator[NDArray[Any]]:
+    """Go through voxels along their first axis: an array at once, others by `SLAB_BYTES`, in whole chunks if any."""
+    if not isinstance(voxels, LazyVoxels):
+        yield voxels
+        return
+    depth = max(SLAB_BYTES // max(math.prod(voxels.shape[1:]) * voxels.dtype.itemsize, 1), 1)
+    depth -= depth % min(voxels.source.chunks[voxels.order[0]], depth)
+    for start in range(0, len(voxels), depth):
+        yield voxels[start : start + depth].read()
 
 
 def _rising(side: range) -> slice:

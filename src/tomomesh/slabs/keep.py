@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mmap
 import tempfile
+import weakref
 from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -76,37 +77,50 @@ class OnDisk:
         OutputError
             Where the disk is full.
         """
-        file = _File(self.folder)
-        return [_changed(work(*map(_mapped, entries)), file.put) for entries in zip(*columns, strict=True)]
+        file = File(self.folder)
+        return [put_away(work(*map(mapped, entries)), file) for entries in zip(*columns, strict=True)]
 
     def fetch(self, kept: Sequence[Kept]) -> list[Any]:
         """Return the values; what is large is read from its file where it is looked at."""
-        return [_mapped(value) for value in kept]
+        return [mapped(value) for value in kept]
 
 
 @dataclass(frozen=True)
 class _Far:
     """An array in a file, from a byte on that a page begins with."""
 
-    file: _File
+    file: File
     offset: int
     dtype: np.dtype[Any]
     shape: tuple[int, ...]
 
+    @property
+    def nbytes(self) -> int:
+        """Its size."""
+        return self.dtype.itemsize * int(np.prod(self.shape))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let other processes have the array itself."""
+        return _itself, (self.mapped(),)
+
     def mapped(self) -> np.ndarray[Any, Any]:
         """Return it as memory that is its own: what is written there is never in the file."""
-        size = self.dtype.itemsize * int(np.prod(self.shape))
-        pages = mmap.mmap(self.file.handle.fileno(), size, access=mmap.ACCESS_COPY, offset=self.offset)
+        pages = mmap.mmap(self.file.handle.fileno(), self.nbytes, access=mmap.ACCESS_COPY, offset=self.offset)
         return np.frombuffer(pages, self.dtype).reshape(self.shape)
 
 
-class _File:
+class File:
     """A file without a name that arrays are put into one behind the other."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.end = 0
         self.handle: Any = None
+
+    def __del__(self) -> None:
+        """Close the file with the last value that is kept in it; maps of it stay."""
+        if self.handle is not None:
+            self.handle.close()
 
     def put(self, array: Any) -> Any:
         """Write an array; one that is small, and what is no array, stays as it is."""
@@ -122,7 +136,9 @@ class _File:
             ) from None  # fmt: skip
 
     def _written(self, array: np.ndarray[Any, Any]) -> _Far:
-        self.handle = self.handle or tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115 - closed with its last map
+        if self.handle is None:
+            self.handle = tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115 - closed with its last user
+            weakref.finalize(self, self.handle.close)
         self.handle.seek(self.end)
         left = array.reshape(-1).view(np.uint8)
         while len(left):
@@ -132,8 +148,25 @@ class _File:
         return found
 
 
-def _mapped(value: Any) -> Any:
+def _itself(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    return array
+
+
+def put_away(value: Any, file: File) -> Any:
+    """Return a value whose large arrays are in a file."""
+    return _changed(value, file.put)
+
+
+def mapped(value: Any) -> Any:
+    """Return a value whose arrays are all to be looked at."""
     return _changed(value, lambda part: part.mapped() if isinstance(part, _Far) else part)
+
+
+def bytes_of(value: Any) -> int:
+    """Return how many bytes the arrays of a value hold, wherever they are."""
+    sizes = [0]
+    _changed(value, lambda part: sizes.append(getattr(part, "nbytes", 0)))
+    return sum(sizes)
 
 
 def _changed(value: Any, change: Callable[[Any], Any]) -> Any:

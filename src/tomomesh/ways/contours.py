@@ -16,8 +16,8 @@ from ..progress import Progress, silent
 from ..results import Enclosed, Segmentation, Surface
 from ..segmentation.contours.between import filled_between
 from ..segmentation.contours.train import train_contours
+from ..segmentation.networks.training import regions
 from ..segmentation.sample import sample_contours
-from ..segmentation.training import regions
 from ..stage import Stage, folded, measured
 from .sections import body_of_voxels, boundary_found, missed, networks_on_slices, sampling_found
 from .way import POINTS, TRAINING, Way, parameters

@@ -11,10 +11,10 @@ from ..measure.rings import assess_contours
 from ..model.lattice import other_number
 from ..results import Enclosed, Segmentation
 from ..segmentation.contours.inputs import share_of_holes, slices_with_several
+from ..segmentation.networks.slices import ByLayer
+from ..segmentation.networks.training import regions, train_study
+from ..segmentation.networks.under_rings import surface_under
 from ..segmentation.sample import sample
-from ..segmentation.training import regions, train_study
-from ..segmentation.under_rings import surface_under
-from ..segmentation.window import by_layer
 from ..som.schedules import schedule_warnings
 from ..stage import Stage, folded, measured, timed
 from .cubes import Inside, surface_on_cubes
@@ -22,10 +22,8 @@ from .sections import body_of_cubes, missed, networks_on_slices, sampling_found
 from .way import CUBES, POINTS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from ..model.networks import Networks
+    from ..model.sliced import Sliced
     from ..progress import Progress
     from ..results import Surface
     from ..segmentation.study import Selected
@@ -88,12 +86,12 @@ def levels_of(kept: Selected, settings: Settings) -> Levels:
     return Levels(chosen.volume.voxels, chosen.lower, chosen.upper, settings.window.layers)
 
 
-def _layers(kept: Selected, settings: Settings) -> NDArray[np.bool_] | None:
+def _layers(kept: Selected, settings: Settings) -> Sliced | None:
     """Return the window of each layer (K, J, I, L), where networks are shown layers."""
     chosen = kept.chosen
     if chosen.volume.layers == 1 or settings.network.inputs != "layers":
         return None
-    return by_layer(chosen.volume, lower=chosen.lower, upper=chosen.upper) & chosen.mask[..., None]
+    return ByLayer(chosen.volume, chosen.mask, chosen.lower, chosen.upper)
 
 
 def _networks_found(networks: Networks, kept: Selected, settings: Settings) -> Stage[None]:

@@ -105,9 +105,9 @@ def link_cells(
     linked : (256, 6) bool array
         Whether a cell of a case shares one in a direction; the cell there does so too.
     latest : (2, J, I) int32 array
-        Overwritten: the cell that was last seen at a place of even and of odd layers.
+        -1 everywhere; overwritten: the cell that was last seen at a place of even and of odd layers.
     table : (n, 6) int32 array
-        Result: the neighbor in each direction, -1 where none is linked.
+        Result: the neighbor in each direction, -1 where none is linked, or none is there.
     """
     for v in range(len(cells)):
         x, y, z, case = cells[v, 0], cells[v, 1], cells[v, 2], cases[v]
@@ -115,42 +115,70 @@ def link_cells(
             table[v, 2 * axis], table[v, 2 * axis + 1] = -1, -1
             if linked[case, 2 * axis]:
                 before = v - 1 if axis == 0 else latest[z & 1, y - 1, x] if axis == 1 else latest[z - 1 & 1, y, x]
-                table[v, 2 * axis], table[before, 2 * axis + 1] = before, v
+                table[v, 2 * axis] = before
+                if before >= 0:  # else the first of these layers is not the first there is
+                    table[before, 2 * axis + 1] = v
         latest[z & 1, y, x] = v
 
 
-@kernel("void(i4[:,::1], u1[::1], i4[:,::1], i8[::1], i4[:,::1], i4[:,::1], u1[::1], i8, i8)")
-def list_faces(
+@kernel("void(i4[:,::1], u1[::1], i8[::1], i4[:,::1], u1[::1], i8, i8)")
+def list_borders(
     cells: NDArray[np.int32],
     cases: NDArray[np.uint8],
-    table: NDArray[np.int32],
     first: NDArray[np.int64],
-    quads: NDArray[np.int32],
     inner: NDArray[np.int32],
     directions: NDArray[np.uint8],
     start: int,
     stop: int,
 ) -> None:
-    """List the square faces between voxels inside and outside.
-
-    A face crosses the line between two voxels, and its corners are the four cells around that line. The cell whose
-    lowest corner is one of the two voxels owns the face.
+    """List the lines between voxels inside and outside: the cell whose lowest corner is one of the two owns it.
 
     Parameters
     ----------
     cells : (n, 3) int32 array
         The voxel (x, y, z) in the lowest corner of each cell.
     cases : (n,) uint8 array
-    table : (n, 6) int32 array
-        Neighboring cells by direction.
     first : (n,) int64 array
-        Faces of the cells before.
-    quads : (q, 4) int32 array
-        Result: the cells around, counter-clockwise seen from outside where the axes are right-handed.
+        Lines of the cells before.
     inner : (q, 3) int32 array
         Result: the voxel inside.
     directions : (q,) uint8 array
         Result: the direction from inside to outside.
+    start, stop : int
+        Cells to work on.
+    """
+    for v in range(start, stop):
+        f = first[v]
+        low = cases[v] & 1
+        for axis in range(3):
+            if cases[v] >> (1 << axis) & 1 != low:
+                inner[f, 0], inner[f, 1], inner[f, 2] = cells[v, 0], cells[v, 1], cells[v, 2]
+                inner[f, axis] += 1 - low
+                directions[f] = 2 * axis + low
+                f += 1
+
+
+@kernel("void(u1[::1], i4[:,::1], i8[::1], i4[:,::1], i8, i8)")
+def list_faces(
+    cases: NDArray[np.uint8],
+    table: NDArray[np.int32],
+    first: NDArray[np.int64],
+    quads: NDArray[np.int32],
+    start: int,
+    stop: int,
+) -> None:
+    """List the square faces between voxels inside and outside, in the order of `list_borders`.
+
+    The corners of a face are the four cells around the line that it crosses.
+
+    Parameters
+    ----------
+    cases, first
+        As in `list_borders`.
+    table : (n, 6) int32 array
+        Neighboring cells by direction.
+    quads : (q, 4) int32 array
+        Result: the cells around, counter-clockwise seen from outside where the axes are right-handed.
     start, stop : int
         Cells to work on.
     """
@@ -167,9 +195,6 @@ def list_faces(
             quads[f, 1] = before if low else beside
             quads[f, 2] = table[before, 2 * c]
             quads[f, 3] = beside if low else before
-            inner[f, 0], inner[f, 1], inner[f, 2] = cells[v, 0], cells[v, 1], cells[v, 2]
-            inner[f, axis] += 1 - low
-            directions[f] = 2 * axis + low
             f += 1
 
 

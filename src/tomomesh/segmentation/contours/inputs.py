@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
 
 from ...isosurface.runs import Runs
-from ...kernels.threads import in_blocks
+from ...kernels.threads import in_order
 from ...model.contours import HOLE, OUTER
+from ...model.sliced import parts_of, some_of
 from ...som.starts import moments
 from ..signal import SOLID, outline, pixels_of
 from .loops import Loop, Patch, trace
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
+
+    from ...model.sliced import Sliced
 
     Crossed = Callable[[NDArray[np.int64], NDArray[np.int64]], NDArray[np.float64]]
 
@@ -187,7 +190,7 @@ def solids(components: Sequence[Component]) -> set[int]:
     return {body for body, more in filled.items() if more > 0}
 
 
-def slices_with_several(mask: NDArray[np.bool_], threads: int = 0) -> int:
+def slices_with_several(mask: Sliced, threads: int = 0) -> int:
     """Count the slices in which components of the window lie side by side, for which one network is too few.
 
     A component counts where its box covers at least `BESIDE` of the largest one's and lies in no other; they are
@@ -195,37 +198,37 @@ def slices_with_several(mask: NDArray[np.bool_], threads: int = 0) -> int:
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : (K, J, I) bool array or slices of it
     threads : int
     """
-    several = np.zeros(len(mask), bool)
-
-    def work(start: int, stop: int) -> None:
-        for k in range(start, stop):
-            several[k] = _side_by_side(mask[k])
-
-    in_blocks(work, len(mask), block=8, threads=threads)
-    return int(several.sum())
+    return int(_of_planes(_side_by_side, mask, threads).sum())
 
 
-def share_of_holes(mask: NDArray[np.bool_], threads: int = 0) -> float:
+def share_of_holes(mask: Sliced, threads: int = 0) -> float:
     """Return the area of the holes in the slices of a window over its own, which an outline fills, in coarse pixels.
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : (K, J, I) bool array or slices of it
     threads : int
     """
-    areas = np.zeros((len(mask), 2))
+    filled, own = _of_planes(_filled_and_own, mask, threads).sum(axis=0)
+    return float(filled / max(own, 1) - 1.0)
 
-    def work(start: int, stop: int) -> None:
-        for k in range(start, stop):
-            coarse = _coarse(mask[k])
-            areas[k] = scipy.ndimage.binary_fill_holes(coarse).sum(), coarse.sum()
 
-    in_blocks(work, len(mask), block=8, threads=threads)
-    filled, own = areas.sum(axis=0)
-    return float(filled / max(own, 1.0) - 1.0)
+def _of_planes(find: Callable[[NDArray[np.bool_]], int | tuple[int, int]], mask: Sliced, threads: int) -> NDArray[Any]:
+    """Return what is found on each slice, (K, ...)."""
+    found: list[int | tuple[int, int]] = []
+    for start, stop in parts_of(mask):
+        some = some_of(mask, start, stop)
+        found += in_order(lambda k: find(some[k]), stop - start, block=8, threads=threads)  # noqa: B023
+    return np.array(found)
+
+
+def _filled_and_own(plane: NDArray[np.bool_]) -> tuple[int, int]:
+    """Count the coarse pixels of a plane, with its holes and without."""
+    coarse = _coarse(plane)
+    return int(scipy.ndimage.binary_fill_holes(coarse).sum()), int(coarse.sum())
 
 
 def _coarse(plane: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model.columns import any_of
-from ..model.points import CAP
-from ..pointcloud.samples import Samples
-from ..som.fit import match
-from .sample import REACH
+from ...model.columns import any_of
+from ...model.points import CAP
+from ...pointcloud.samples import Samples
+from ...som.fit import match
+from ..sample import REACH
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..model.networks import Networks
-    from ..model.volume import Volume
-    from .sample import Sampling
+    from ...model.networks import Networks
+    from ...model.volume import Volume
+    from ..sample import Sampling
 
     Floats = NDArray[np.float64]
 
