@@ -19,7 +19,7 @@ from studies import write_nifti
 from tomomesh import Volume, read_mesh, reconstruct
 from tomomesh.cli import main
 from tomomesh.large import LargeSurface, reconstruct_large
-from tomomesh.slabs import surface
+from tomomesh.slabs import rest, surface
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -104,8 +104,11 @@ class TestSame:
         assert told == ["part-001.ply", "part-002.ply", "part-003.ply", "part-pieces.json"]
 
 
-STAGES = ("ground", "squares_from", "region", "begun", "returned", "stepped", "chosen", "piece")
-"""What is done to a slab, by the function that does it."""
+STAGES = [
+    *((surface, name) for name in ("ground", "squares_from", "region", "chosen", "piece")),
+    *((rest, name) for name in ("begun", "returned", "stepped")),
+]
+"""What is done to a slab, by the function that does it and the module that asks for it."""
 
 
 def killed_once(*given: Any, work: Any, marker: Path, **named: Any) -> Any:
@@ -118,7 +121,7 @@ def killed_once(*given: Any, work: Any, marker: Path, **named: Any) -> Any:
 class TestWorkers:
     @pytest.fixture
     def study(self, tmp_path: Path) -> Path:
-        write_nifti(tmp_path / "labels.nii", (blobs(5) > 20).astype(np.uint8), np.eye(4))
+        write_nifti(tmp_path / "labels.nii", np.pad((blobs(5) > 20).astype(np.uint8), 1), np.eye(4))
         return tmp_path / "labels.nii"
 
     def line(self, study: Path, name: str) -> list[str]:
@@ -130,12 +133,12 @@ class TestWorkers:
         assert main([*self.line(study, "whole.ply"), "--no-remesh"]) == 0
         assert (study.parent / "workers.ply").read_bytes() == (study.parent / "whole.ply").read_bytes()
 
-    @pytest.mark.parametrize("stage", STAGES)
+    @pytest.mark.parametrize(("module", "stage"), STAGES)
     def test_a_worker_killed_in_any_stage(
-        self, stage: str, study: Path, here: Any, client: Any, monkeypatch: pytest.MonkeyPatch
+        self, module: Any, stage: str, study: Path, here: Any, client: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         marker = study.parent / "marker"
-        monkeypatch.setattr(surface, stage, partial(killed_once, work=getattr(surface, stage), marker=marker))
+        monkeypatch.setattr(module, stage, partial(killed_once, work=getattr(module, stage), marker=marker))
         monkeypatch.setattr(here.scheduler, "allowed_failures", 1)
         labels = Volume.from_stored((blobs(5) > 20).astype(np.uint8), np.eye(4))
         found = reconstruct_large(labels, client=client, slab=6, select=(1,))
