@@ -15,6 +15,7 @@ from tomomesh import Settings, Volume
 from tomomesh.errors import EmptyError, TomomeshError, UsageError
 from tomomesh.isosurface.run_mask import RunMask
 from tomomesh.model.lazy import Held, LazyVoxels, in_memory
+from tomomesh.segmentation.otsu import otsu_threshold
 from tomomesh.segmentation.padding import beside
 from tomomesh.segmentation.slabwise.cut import Cutting
 from tomomesh.segmentation.slabwise.levels import TAILS, levels_of
@@ -204,6 +205,22 @@ class TestSelection:
             kept(lazily(Volume.from_stored(BALL.astype(np.int16), np.eye(4))), {"lower": 7.0}, Cutting(range_of))
 
 
+class TestPadding:
+    @pytest.mark.parametrize("kind", ["i2", "f4", "f8"])
+    @pytest.mark.parametrize("level", [0.4, -9.0])
+    @pytest.mark.parametrize("place", [SLICES < 4, SLICES > 8, COLUMNS > 12, ROWS < 3, CIRCLE])
+    def test_is_found_in_slabs_and_has_no_say(self, place: NDArray[np.bool_], level: float, kind: str) -> None:
+        noise = 0.06 * np.random.default_rng(4).normal(size=SHAPE)
+        levels = (np.where(place, level, BALL + noise) * (500 if kind == "i2" else 1)).astype(kind)
+        for cutting in (Cutting(whole), Cutting(range_of), Cutting(lambda shape: [0, 2, 10, shape[0]])):
+            for study in (Volume.from_stored(levels, np.eye(4)), lazily(Volume.from_stored(levels, np.eye(4)))):
+                found = kept(study, {}, cutting).value.chosen
+                assert found.counts.padding == np.count_nonzero(place)
+                assert found.lower == otsu_threshold(levels[~place])
+                background = np.where(place, levels[~place].min(), levels)
+                np.testing.assert_array_equal(in_memory(found.volume.voxels), background)
+
+
 def range_of(shape: tuple[int, ...]) -> range:
     """Cut slice by slice."""
     return range(shape[0] + 1)
@@ -226,16 +243,26 @@ class TestBody:
     @law(25)
     @given(
         cutting=cuttings(), preset=st.sampled_from(["bone", "skin", "lung", "fat", None]), slices=st.integers(0, 2),
-        keep=st.sampled_from(["auto", "body", "all"]), padded=st.booleans(), edge=st.sampled_from([1.0, 4.0]),
+        keep=st.sampled_from(["auto", "body", "all"]), padded=st.booleans(), edge=st.sampled_from([0.7, 4.0]),
+        cells=st.sampled_from([20, 160]),
     )  # fmt: skip
     def test_of_a_head_on_a_table(
-        self, cutting: Cutting, preset: str | None, slices: int, keep: str, padded: bool, edge: float
+        self,
+        cutting: Cutting,
+        preset: str | None,
+        slices: int,
+        keep: str,
+        padded: bool,
+        edge: float,
+        cells: int,
     ) -> None:
         levels = head()
         levels[:, :2] = -3000 if padded else levels[:, :2]
         study = replace(Volume.from_stored(levels, np.diag([edge, edge, edge, 1.0])), unit="HU")
         asked = {"keep": keep, "slices": ("axial", "coronal", "sagittal")[slices]}
-        assert_the_same(study, asked | ({"preset": preset} if preset else {}), cutting)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("tomomesh.segmentation.body.CELLS", cells)
+            assert_the_same(study, asked | ({"preset": preset} if preset else {}), cutting)
 
 
 @st.composite
