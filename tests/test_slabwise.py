@@ -200,9 +200,10 @@ class TestSelection:
         with pytest.raises(UsageError, match="in memory alone"):
             kept(lazily(Volume.from_stored(labels, np.eye(4))), {"select": (1,), "fill_slices": True}, Cutting())
 
-    def test_nothing_in_the_window_names_the_range_of_the_whole(self) -> None:
+    @pytest.mark.parametrize("kind", ["i2", "f4"])
+    def test_nothing_in_the_window_names_the_range_of_the_whole(self, kind: str) -> None:
         with pytest.raises(EmptyError, match="between 0 and 1"):
-            kept(lazily(Volume.from_stored(BALL.astype(np.int16), np.eye(4))), {"lower": 7.0}, Cutting(range_of))
+            kept(lazily(Volume.from_stored(BALL.astype(kind), np.eye(4))), {"lower": 7.0}, Cutting(range_of))
 
 
 class TestPadding:
