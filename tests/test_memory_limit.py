@@ -93,13 +93,13 @@ class TestArrays:
 
     def test_small_ones_never_lie_in_files(self) -> None:
         before = len(maps())
-        with memory_limit("300MiB"):
+        with memory_limit("400MiB"):
             small = [np.empty(arrays.LARGE - 1, np.uint8) for _ in range(50)]
             assert len(maps()) == before
             del small
 
     def test_those_of_other_threads_and_of_later_are_as_ever(self) -> None:
-        found = list[str]()
+        found = list[str | None]()
 
         def look() -> None:
             found.append(get_handler_name(np.empty(8 * MIB, np.uint8)))
@@ -181,13 +181,13 @@ def test_pages_that_are_left_take_no_memory_until_they_are_read() -> None:
 
 
 class TestLimits:
-    @pytest.mark.parametrize("asked", ["", "much", "4 PB", "-4GB", "1e9", "1..5GB", "299MiB", "0", 1000, float("nan")])
+    @pytest.mark.parametrize("asked", ["", "much", "4 PB", "-4GB", "1e9", "1..5GB", "399MiB", "0", 1000, float("nan")])
     def test_what_is_none_is_refused(self, asked: str | float) -> None:
-        with pytest.raises(UsageError, match="300MiB or more"), memory_limit(asked):
+        with pytest.raises(UsageError, match="400MiB or more"), memory_limit(asked):
             pass
 
     def test_in_units(self) -> None:
-        asked = ["1GB", "1 gb", "1G", "1000MB", "1.0e9".replace("e9", "GB"), 1e9, 10**9]
+        asked: list[str | float] = ["1GB", "1 gb", "1G", "1000MB", "1.0 GB", 1e9, 10**9]
         assert {limit.bytes_of(one) for one in asked} == {10**9}
         assert limit.bytes_of("1GiB") == limit.bytes_of("1024 MiB") == 2**30
 
@@ -218,7 +218,7 @@ import numpy as np
 from tomomesh import TomomeshError, memory_limit
 resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, resource.RLIM_INFINITY))
 try:
-    with memory_limit("300MiB"):
+    with memory_limit("400MiB"):
         kept = [np.ones(8 << 20) for _ in range(20)]
 except TomomeshError as error:
     print(error.exit_code, error)
@@ -259,8 +259,8 @@ PEAK = """
 import numpy as np
 from pathlib import Path
 from tomomesh import memory_limit
-with memory_limit("400MiB"):
-    columns = [np.full(2 << 20, float(n)) for n in range(64)]  # 1 GiB
+with memory_limit("800MiB"):
+    columns = [np.full(4 << 20, float(n)) for n in range(64)]  # 2 GiB
     for n, column in enumerate(columns):
         column += columns[n - 1]
     assert [column[-1] for column in columns[1:]] == [sum(range(n + 1)) + 63 for n in range(1, 64)]
@@ -270,7 +270,7 @@ print(int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]) /
 
 def test_the_peak_stays_below() -> None:
     done = subprocess.run([sys.executable, "-c", PEAK], capture_output=True, text=True, check=True)
-    assert 200 < float(done.stdout) < 400
+    assert 300 < float(done.stdout) < 800
     assert not done.stderr  # nor is anything said when arrays go as the process ends
 
 
@@ -280,7 +280,7 @@ def test_a_surface_is_the_same(seed: int, least: int) -> None:
     cloud = sphere(3000) + np.random.default_rng(seed).normal(0, 0.005, (3000, 3))
     free = reconstruct_points(cloud)
     with all_in_files(least):
-        held = reconstruct_points(cloud, memory="300MiB")
+        held = reconstruct_points(cloud, memory="400MiB")
     assert get_handler_name(held.mesh.vertices) == "tomomesh"
     assert np.array_equal(free.mesh.vertices, held.mesh.vertices)
     assert np.array_equal(free.mesh.faces, held.mesh.faces)
@@ -292,7 +292,7 @@ def test_the_command_writes_the_same_file(folder: Path, tmp_path: Path) -> None:
     np.save(tmp_path / "cloud.npy", sphere(3000))
     line = ["surface", str(tmp_path / "cloud.npy"), "--quiet", "-o"]
     assert as_program([*line, str(folder / "free.ply")]).returncode == 0
-    assert as_program([*line, str(folder / "held.ply"), "--memory", "300MiB"]).returncode == 0
+    assert as_program([*line, str(folder / "held.ply"), "--memory", "400MiB"]).returncode == 0
     assert (folder / "free.ply").read_bytes() == (folder / "held.ply").read_bytes()
     refused = as_program([*line, str(folder / "none.ply"), "--memory", "little"])
     assert refused.returncode == 2

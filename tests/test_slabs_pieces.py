@@ -133,7 +133,7 @@ class TestRefusals:
             yield next(made)
             raise fault
 
-        monkeypatch.setattr("tomomesh.io.meshes.pieces.shares", fails)
+        monkeypatch.setattr("tomomesh.io.meshes.pieces.files.shares", fails)
         with pytest.raises(OutputError if isinstance(fault, OSError) else KeyboardInterrupt):
             write_pieces(ring().moved(2 * ring().vertices), folder / "m.ply", 3)
         assert sorted(folder.iterdir()) == names

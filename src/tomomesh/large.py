@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 BASE = 180e6
 """Bytes of Python, its packages, the kernels and Dask."""
 A_VOXEL = 6.0
-"""Bytes for each voxel of a slab and its halo, beside those of the file: what is read, the mask, and the mask joined."""
+"""Bytes for each voxel of a slab and its halo, beside those of the file: read, masked, joined."""
 A_CELL = 400.0
 """Bytes for each vertex of a slab and its halo."""
 CELLS_A_RUN = 6.0

@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from .effect import without_effect
+from .errors import UsageError
 from .finish import compare_with, finish
 from .memory.limit import memory_limit
 from .model.points import PointSet
@@ -240,9 +241,13 @@ def _give_back() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
-def settled(settings: Settings | None, changes: dict[str, Any]) -> Settings:
-    """Return the settings of a run; refuse those whose packages are not installed."""
+def settled(settings: Settings | None, changes: dict[str, Any], *, every: bool = False) -> Settings:
+    """Return the settings of a run; refuse those whose packages are not installed, or that are for every label."""
     settings = (settings or Settings()).replace(**changes)
+    if settings.cubes.shared_walls and not every:
+        raise UsageError(
+            "walls are shared among all labels of a map", found="--shared-walls for one mesh", hint="--each-label"
+        )
     if settings.printing.asked:
         from .printing.part import require_printing
 

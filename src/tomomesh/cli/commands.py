@@ -17,6 +17,7 @@ from .against import compared, is_mesh
 from .bars import Bars, bars_of
 from .batch import reconstruct_each, refuse_for_one
 from .each_label import reconstruct_each_label
+from .large import is_large, reconstruct_in_slabs
 from .options.likely import require_kind
 from .outputs.checks import (
     OF_STUDIES,
@@ -100,7 +101,10 @@ def _reconstruct(chosen: Namespace) -> None:
         reconstruct_each_label(chosen, settings, given_of(chosen), _reconstruct_one)
         return
     refuse_for_one(chosen)
-    surface = _reconstruct_one(chosen, settings)
+    if is_large(chosen):
+        surface = reconstruct_in_slabs(chosen, settings, given_of(chosen))
+    else:
+        surface = _reconstruct_one(chosen, settings)
     _tell(chosen, surface.report, summary.of_surface(surface.report, _shown(chosen)))
 
 

@@ -72,7 +72,7 @@ class Levels:
 
     Attributes
     ----------
-    voxels : (K, J, I) or (K, J, I, L) array, planes that are read as they are asked for, Columns or Stretch
+    voxels : (K, J, I) or (K, J, I, L) array, slices that are read as they are asked for, Columns or Stretch
     lower, upper : float or (L,) float array
         A layer is in its window where lower < k <= upper.
     layers : {"all", "any"}

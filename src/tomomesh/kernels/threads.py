@@ -62,14 +62,17 @@ def in_blocks(
     _in_pool(work, starts, total, block, workers, done)
 
 
-def in_order(find: Callable[[int], T], total: int, *, block: int = 1, threads: int = 0) -> list[T]:
+def in_order(
+    find: Callable[[int], T], total: int,
+    *, block: int = 1, threads: int = 0, done: Callable[[int], None] = lambda count: None,
+) -> list[T]:  # fmt: skip
     """Return what ``find(number)`` finds of ``range(total)``, in this order; see `in_blocks`."""
     found: dict[int, T] = {}
 
     def work(start: int, stop: int) -> None:
         found.update({number: find(number) for number in range(start, stop)})
 
-    in_blocks(work, total, block=block, threads=threads)
+    in_blocks(work, total, block=block, threads=threads, done=done)
     return [found[number] for number in range(total)]
 
 

@@ -23,12 +23,14 @@ if TYPE_CHECKING:
 KEPT = 0.25
 """Share of the limit, over what is taken at first, for large arrays that stay in the memory. Chosen: half of it takes
 2 % more time, twice leaves little for the pages of the others."""
-FULL = 0.85
-"""Share of the limit from which pages are let go of: the rest is for what comes before that is seen."""
-LOOK_S = 0.01
-"""How often that is looked at, seconds: in as many a processor fills some 20 MB."""
-LEAST = 300 << 20
-"""Smallest limit: Python, NumPy, SciPy and the kernels take half of it."""
+FULL = 0.7
+"""Share of the limit from which pages are let go of. The rest is for what comes before that is seen, which is late where
+NumPy holds the lock of the interpreter, and all cores are busy: .8 of 1 GiB was passed by 240 MiB, at 10 million points
+beside nine other processes on two cores."""
+LOOK_S = 0.005
+"""How often that is looked at, seconds: a processor fills some 20 MB meanwhile, and more where the machine is busy."""
+LEAST = 400 << 20
+"""Smallest limit: Python, NumPy, SciPy and Numba take half of it."""
 UNITS = {"": 1, **{f"{k}{b}": (1024 if b else 1000) ** n for n, k in enumerate("KMGT", 1) for b in ("", "I")}}
 """Bytes by unit, in capitals."""
 IN_MEMORY = ("tmpfs", "ramfs")
@@ -52,7 +54,7 @@ def bytes_of(size: str | float) -> int:
     found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*([KMGT]?I?)B?\s*", str(size).upper())
     number = float(found[1]) * UNITS.get(found[2], 0) if found else 0.0
     if not LEAST <= number < 1 << 62:
-        raise UsageError("that is no limit of the memory", found=f"memory = {size}", expected="300MiB or more, as 4GB")
+        raise UsageError("that is no limit of the memory", found=f"memory = {size}", expected="400MiB or more, as 4GB")
     return int(number)
 
 

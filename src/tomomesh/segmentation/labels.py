@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ..isosurface.walls.walls import Walls
     from ..model.boxes import Box
     from ..model.volume import Volume
     from .slabwise.cut import Cut, Cutting
@@ -99,6 +100,8 @@ class Labelled:
         First slice, row and column of each, and those behind its last.
     cut : Cut
         The voxels in slabs.
+    walls : Walls or None
+        Between all of them, where neighbors share them.
 
     Examples
     --------
@@ -112,6 +115,7 @@ class Labelled:
     numbers: Ints
     boxes: Ints
     cut: Cut
+    walls: Walls | None = None
 
     @classmethod
     def of(cls, volume: Volume, cutting: Cutting = HERE) -> Labelled:

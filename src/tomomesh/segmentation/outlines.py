@@ -13,6 +13,7 @@ import numpy as np
 
 from ..isosurface.run_mask import RunMask
 from ..kernels.measure.edges import join_pairs
+from ..model.sliced import ranges
 from .signal import SOLID
 
 if TYPE_CHECKING:
@@ -173,19 +174,57 @@ def outlines_of(mask: NDArray[np.bool_] | RunMask, pixel_mm: tuple[float, float]
     pixel_mm : (float, float)
         Distance of the columns and of the rows.
     """
-    inside, outside = _runs(boxed := _boxed(mask if isinstance(mask, RunMask) else RunMask.of([mask])))
-    count, rows = boxed.shape[0], boxed.shape[1] + 2 * FRAME
-    beside, above = inside.meeting(1, 1), inside.meeting(rows)
-    pieces, gaps = inside.joined(beside), outside.joined(outside.meeting(1))
-    held = gaps != gaps[0]  # the outside of all slices is one, through their frames
-    hollow = outside.of(held)
-    bodies = _sum(inside.joined(beside, above), inside.size)
-    bodies = bodies[bodies > 0]
-    return Outlines(
-        *_parts(inside, pieces, count), *_parts(hollow, gaps[held], count), _lengths(inside, beside, count, pixel_mm),
-        _ellipses(inside, rows, count), _sum(inside.slice, _shared(inside, above), count)[:-1], len(bodies),
-        float(bodies.max(initial=0.0) / max(bodies.sum(), 1.0)), _forks(pieces, above), pixel_mm,
-    )  # fmt: skip
+    boxed = _boxed(mask if isinstance(mask, RunMask) else RunMask.of([mask]))
+    count = boxed.shape[0]
+    parts = [
+        _Part.of(boxed.part(start, min(stop + 1, count)), stop - start, pixel_mm) for start, stop in ranges(0, count)
+    ]
+    *columns, shared = (np.concatenate(each) for each in zip(*(part.columns for part in parts), strict=True))
+    bodies, forks = _bodies(parts), sum(part.forks for part in parts)
+    largest = float(bodies.max(initial=0.0) / max(bodies.sum(), 1.0))
+    return Outlines(*columns, shared[:-1], len(bodies), largest, forks, pixel_mm)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What some slices are, by the columns of `Outlines`, and the pixels (p,) of their pieces, slice after slice.
+
+    Links (2, q) are pieces that share pixels with those of the next slice, as far as the one that follows the last.
+    """
+
+    columns: list[NDArray[Any]]
+    sizes: Floats
+    links: Ints
+    forks: int
+
+    @classmethod
+    def of(cls, mask: RunMask, own: int, pixel_mm: tuple[float, float]) -> _Part:
+        """Look at some slices, of which the one that follows their `own` only tells how these go on."""
+        inside, outside = _runs(mask)
+        count, rows = mask.shape[0], mask.shape[1] + 2 * FRAME
+        beside, above = inside.meeting(1, 1), inside.meeting(rows)
+        pieces, gaps = inside.joined(beside), outside.joined(outside.meeting(1))
+        held = gaps != gaps[0]  # the outside of all slices is one, through their frames
+        columns = [
+            *_parts(inside, pieces, count), *_parts(outside.of(held), gaps[held], count),
+            _lengths(inside, beside, count, pixel_mm), _ellipses(inside, rows, count),
+            _sum(inside.slice, _shared(inside, above), count),
+        ]  # fmt: skip
+        first, pieces = np.unique(pieces, return_inverse=True)
+        links = np.stack(np.divmod(np.unique(pieces[above[0]] * len(first) + pieces[above[1]]), max(len(first), 1)))
+        known = np.count_nonzero(inside.slice[first] < own)
+        return cls([one[:own] for one in columns], _sum(pieces, inside.size)[:known], links, _forks(links))
+
+
+def _bodies(parts: list[_Part]) -> Floats:
+    """Return the pixels of the pieces in space."""
+    sizes = np.concatenate([part.sizes for part in parts])
+    first = np.cumsum([0, *(len(part.sizes) for part in parts)])
+    roots = np.arange(len(sizes), dtype=np.int32)
+    for part, before in zip(parts, first.tolist(), strict=False):
+        join_pairs(*(part.links + before), roots)
+    found = _sum(roots, sizes)
+    return found[found > 0]
 
 
 def _boxed(mask: RunMask) -> RunMask:
@@ -246,7 +285,6 @@ def _ellipses(runs: _Runs, rows: int, count: int) -> Floats:
     return np.where(area > 0, 4 * np.pi * np.sqrt(spread), 0.0)
 
 
-def _forks(pieces: Ints, above: tuple[Ints, Ints]) -> int:
+def _forks(links: Ints) -> int:
     """Count the pieces that go on as several, or come of several."""
-    links = np.stack(np.divmod(np.unique(pieces[above[0]] * len(pieces) + pieces[above[1]]), max(len(pieces), 1)))
     return sum(int(np.count_nonzero(np.bincount(ends) > 1)) for ends in links) if links.size else 0

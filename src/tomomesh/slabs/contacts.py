@@ -76,12 +76,17 @@ def drawn_from(parts: Sequence[Part], first: int, last: int, shape: tuple[int, .
     return np.unpackbits(bits, axis=1, count=size).view(np.bool_).reshape(len(bits), *shape)
 
 
-def filled(slices: Sequence[RunMask]) -> RunMask:
-    """Fill what the outside of a frame does not reach, given as a mask a slab.
+def whole_of(slices: Sequence[RunMask]) -> RunMask:
+    """Return the mask of a frame from those of its slabs; what lies behind the last slice is empty."""
+    return RunMask.joined([*slices, RunMask.none((1, *slices[0].shape[1:]))])
 
-    What lies behind the last slice is empty; a mask without contacts stays without them.
-    """
-    empty = RunMask.none((1, *slices[0].shape[1:]))
-    mask = RunMask.joined([*slices, empty])
+
+def filled(mask: RunMask) -> RunMask:
+    """Fill what the outside of a frame does not reach; a mask without contacts stays without them."""
     holes = Runs.of(~mask)
     return mask | holes.mask.only(~holes.bordering[holes.parts])
+
+
+def cavities_in(mask: RunMask) -> int:
+    """Count what the outside of a frame does not reach."""
+    return int(np.count_nonzero(~Runs.of(~mask).bordering))

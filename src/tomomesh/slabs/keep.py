@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mmap
 import tempfile
-import weakref
 from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -138,7 +137,6 @@ class File:
     def _written(self, array: np.ndarray[Any, Any]) -> _Far:
         if self.handle is None:
             self.handle = tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115 - closed with its last user
-            weakref.finalize(self, self.handle.close)
         self.handle.seek(self.end)
         left = array.reshape(-1).view(np.uint8)
         while len(left):
@@ -157,9 +155,15 @@ def put_away(value: Any, file: File) -> Any:
     return _changed(value, file.put)
 
 
-def mapped(value: Any) -> Any:
-    """Return a value whose arrays are all to be looked at."""
-    return _changed(value, lambda part: part.mapped() if isinstance(part, _Far) else part)
+def mapped(value: Any, *, own: bool = False) -> Any:
+    """Return a value whose arrays can all be worked on, if asked for those too that another process has sent."""
+
+    def looked_at(part: Any) -> Any:
+        if isinstance(part, _Far):
+            return part.mapped()
+        return part.copy() if own and isinstance(part, np.ndarray) and not part.flags.behaved else part
+
+    return _changed(value, looked_at)
 
 
 def bytes_of(value: Any) -> int:

@@ -92,7 +92,7 @@ def _values(kept: Any) -> Any:
     """Return what is kept, in lists and tuples too."""
     if isinstance(kept, list | tuple):
         return type(kept)(map(_values, kept))
-    return mapped(kept.value) if isinstance(kept, _Held) else kept
+    return mapped(kept.value, own=True) if isinstance(kept, _Held) else kept
 
 
 def _done(work: Callable[..., Any], row: list[Any], beside: int) -> _Held:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
-from ..isosurface.runs import Runs
-from ..segmentation.slabwise.sources import Drawn
+from ..segmentation.slabwise.sources import MaskVoxels
 from ..settings import option_of
 from ..slabs.patches.patch import patches_of
 from ..slabs.patches.promise import check_patches
@@ -37,7 +36,7 @@ def require_slabs(settings: Settings) -> None:
     UsageError
     """
     asked = [option_of(name) for name in WHOLE if getattr(settings.run, name)]
-    asked += ["--surface outer"] * (settings.cubes.surface == "outer") + ["a part to print"] * settings.printing.asked
+    asked += ["a part to print"] * settings.printing.asked
     if asked:
         raise UsageError(
             "this needs the whole mesh at once", found=f"{asked[0]}, and a mesh that is made slab by slab",
@@ -62,9 +61,11 @@ def _asked(chosen: Chosen, settings: Settings) -> Asked:
     """Ask for the boundary of the voxels that are kept; of labels that all are, they tell all that there is to know."""
     volume, runs = chosen.volume, chosen.runs
     source = getattr(volume.voxels, "source", None)
-    alone = isinstance(source, Drawn) and source.mask.count == runs.count
+    alone = isinstance(source, MaskVoxels) and source.mask.count == runs.count
+    surface = "outer" if settings.cubes.surface == "outer" else "all"
     return Asked(
-        runs, None if alone else volume.voxels, volume.affine, chosen.lower, chosen.upper, settings.window.layers
+        runs, None if alone else volume.voxels, volume.affine, chosen.lower, chosen.upper, settings.window.layers,
+        surface,
     )  # fmt: skip
 
 
@@ -87,8 +88,8 @@ def _told(made: SlabSurface, kept: Selected, *, labels: bool) -> tuple[dict[str,
         warnings = ("the gray levels are those of a mask: the surface is evened out between the voxels",)
     elif steps and not made.trace.converged:
         warnings = (f"the mesh had not come to rest after {steps} steps",)
-    slabs = {"count": len(made.mesh.pieces)}
-    return {"points": points, "voxels": voxels, "surface": {"square_faces": squares}, "fit": fit, "slabs": slabs}, warnings
+    surface, slabs = {"square_faces": squares}, {"count": len(made.mesh.pieces)}
+    return {"points": points, "voxels": voxels, "surface": surface, "fit": fit, "slabs": slabs}, warnings
 
 
 @timed("quality")
@@ -102,13 +103,11 @@ def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> S
     progress("checks", 0, 1)
     across = kept.study.affine[:3, 2]
     patches = patches_of(made.mesh, tuple(map(float, across)))
-    runs = made.joined
-    cavities = int((~Runs.of(~runs).bordering).sum())
-    whole = check_patches(patches, cavities=cavities)
+    whole = check_patches(patches, cavities=made.cavities)
     progress("checks", 1, 1)
-    found = whole.topology.components
-    told = {"found": found, "cavities": cavities, "taken": found, "debris": 0, "enclosed_cubes": runs.count}
-    return Stage((patches, whole, cavities), {"surface": told})
+    found, inside = whole.topology.components, made.enclosed
+    told = {"found": found, "cavities": made.cavities, "taken": found, "debris": 0, "enclosed_cubes": inside}
+    return Stage((patches, whole, made.cavities), {"surface": told})
 
 
 @timed("quality")

@@ -31,11 +31,11 @@ CUTS = ("scale", "flat_base", "one_piece", "fill_cavities", "thicken", "hollow",
 """Parameters that change a part."""
 MESH_ONLY = ("local_origin", "smooth", "allow_far", "remesh", "edge", "target_faces")
 """Parameters of the run that matter to meshes alone."""
-STUDY_ONLY = ("frame",)
-"""Parameters of the run that matter to studies alone."""
+STUDY_ONLY = ("frame", "shared_walls")
+"""Parameters that matter to studies of a user's own alone."""
 SURFACE_ONLY = (
     "cell_mm", "cell_factor", "closing", "fill_holes", "stacks", "largest", "allow_leaks", "surface", "low_pass",
-    *MESH_ONLY,
+    "shared_walls", *MESH_ONLY,
 )  # fmt: skip
 """Parameters that do not matter to the points."""
 

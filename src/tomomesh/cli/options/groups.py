@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...settings import Settings, option_of, parameters
 from .formats import LABEL, POINT, STUDY
-from .parameters import add_parameter, chosen_from, size_in_bytes
+from .parameters import add_parameter, chosen_from
 
 if TYPE_CHECKING:
     import argparse
@@ -86,10 +86,9 @@ def add_scale(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--memory",
-        type=size_in_bytes,
         metavar="SIZE",
-        help="work on one study slab by slab, each process within so much memory, as 4GB or 500MiB; the voxels are "
-        "never read whole",
+        help="work on one study slab by slab, each process within so much memory, as 4GB or 500MiB; its voxels, and "
+        "the mesh around them, are never whole",
     )
     group.add_argument(
         "--slab", type=int, metavar="N", help="slices of a slab, in place of as many as the memory holds"
@@ -98,7 +97,7 @@ def add_scale(parser: argparse.ArgumentParser) -> None:
         "--pieces",
         type=int,
         metavar="N",
-        help="write a study's mesh that was made slab by slab as N files NAME-1.ply, ... that weld exactly",
+        help="write a mesh that was made slab by slab as N files, NAME-001.ply and so on, that weld exactly",
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 from typing import TYPE_CHECKING, Any
 
 from ...settings import LAYERS, MANY, asked_by, limits_of, option_of, parameters
@@ -18,9 +17,6 @@ ALIASES = {"cell_mm": "--cell"}
 WIDE = 40
 """Letters of choices over which they are listed in the help of an option: with its own name they would be wider than
 half of a terminal of 80 columns."""
-
-SIZE = re.compile(r"([0-9]*\.?[0-9]+)\s*(?:([kmgt])(i)?)?b?", re.IGNORECASE)
-"""A number of bytes, or of thousands of them, or of 1024."""
 
 
 def spellings(name: str) -> list[str]:
@@ -87,21 +83,6 @@ def _is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def size_in_bytes(text: str) -> int:
-    """Return a size of memory, as ``4GB`` or ``500 MiB``, in bytes.
-
-    Examples
-    --------
-    >>> size_in_bytes("4GB"), size_in_bytes("1.5 GiB")
-    (4000000000, 1610612736)
-    """
-    found = SIZE.fullmatch(text.strip())
-    if not found:
-        raise argparse.ArgumentTypeError(f"invalid size: {text!r} (as 4GB or 500MiB)")
-    number, letter, binary = found.groups()
-    return int(float(number) * (1024 if binary else 1000) ** " kmgt".index((letter or " ").lower()))
 
 
 def add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:

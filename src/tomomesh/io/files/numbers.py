@@ -1,4 +1,4 @@
-"""Numbers that stand one behind the other in files, packed or not, read part by part."""
+"""FileNumbers that stand one behind the other in files, packed or not, read part by part."""
 
 from __future__ import annotations
 
@@ -82,10 +82,10 @@ class Unpacked:
     skip: int
     length: int
     name: str
-    _held: list[Copy] = field(default_factory=list, compare=False, repr=False)
+    _copies: list[Copy] = field(default_factory=list, compare=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_held": []}
+        return {**self.__dict__, "_copies": []}
 
     def now(self) -> Unpacked:
         """Unpack now, so that what is damaged is told now.
@@ -95,12 +95,12 @@ class Unpacked:
         FormatError, UnreadableError, ResourceError
             As `unpacked` and `copy`, and where the disk has no room.
         """
-        self._held[:] = [_unpacked(self)]
+        self._copies[:] = [_unpacked(self)]
         return self
 
     def opened(self) -> tuple[Copy, int]:
         """Return what is unpacked."""
-        return (self._held[0] if self._held else _unpacked_again(self)), 0
+        return (self._copies[0] if self._copies else _unpacked_again(self)), 0
 
 
 def _unpacked(packed: Unpacked) -> Copy:
@@ -108,12 +108,12 @@ def _unpacked(packed: Unpacked) -> Copy:
     promised = len(packed.files) * packed.length
     if promised > (free := shutil.disk_usage(tempfile.gettempdir()).free):
         raise _no_room(packed, f"at most {free} bytes")
-    with tempfile.TemporaryFile(prefix="tomomesh-") as held:
+    with tempfile.TemporaryFile(prefix="tomomesh-", buffering=0) as copied:
 
         def write(data: memoryview) -> None:
             try:
-                held.write(data)
-                held.flush()
+                while data:
+                    data = data[copied.write(data) :]
             except OSError as fault:
                 raise _no_room(packed) if fault.errno in NO_ROOM else fault from None
 
@@ -121,7 +121,7 @@ def _unpacked(packed: Unpacked) -> Copy:
             with unpacked(seen.unchanged(), packed.packing, file=packed.name, start=start) as stream:
                 pass_over(stream, packed.skip)
                 copy(packed.length, stream, write, file=packed.name)
-        return Copy(os.dup(held.fileno()), "rb")
+        return Copy(os.dup(copied.fileno()), "rb")
 
 
 def _no_room(packed: Unpacked, expected: str = "") -> ResourceError:
@@ -138,7 +138,7 @@ _unpacked_again = lru_cache(COPIES)(_unpacked)
 
 
 @dataclass(frozen=True)
-class Numbers:
+class FileNumbers:
     """An array of numbers in files.
 
     Attributes

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import OutputError
 from ...model.mesh import TriMesh
 from ..files.signature import signature
-from .parts import InOnePiece
+from .pieces.parts import InOnePiece
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..fields import Fields
-    from .parts import Parts
+    from .pieces.parts import Parts
 
 
 MOVED = 1 / 32

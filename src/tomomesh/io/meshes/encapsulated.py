@@ -10,7 +10,7 @@ from ...errors import FormatError, TomomeshError, UsageError
 from ..files.atomic import check_output, replacing
 from ..files.source import third_party, unheard
 from .attributes import MeshAttributes
-from .parts import InOnePiece
+from .pieces.parts import InOnePiece
 from .stl import read_stl, stl_parts
 
 if TYPE_CHECKING:

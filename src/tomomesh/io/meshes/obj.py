@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from .attributes import MeshAttributes
     from .cells import Arrays
-    from .parts import Parts
+    from .pieces.parts import Parts
 
 VERTEX, FACE = re.compile(r"\s*[vV](?!\S)"), re.compile(r"\s*(f|F|fo)(?!\S)")
 """How the lines of vertices and of faces begin; old files name outlines of faces apart."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from ..fields import Fields
     from .attributes import MeshAttributes
-    from .parts import Parts
+    from .pieces.parts import Parts
 
 TYPE_NAMES = {
     "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
@@ -42,8 +42,7 @@ WRITTEN = ("u1", "i4", "u4", "f4", "f8")
 """Codes of the types that are written: meshio's reader of binary files knows no other names of ours."""
 
 MOST_VERTICES = 2**31 - 1
-"""As many as ``int`` numbers. Of ``uint``, which would reach twice as far, VTK makes ``int`` again, and PLY has nothing
-longer."""
+"""As many as ``int`` numbers, which every reader takes; ``uint``, the longest that PLY has, reaches twice as far."""
 
 LINE_END = re.compile(rb"[ \t]*(\r\n|\n|\r)")
 """The end of the header's last line: behind a lone carriage return the first row may begin with any byte but that of a
@@ -107,8 +106,8 @@ class PlyHeader:
         return self.elements[:at], (*self.elements, PlyElement(name, 0, ()))[at]
 
 
-def parse_header(data: bytes, *, file: str) -> PlyHeader:
-    """Read a PLY header and compare what it promises with what the file holds.
+def parse_header(data: bytes, *, file: str, size: int | None = None) -> PlyHeader:
+    """Read a PLY header and compare what it promises with what the file holds: `size` bytes, or those of `data`.
 
     Raises
     ------
@@ -128,7 +127,8 @@ def parse_header(data: bytes, *, file: str) -> PlyHeader:
     except (IndexError, KeyError, ValueError):
         raise FormatError("the PLY header cannot be understood", file=file) from None
     # the last row of a text needs no line end
-    require_bytes(promised - (1 if text else 0), len(data) - length, file=file)
+    held = len(data) if size is None else size
+    require_bytes(promised - (1 if text else 0), held - length, file=file)
     return header
 
 

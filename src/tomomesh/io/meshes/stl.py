@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from .attributes import MeshAttributes
     from .cells import Arrays
-    from .parts import Parts
+    from .pieces.parts import Parts
 
 FACE = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
 """One face of a binary STL file."""

@@ -15,7 +15,7 @@ from .gifti import is_bare, write_gifti
 from .glb import write_glb
 from .obj import obj_parts
 from .off import write_off
-from .parts import InOnePiece, write_parts
+from .pieces.parts import InOnePiece, write_parts
 from .ply import ply_parts
 from .stl import stl_parts
 from .threemf import write_3mf
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .parts import Parts
+    from .pieces.parts import Parts
 
 
 def write_mesh(

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import FormatError
 from ...model.lazy import LazyVoxels, Voxels, in_memory, layer_of, slabs
 from ..files.limits import require_bytes, require_memory, require_rows
-from ..files.numbers import Numbers, Plain, Unpacked
+from ..files.numbers import FileNumbers, Plain, Unpacked
 from ..files.parts import Seen, read_later
 from ..files.source import existing_file, first_bytes, third_party, whole
 from ..files.unpack import PLAIN, check_promise, fill, pass_over, unpacked
@@ -183,14 +183,14 @@ def layers_last(stored: Any, space: Sequence[int], *, file: str) -> Any:
     return turned if turned.ndim == 4 else at_once(turned, file=file).reshape(*turned.shape[:3], -1)
 
 
-def _opened(raster: Raster, file: str) -> Numbers:
+def _opened(raster: Raster, file: str) -> FileNumbers:
     """Return the numbers where they are, unpacked where they have to be."""
     starts, seen = [_start(raster, part, file) for part in raster.parts], tuple(map(Seen.of, raster.parts))
     if raster.packing == PLAIN:
         plain = (Plain(one, start + raster.skip) for one, start in zip(seen, starts, strict=True))
-        return Numbers(raster.shape, raster.dtype, tuple(plain))
+        return FileNumbers(raster.shape, raster.dtype, tuple(plain))
     packed = Unpacked(seen, tuple(starts), raster.packing, raster.skip, raster.part_bytes, file)
-    return Numbers(raster.shape, raster.dtype, (packed.now(),))
+    return FileNumbers(raster.shape, raster.dtype, (packed.now(),))
 
 
 def _start(raster: Raster, part: Path, file: str) -> int:
@@ -225,7 +225,7 @@ def many_levels(stored: Voxels) -> bool:
         return False
     seen = np.zeros((stored.shape[3], 256), np.bool_)
     for slab in slabs(stored):
-        for layer, levels in zip(np.moveaxis(slab, 3, 0), seen, strict=True):
+        for layer, levels in zip(np.moveaxis(in_memory(slab), 3, 0), seen, strict=True):
             levels |= np.bincount(layer.ravel(), minlength=256) > 0
         if (seen.sum(axis=1) > 2).any():
             return True

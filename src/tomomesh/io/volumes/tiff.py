@@ -18,7 +18,7 @@ from ...model.units import millimeters
 from ...model.volume import Volume
 from ..files.extras import required
 from ..files.limits import require_bytes, require_memory
-from ..files.numbers import Numbers, Plain
+from ..files.numbers import FileNumbers, Plain
 from ..files.parts import Seen, read_later
 from ..files.source import existing_file, third_party
 from .affine import GIVEN, UNTURNED, check_spacing, passed_over, required_spacing, upright
@@ -109,7 +109,7 @@ def _numbers(found: list[Any], path: Path, name: str) -> Any:
     shape, start = (count, *page, 1), found[0].dataoffset
     if read_later() and len(found) == 1 and start is not None:
         kind = found[0].dtype.newbyteorder(found[0].keyframe.parent.byteorder)
-        return LazyVoxels.of(Numbers(shape, kind, (Plain(Seen.of(path), start),)))
+        return LazyVoxels.of(FileNumbers(shape, kind, (Plain(Seen.of(path), start),)))
     if read_later() and len(pages_of(found)) == count:
         return LazyVoxels.of(Pages(shape, found[0].dtype, Seen.of(path), name))
     require_memory(sum(one.nbytes for one in found), file=name)

@@ -17,7 +17,7 @@ from ..signal import SOLID, outline, pixels_of
 from .loops import Loop, Patch, trace
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -155,14 +155,14 @@ class Component:
         return Inputs(shown + self.low, None, patch, OUTER, len(loop), outlined=solid)
 
 
-def components_of(plane: NDArray[np.bool_], bodies: NDArray[np.int32]) -> tuple[list[Component], int]:
+def components_of(plane: NDArray[np.bool_], body_at: Callable[[int, int], int]) -> tuple[list[Component], int]:
     """Part the window of a slice into its connected components.
 
     Parameters
     ----------
     plane : (J, I) bool array
-    bodies : (J, I) int32 array
-        The numbers of the connected components of the whole window.
+    body_at : callable
+        Told a pixel (row, column), returns the number of the connected component of the whole window there.
 
     Returns
     -------
@@ -176,12 +176,13 @@ def components_of(plane: NDArray[np.bool_], bodies: NDArray[np.int32]) -> tuple[
     for number, (rows, columns) in enumerate(boxes, 1):
         if 2 * (rows.stop - rows.start + columns.stop - columns.start) >= SHORTEST:
             pixels = labels[rows, columns] == number
-            body = int(bodies[rows, columns][pixels][0])
+            row, column = divmod(int(np.argmax(pixels)), pixels.shape[1])
+            body = body_at(rows.start + row, columns.start + column)
             found.append(Component(body, np.array([columns.start, rows.start]), pixels))
     return found, len(boxes) - len(found)
 
 
-def solids(components: Sequence[Component]) -> set[int]:
+def solids(components: Iterable[Component]) -> set[int]:
     """Return the bodies that are solids, and not walls, over all their slices; see `signal.fills_most`."""
     filled: dict[int, float] = {}
     for one in components:

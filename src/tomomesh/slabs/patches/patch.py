@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Patch:
+class MeshPatch:
     """The faces of a slab, over vertices that are numbered within it.
 
     Attributes
@@ -71,7 +71,7 @@ class Patches:
     slabs : Slabs
         Who works on them.
     kept : list of Kept
-        Of `Patch`.
+        Of `MeshPatch`.
     vertex_count : int
         Of the whole mesh.
     extent : Extent
@@ -93,7 +93,7 @@ class Patches:
     def __len__(self) -> int:
         return len(self.kept)
 
-    def __iter__(self) -> Iterator[Patch]:
+    def __iter__(self) -> Iterator[MeshPatch]:
         """Hand out one patch after the other."""
         return (self.slabs.fetch([one])[0] for one in self.kept)
 
@@ -134,14 +134,14 @@ class Patches:
         """Count the positions that stay apart at a precision."""
         return distinct_in(self, kind)
 
-    def _faces(self, made: Callable[[Patch, Any], NDArray[Any]]) -> Iterator[NDArray[Any]]:
+    def _faces(self, made: Callable[[MeshPatch, Any], NDArray[Any]]) -> Iterator[NDArray[Any]]:
         return self._rows(lambda one: one.faces[: one.halves], lambda one: one.faces[one.halves :], made)
 
     def _rows(
         self,
-        first: Callable[[Patch], NDArray[Any]],
-        last: Callable[[Patch], NDArray[Any]],
-        made: Callable[[Patch, Any], NDArray[Any]],
+        first: Callable[[MeshPatch], NDArray[Any]],
+        last: Callable[[MeshPatch], NDArray[Any]],
+        made: Callable[[MeshPatch, Any], NDArray[Any]],
     ) -> Iterator[NDArray[Any]]:
         """Hand out what is made of some rows of each patch, then of others, some at a time."""
         for rows_of in (first, last):
@@ -175,13 +175,13 @@ def _extent(slabs: Slabs, kept: list[Kept], faces: int) -> Extent:
     return Extent(np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1], faces)
 
 
-def _carried(patch: Patch, matrix: Floats) -> Patch:
+def _carried(patch: MeshPatch, matrix: Floats) -> MeshPatch:
     turned = slice(None, None, -1 if np.linalg.det(matrix[:3, :3]) < 0 else 1)
     places = carried(patch.vertices, matrix[:3, :3].T, matrix[:3, 3])
     return replace(patch, vertices=places, faces=np.ascontiguousarray(patch.faces[:, turned]))
 
 
-def _box(patch: Patch) -> Floats | None:
+def _box(patch: MeshPatch) -> Floats | None:
     return np.stack(box(patch.kept)) if len(patch.kept) else None
 
 
@@ -218,7 +218,7 @@ def _places(piece: Piece, begins: Ints, numbers: Ints) -> Floats:
     return np.asarray(np.concatenate([piece.vertices, piece.centers])[_owned(piece, begins, numbers)])
 
 
-def _patch(piece: Piece, begins: Ints, asked: Ints, beside: Ints, given: Floats) -> Patch:
+def _patch(piece: Piece, begins: Ints, asked: Ints, beside: Ints, given: Floats) -> MeshPatch:
     """Put a piece and what it uses of others together."""
     own, centers = len(piece.vertices), len(piece.centers)
     shared = np.zeros(own + centers + len(beside), np.bool_)
@@ -226,7 +226,7 @@ def _patch(piece: Piece, begins: Ints, asked: Ints, beside: Ints, given: Floats)
     shared[own + centers :] = True
     ranges = [begins[0] + np.arange(own), begins[1] + np.arange(centers), beside]
     faces = [_local(piece, begins, some, beside).astype(np.int32) for some in (piece.halves, piece.quarters)]
-    return Patch(
+    return MeshPatch(
         np.concatenate([piece.vertices, piece.centers, given]), np.concatenate(faces), np.concatenate(ranges), shared,
         own, centers, len(piece.halves),
     )  # fmt: skip

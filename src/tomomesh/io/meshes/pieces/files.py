@@ -6,20 +6,20 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import UsageError
-from ...model.columns import box
-from ...model.mesh import TriMesh
-from ...slabs.patches.patch import in_one_patch
-from ...slabs.patches.shares import shares
-from ..documents import json_of
-from ..files.atomic import check_output, replacing
-from ..files.source import suffix_of
-from .attributes import MeshAttributes, fits_single, require_single
+from ....errors import UsageError
+from ....model.columns import box
+from ....model.mesh import TriMesh
+from ....slabs.patches.patch import in_one_patch
+from ....slabs.patches.shares import shares
+from ...documents import json_of
+from ...files.atomic import check_output, replacing
+from ...files.source import suffix_of
+from ..attributes import MeshAttributes, fits_single, require_single
+from ..write import PART_WRITERS
 from .parts import InOnePiece
-from .write import PART_WRITERS
 
 if TYPE_CHECKING:
-    from ...slabs.patches.patch import Patches
+    from ....slabs.patches.patch import Patches
 
 MOST_PIECES = 200
 """Files of one mesh: all are open until the last is whole, and macOS lets a process have 256."""

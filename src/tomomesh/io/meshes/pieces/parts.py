@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from ...measure.topology import count_positions
-from ...model.columns import parts_of
-from ..files.atomic import replacing
+from ....measure.topology import count_positions
+from ....model.columns import parts_of
+from ...files.atomic import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ...model.mesh import TriMesh
+    from ....model.mesh import TriMesh
 
     Floats = NDArray[np.float64]
 
