@@ -14,7 +14,7 @@ from conftest import law, seeds
 from tomomesh import Settings, Volume
 from tomomesh.errors import EmptyError, TomomeshError, UsageError
 from tomomesh.isosurface.run_mask import RunMask
-from tomomesh.model.lazy import Held, LazyVoxels, in_memory
+from tomomesh.model.lazy import ArraySource, LazyVoxels, in_memory
 from tomomesh.segmentation.otsu import otsu_threshold
 from tomomesh.segmentation.padding import beside
 from tomomesh.segmentation.slabwise.cut import Cutting
@@ -105,7 +105,7 @@ def kept(volume: Volume, asked: dict[str, Any], cutting: Cutting, labels: Volume
 
 def lazily(volume: Volume) -> Volume:
     """Have its voxels stay where they are until they are read."""
-    voxels: Any = LazyVoxels.of(Held(volume.voxels))
+    voxels: Any = LazyVoxels.of(ArraySource(volume.voxels))
     return replace(volume, voxels=voxels)
 
 
@@ -287,7 +287,7 @@ class TestSources:
         inner = np.arange(1, 1 + np.prod(sizes)).reshape(sizes)
         whole = np.zeros((8, 8, 8), inner.dtype)
         whole[tuple(slice(a, a + size) for a, size in zip(low, sizes, strict=True))] = inner
-        placed = LazyVoxels.of(Placed(inner if here else LazyVoxels.of(Held(inner)), low, (8, 8, 8)))
+        placed = LazyVoxels.of(Placed(inner if here else LazyVoxels.of(ArraySource(inner)), low, (8, 8, 8)))
         np.testing.assert_array_equal(placed[at].read(), whole[at])
 
     @law(100)
