@@ -8,7 +8,7 @@ import numpy as np
 
 from bench import at_most, header, judge, note
 from tomomesh import SOM
-from tomomesh.segmentation.training import train_study
+from tomomesh.segmentation.networks.training import train_study
 from tomomesh.settings import NetworkSettings
 
 if TYPE_CHECKING:

@@ -16,9 +16,9 @@ from tomomesh import Settings, Volume, reconstruct, window
 from tomomesh.cli import main
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.isosurface.voxels import boundary
+from tomomesh.segmentation.networks.training import train_study
 from tomomesh.segmentation.otsu import otsu_threshold
 from tomomesh.segmentation.survey import survey
-from tomomesh.segmentation.training import train_study
 from tomomesh.segmentation.window import by_layer, choose_window
 from tomomesh.settings import NetworkSettings, WindowSettings
 

@@ -61,7 +61,7 @@ class TestCrop:
         assert np.shares_memory(found.voxels, volume.voxels)
         assert_in_place(found)
         whole = np.zeros(volume.shape, bool)
-        whole[box] = True if inside is None else inside
+        whole[box] = True if inside is None else inside[:]
         assert np.array_equal(whole.ravel(), wanted)
 
     @pytest.mark.parametrize("name", NAMES)

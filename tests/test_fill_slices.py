@@ -12,6 +12,7 @@ from studies import write_nifti
 from tomomesh import compare_with_study, reconstruct
 from tomomesh.cli import main
 from tomomesh.errors import EmptyError, UsageError
+from tomomesh.isosurface.run_mask import RunMask
 from tomomesh.model.volume import Volume
 from tomomesh.segmentation.contours.labelled import filled_slices, gaps_in
 
@@ -87,7 +88,7 @@ class TestSolid:
     def test_slices_lie_across_any_axis(self, axis: int) -> None:
         body = BODIES["ball"][0]
         sparse = thinned(body, 4, 2, axis)
-        found = gaps_in(sparse)
+        found = gaps_in(RunMask.of([sparse]))
         assert found is not None
         assert found.axis == axis
         filled, _ = filled_slices(sparse, volume_of(sparse, np.diag([1.0, 1.0, 1.0, 1.0])))
@@ -136,7 +137,7 @@ class TestSolid:
         body = BODIES["ball"][0]
         sparse = body.copy()
         sparse[28:32] = False
-        assert gaps_in(sparse)
+        assert gaps_in(RunMask.of([sparse]))
         filled, _ = filled_slices(sparse, volume_of(sparse))
         assert (filled.voxels > 0).sum() == pytest.approx(body.sum(), rel=0.01)
 
@@ -183,13 +184,13 @@ class TestSeveralBodies:
 class TestRecognised:
     def test_whole_bodies_and_two_that_taper_are_no_gaps(self) -> None:
         for body, _ in BODIES.values():
-            assert gaps_in(body) is None
+            assert gaps_in(RunMask.of([body])) is None
         two = (X**2 + J**2 + (np.abs(K) - 16) ** 2) <= 13**2
         assert not two.any(axis=(1, 2)).all()
-        assert gaps_in(two) is None
+        assert gaps_in(RunMask.of([two])) is None
 
     def test_an_empty_mask_has_none(self) -> None:
-        assert gaps_in(np.zeros((4, 5, 6), bool)) is None
+        assert gaps_in(RunMask.none((4, 5, 6))) is None
 
     def test_it_is_told_and_the_option_named(self) -> None:
         sparse = thinned(BODIES["ball"][0], 8)

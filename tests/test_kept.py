@@ -18,6 +18,7 @@ from test_body import AIR, BONE, LUNG, SKIN, TABLE, head, lungs
 from tomomesh import Volume, read_volume, segment
 from tomomesh.cli.summary import of_points
 from tomomesh.errors import UsageError
+from tomomesh.isosurface.run_mask import RunMask
 from tomomesh.segmentation.body import SMALL, SPECK, without_specks
 from tomomesh.segmentation.window import PRESETS_HU
 from tomomesh.settings import ReadSettings
@@ -142,11 +143,11 @@ class TestSpecks:
         mask[rng.integers(14), rng.integers(15), rng.integers(16)] = True
         mask = ndimage.binary_dilation(mask, iterations=grown) if grown else mask
         mask = np.kron(mask, np.ones((3, 3, 3), np.bool_)) if seed % 2 else mask
-        found = without_specks(mask)
+        found = without_specks(RunMask.of([mask]))
         labels, _ = ndimage.label(mask, TOUCHING)
         sizes = np.bincount(labels.ravel())[1:]
         limit = min(SPECK, SMALL * sizes.max())
-        gone, new = mask & ~found.mask, found.mask & ~mask
+        gone, new = mask & ~found.mask[:], found.mask[:] & ~mask
         assert (found.specks, found.speck_voxels) == ((sizes < limit).sum(), sizes[sizes < limit].sum())
         assert found.largest_speck == sizes[sizes < limit].max(initial=0)
         np.testing.assert_array_equal(gone, np.isin(labels, np.flatnonzero(sizes < limit) + 1))
@@ -160,14 +161,15 @@ class TestSpecks:
         mask[1:22, 1:22, 1:22] = mask[5:7, 5:7, 40:42] = True
         mask[20, 20:27, 40] = True
         mask[10:12, 10:12, 10:12] = mask[15, 15, 15:18] = False
-        found = without_specks(mask)
+        found = without_specks(RunMask.of([mask]))
         assert (found.specks, found.largest_speck, found.pores, found.pore_voxels) == (1, 7, 1, 3)
 
     def test_a_small_structure_keeps_every_piece(self) -> None:
         mask = np.zeros((12, 12, 30), np.bool_)
         mask[2:8, 2:8, 2:8] = mask[5, 5, 20] = mask[5, 5:7, 25] = True
         mask[4, 4, 4] = False
-        assert without_specks(mask).mask is mask
+        runs = RunMask.of([mask])
+        assert without_specks(runs).mask is runs
 
     @pytest.mark.parametrize(("labels", "most"), [((515, 516), 0.003), ((4, 43, 14, 15), 0.001), ((2, 41), 0.001)])
     def test_labels_keep_their_volume_and_pieces(self, labels: tuple[int, ...], most: float) -> None:

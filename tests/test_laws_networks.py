@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 from conftest import law, seeds, size
 from tomomesh.errors import EmptyError
 from tomomesh.model.lattice import TOPOLOGIES, lattice
-from tomomesh.segmentation.training import regions, train_study
+from tomomesh.segmentation.networks.training import regions, train_study
 from tomomesh.settings import FALLS, NetworkSettings
 from tomomesh.som.fit import fit, match, radii, start_positions
 from tomomesh.som.region import train_region

@@ -14,7 +14,7 @@ from conftest import COMPILED, law, seeds
 from tomomesh.errors import ResourceError
 from tomomesh.pointcloud.samples import Samples, settle_points
 from tomomesh.pointcloud.search import Index
-from tomomesh.segmentation.training import regions, train_study
+from tomomesh.segmentation.networks.training import regions, train_study
 from tomomesh.settings import NetworkSettings
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ import pytest
 
 import tomomesh
 from tomomesh.errors import UsageError
+from tomomesh.segmentation.networks.training import train_study
 from tomomesh.segmentation.signal import pixels_of
-from tomomesh.segmentation.training import train_study
 from tomomesh.settings import NetworkSettings
 from tomomesh.som.region import train_region
 

@@ -18,10 +18,11 @@ from tomomesh.model.lattice import lattice
 from tomomesh.model.networks import Networks
 from tomomesh.model.points import BRIDGE, CAP, NEURON
 from tomomesh.segmentation.contours.shrinking import bell_variance, unshrunk
+from tomomesh.segmentation.networks.slices import CHORD, neurons_for
+from tomomesh.segmentation.networks.training import train_study
+from tomomesh.segmentation.networks.under_rings import surface_under
 from tomomesh.segmentation.sample import sample
 from tomomesh.segmentation.signal import border_pairs, crossings_around, is_stepped
-from tomomesh.segmentation.training import CHORD, neurons_for, train_study
-from tomomesh.segmentation.under_rings import surface_under
 from tomomesh.settings import NetworkSettings
 
 if TYPE_CHECKING:

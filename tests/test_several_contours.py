@@ -20,7 +20,7 @@ from tomomesh.segmentation.contours.curved import finely
 from tomomesh.segmentation.contours.inputs import slices_with_several
 from tomomesh.segmentation.contours.loops import trace
 from tomomesh.segmentation.contours.train import train_contours
-from tomomesh.segmentation.training import regions
+from tomomesh.segmentation.networks.training import regions
 from tomomesh.settings import NetworkSettings, Settings
 
 if TYPE_CHECKING:

@@ -42,7 +42,7 @@ NONE = np.empty(0)
 def segment_toy(kept, settings, progress):
     points = PointSet.from_positions(kept.study.to_mm(np.argwhere(kept.mask)[:, ::-1].astype(float)))
     sampling = Sampling(points, 1.0, 0, NONE, NONE)
-    found = Segmentation(kept.study, kept.plane, kept.mask, kept.mask.astype(np.uint16), points, sampling, None)
+    found = Segmentation(kept.study, kept.plane, kept.chosen.runs, kept.mask.astype(np.uint16), points, sampling, None)
     return Stage(found, {"points": {"unit": "mm", "count": len(points), "spacing_mm": 1.0}})
 
 

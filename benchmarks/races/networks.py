@@ -11,7 +11,7 @@ import numpy as np
 from bench import Cost, at_least, costs, note
 from tomomesh import phantom, window
 from tomomesh.model.lattice import lattice
-from tomomesh.segmentation.training import train_study
+from tomomesh.segmentation.networks.training import train_study
 from tomomesh.settings import NetworkSettings
 from tomomesh.som.fit import fit
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .isosurface.run_mask import RunMask
 from .isosurface.sides import WindowSides
 from .kernels.threads import in_blocks
 from .measure.links import Links
@@ -18,6 +19,7 @@ from .measure.report import area_samples
 from .measure.shape import areas_and_volumes
 from .measure.tree import Tree
 from .model.boxes import box_of
+from .model.sliced import areas_of, ranges, some_of
 from .segmentation.signal import SOLID, closed
 
 if TYPE_CHECKING:
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 
     from .isosurface.voxels import Boundary
     from .model.mesh import TriMesh
+    from .model.sliced import Sliced
     from .model.volume import Volume
 
     Floats = NDArray[np.float64]
@@ -81,7 +84,7 @@ class Followed:
         Voxels that the surface should enclose.
     unit : float
         Voxels that count as one: more than 1 where a network cannot be asked to tell voxels apart.
-    wall : (K, J, I) bool array or None
+    wall : (K, J, I) bool array, slices of it, or None
         The window, where the surface runs along its middle.
     besides : WindowSides or None
         Where the surface may lie as well: around what lies in a hole, or over the openings of a wall.
@@ -92,11 +95,11 @@ class Followed:
     places: Floats | WindowSides
     inside: float
     unit: float = 1.0
-    wall: Mask | None = None
+    wall: Sliced | None = None
     besides: WindowSides | None = None
 
     @classmethod
-    def in_space(cls, found: Boundary, mask: Mask) -> Followed:
+    def in_space(cls, found: Boundary, mask: Sliced) -> Followed:
         """Ask a network in space for the boundary of a window (K, J, I)."""
         places, inside = found.crossings.positions, float(found.volumes.sum())
         return cls("space", found.affine, places, inside, unit=unit_of(mask))
@@ -114,7 +117,7 @@ class Followed:
         there = self._from(samples, threads)
         back = Tree.of_faces(own, threads=threads).nearest(_some(self.places), threads=threads)[0]
         if self.wall is not None:
-            back = np.maximum(back - WALLS * np.count_nonzero(self.wall) / len(self.places), 0.0)
+            back = np.maximum(back - WALLS * int(areas_of(self.wall).sum()) / len(self.places), 0.0)
         offset = (enclosed - self.inside) / len(self.places)
         return Apart(enclosed / max(self.inside, 1.0), offset, there, back)
 
@@ -140,25 +143,27 @@ def _some(places: Floats | WindowSides) -> Floats:
     return places.some(every) if isinstance(places, WindowSides) else places[::every]
 
 
-def boundary_followed(mask: Mask, volume: Volume) -> Followed:
+def boundary_followed(mask: Sliced, volume: Volume) -> Followed:
     """Ask contours for the whole boundary of a window (K, J, I)."""
-    return Followed("contours", volume.affine, WindowSides.of(mask), float(np.count_nonzero(mask)))
+    return Followed("contours", volume.affine, WindowSides.of(mask), float(areas_of(mask).sum()))
 
 
-def components_followed(mask: Mask, volume: Volume, *, outlined: bool, threads: int = 0) -> Followed:
+def components_followed(mask: Sliced, volume: Volume, *, outlined: bool, threads: int = 0) -> Followed:
     """Ask for the outline of each component of a window (K, J, I); some of them may lie in holes of others."""
     found = outline_followed(mask, volume, outlined=outlined, threads=threads).as_closed("contours")
     return found if found.wall is not None else replace(found, unit=1.0, besides=WindowSides.of(mask))
 
 
-def outline_followed(mask: Mask, volume: Volume, *, outlined: bool = False, threads: int = 0) -> Followed:
+def outline_followed(mask: Sliced, volume: Volume, *, outlined: bool = False, threads: int = 0) -> Followed:
     """Ask for the outline of a window (K, J, I) in every slice, or for the middle of one that is a wall.
 
     Networks that were shown outlines are asked for these. One that was shown the pixels of a solid lies inside of it,
     and is asked for the outline all the same.
     """
-    filled = _over_bare(_filled(mask, threads))
-    own, enclosed = int(np.count_nonzero(mask)), int(np.count_nonzero(filled))
+    areas = areas_of(mask)
+    bearing, box = np.pad(areas > 0, 1), box_of(mask)[1:]
+    filled = RunMask.of(_filled(mask, bearing, box, start, stop, threads) for start, stop in ranges(0, len(areas)))
+    own, enclosed = int(areas.sum()), filled.count
     if outlined or own > SHELL * enclosed:
         return Followed("outline", volume.affine, WindowSides.of(filled), float(enclosed), unit=unit_of(mask))
     return Followed(
@@ -167,37 +172,45 @@ def outline_followed(mask: Mask, volume: Volume, *, outlined: bool = False, thre
     )  # fmt: skip
 
 
-def unit_of(mask: Mask) -> float:
+def unit_of(mask: Sliced) -> float:
     """Return how many voxels count as one for a network that is laid around a whole window (K, J, I)."""
     longest = max(int(side.stop - side.start) for side in box_of(mask))
     return max(1.0, longest / PARTS)
 
 
-def _filled(mask: Mask, threads: int) -> Mask:
-    """Fill what the outside does not reach in each slice, as `tomomesh.segmentation.signal.outline` does."""
-    filled = np.zeros_like(mask)
-    box = box_of(mask)[1:]
-    inner = mask[:, *box]
+def _filled(mask: Sliced, bearing: Mask, box: tuple[slice, ...], start: int, stop: int, threads: int) -> Mask:
+    """Fill what the outside does not reach in some slices, as `tomomesh.segmentation.signal.outline` does.
 
-    def work(start: int, stop: int) -> None:
-        for k in range(start, stop):
-            plane, _, margin = closed(inner[k])
-            filled[k, *box] = plane[margin:-margin, margin:-margin]
+    A bare slice between two others is filled where both of them are: a surface goes through it. Which are not is told
+    by `bearing` (K + 2,), from the one before the first on.
+    """
+    some = some_of(mask, start, stop)
+    filled = np.zeros_like(some)
 
-    in_blocks(work, len(mask), block=1, threads=threads)
+    def work(first: int, last: int) -> None:
+        for n in range(first, last):
+            k = start + n
+            if bearing[k + 1]:
+                filled[n, *box] = _closed(some[n][box])
+            elif bearing[k] and bearing[k + 2]:
+                filled[n, *box] = _closed(mask[k - 1][box]) & _closed(mask[k + 1][box])
+
+    in_blocks(work, len(some), block=1, threads=threads)
     return filled
 
 
-def _over_bare(filled: Mask) -> Mask:
-    """Fill, in place, a bare slice between two others where both of them are: a surface goes through it."""
-    held = np.asarray(filled.any(axis=(1, 2)))
-    bare = 1 + np.flatnonzero(~held[1:-1] & held[:-2] & held[2:])
-    filled[bare] = filled[bare - 1] & filled[bare + 1]
-    return filled
+def _closed(plane: Mask) -> Mask:
+    filled, _, margin = closed(plane)
+    return filled[margin:-margin, margin:-margin]
 
 
-def _in(mask: Mask, places: Floats) -> Mask:
+def _in(mask: Sliced, places: Floats) -> Mask:
     """Tell which places (n, 3), as indices (x, y, z), lie in a voxel of a window."""
     nearest = np.rint(places).astype(np.int64)
     x, y, z = np.clip(nearest, 0, np.array(mask.shape[::-1]) - 1).T
-    return np.asarray(mask[z, y, x])
+    found = np.zeros(len(places), np.bool_)
+    for start, stop in ranges(0, mask.shape[0]):
+        own = np.flatnonzero((z >= start) & (z < stop))
+        if len(own):
+            found[own] = some_of(mask, start, stop)[z[own] - start, y[own], x[own]]
+    return found

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
+from .isosurface.run_mask import RunMask
 from .measure.tree import Tree
 from .model.columns import any_of
 from .model.mesh import QuadMesh
@@ -48,7 +49,7 @@ class Segmentation(Reported, Generic[S]):
         The study, its slices along K.
     plane : str
         Of the slices: axial, coronal or sagittal.
-    mask : (K, J, I) bool array
+    runs : RunMask
         The window.
     regions : (K, J, I) uint8 or uint16 array, or callable
         The labels, or what finds them.
@@ -63,12 +64,17 @@ class Segmentation(Reported, Generic[S]):
 
     volume: Volume
     plane: str
-    mask: NDArray[np.bool_]
+    runs: RunMask
     regions: Regions | Callable[[], Regions]
     points: PointSet
     sampling: Sampling
     source: S
     levels: Levels | None = None
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """The window, (K, J, I), all in memory."""
+        return self.runs.dense
 
     @cached_property
     def labels(self) -> Regions:
@@ -81,10 +87,10 @@ class Segmentation(Reported, Generic[S]):
 
     def bare(self) -> Segmentation[Any]:
         """Return the same without all that no step after its surface needs: it is only shown, or written."""
-        none = np.broadcast_to(np.False_, self.mask.shape)
+        none = np.broadcast_to(np.uint8(0), self.runs.shape)
         every: Segmentation[Any] = self
         return replace(
-            every, volume=self.volume.bare(), mask=none, regions=none.view(np.uint8), source=None, levels=None
+            every, volume=self.volume.bare(), runs=RunMask.none(self.runs.shape), regions=none, source=None, levels=None
         )  # fmt: skip
 
 
@@ -100,7 +106,7 @@ class Enclosed:
     @classmethod
     def window(cls, found: Segmentation[Any]) -> Enclosed:
         """Return the volume of the voxels of a window, mm^3."""
-        return cls("window", np.count_nonzero(found.mask) * found.volume.voxel_mm3)
+        return cls("window", found.runs.count * found.volume.voxel_mm3)
 
     def or_more(self, other: Enclosed) -> Enclosed:
         """Return the larger of two."""

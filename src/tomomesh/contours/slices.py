@@ -31,7 +31,7 @@ OFF_PLANE = 0.25
 """Most that points may be off their planes (root mean square), in distances of the slices: half of the way to where
 they would lie nearer to others."""
 SLICES = 3
-"""Planes that a stack has at least. Chosen: half and twice of it change no case of benchmarks/constants.py."""
+"""Sliced that a stack has at least. Chosen: half and twice of it change no case of benchmarks/constants.py."""
 STRAYS = 0.02
 """Share of the points that may lie in no plane. Chosen: half and twice of it change no case of benchmarks/constants.py.
 """
@@ -102,7 +102,7 @@ def find_slices(positions: Floats) -> Slices | None:
     """Find the planes of a stack of contours, from the positions of its points alone.
 
     Points are joined to contours with neighbors of their own height, which gives the normal of all of them and the
-    height of each. Planes are then sought within each column of contours that lie over one another
+    height of each. Sliced are then sought within each column of contours that lie over one another
     (`tomomesh.contours.levels`). The points must lie near these planes, on curves rather than areas, far closer within
     the planes than these are to each other, and mostly on closed contours.
 

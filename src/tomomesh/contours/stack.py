@@ -60,7 +60,7 @@ class ContourSurface:
     stack : Stack
         The parts, and how they go on.
     slices, contours, open : int
-        Planes, contours, and those among them that did not close by themselves.
+        Sliced, contours, and those among them that did not close by themselves.
     reach : float
         Longest gap that was closed, in local sampling distances.
     asked_edge : float

@@ -30,7 +30,7 @@ missing: three at most. Chosen: with half of the first slices that jitter by a q
 objects one slice apart join; with half of the second three missing slices part a ball, with twice of it two
 nodules that neither taper nor touch are one."""
 LOOK = 24
-"""Planes beyond a part in which it is looked for, those of other objects among them."""
+"""Sliced beyond a part in which it is looked for, those of other objects among them."""
 NOT, WITHIN, OVER = 0, 1, 2
 """How a part may go on as another: not at all; lying in its hole, for want of a better one; over it or beside it."""
 

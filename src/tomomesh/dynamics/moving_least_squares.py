@@ -227,9 +227,11 @@ class _Projector:
     def under(cls, vertices: Floats, ring: OneRing, samples: Samples, threads: int) -> _Projector:
         width = np.maximum(NARROW * samples.spacing, SHARE * samples.width)
         positions = samples.positions if samples.offsets is None else samples.positions + samples.offsets
-        rows = np.column_stack([positions, samples.normals, width])
         index = Index.of(positions, SIGHT * float(np.median(width)))
-        rows = rows[index.order]
+        rows = np.empty((len(positions), 7))
+        for at, columns in ((slice(0, 3), positions), (slice(3, 6), samples.normals), (6, width)):
+            rows[:, at] = columns[index.order]
+        del positions, width
         vertex = _nearest(rows, vertices, index.frame[3], threads)
         _require_any(vertex >= 0, samples)
         facing = np.einsum("ij,ij->i", ring.normals(vertices)[vertex], rows[:, 3:6])

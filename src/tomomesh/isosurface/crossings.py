@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from ..kernels.isosurface.voxels import leave_window
 from ..kernels.threads import in_blocks
 from ..model.columns import any_of
 from ..model.points import ADDED, BORDER, CROSSING
+from ..model.sliced import some_of
 from .means import BLOCK
 
 if TYPE_CHECKING:
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .thick_slices import Columns, Thinned
+    from ..model.sliced import Sliced
+    from .thick_slices import Thinned
 
 CLOSEST = 0.01
 """A crossing comes no nearer to a voxel's center than this share of the way to its neighbor. Chosen: half of it changes
@@ -70,17 +72,25 @@ class Levels:
 
     Attributes
     ----------
-    voxels : (K, J, I) or (K, J, I, L) array, Columns or Stretch
+    voxels : (K, J, I) or (K, J, I, L) array, slices that are read as they are asked for, Columns or Stretch
     lower, upper : float or (L,) float array
         A layer is in its window where lower < k <= upper.
     layers : {"all", "any"}
         A voxel is inside where all its layers are in their windows, or one at least.
     """
 
-    voxels: NDArray[Any] | Columns | Stretch
+    voxels: NDArray[Any] | Sliced
     lower: float | NDArray[np.float64]
     upper: float | NDArray[np.float64]
     layers: str = "all"
+
+    def on(self, *slices: int) -> Levels:
+        """Return the levels of some slices alone, which are then numbered from 0."""
+        return replace(self, voxels=np.stack([self.voxels[k] for k in slices]))
+
+    def part(self, start: int, stop: int) -> Levels:
+        """Return the levels of a range of slices alone, which are then numbered from 0; a view of an array."""
+        return replace(self, voxels=some_of(self.voxels, start, stop))
 
     def nearest(self, places: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the voxels that are nearest to places (n, 3), which are (x, y, z) and may lie beyond the border."""

@@ -128,14 +128,19 @@ class RunMask:
         return int(self.sizes.sum(dtype=np.int64))
 
     @cached_property
+    def dense(self) -> Mask:
+        """All of it, drawn once: for what is small enough to be whole in memory."""
+        return self[:]
+
+    @cached_property
     def box(self) -> Box:
         """The box (K, J, I) of what it holds; empty where it holds nothing."""
         if not len(self.starts):
             return slice(0, 0), slice(0, 0), slice(0, 0)
         j = np.unique(self.rows % self.shape[1])
-        ends = (self.rows[0], self.rows[-1]) // np.int64(self.shape[1])
+        first, last = (int(row) // self.shape[1] for row in self.rows[[0, -1]])
         columns = slice(int(self.starts.min()), int(self.stops.max()))
-        return slice(int(ends[0]), int(ends[1]) + 1), slice(int(j[0]), int(j[-1]) + 1), columns
+        return slice(first, last + 1), slice(int(j[0]), int(j[-1]) + 1), columns
 
     def areas(self, axis: int = 0) -> Longs:
         """Count its voxels on each plane across an axis of (K, J, I)."""
@@ -158,6 +163,11 @@ class RunMask:
         drawn = np.zeros(self.shape[:2], np.bool_)
         drawn.ravel()[self.rows[(self.starts <= place) & (place < self.stops)]] = True
         return drawn
+
+    def sampled(self, every: Sequence[int]) -> Mask:
+        """Draw every n-th voxel along each axis (K, J, I)."""
+        k, j = (np.arange(0, size, step) for size, step in zip(self.shape[:2], every, strict=False))
+        return self._of_rows(np.add.outer(k * self.shape[1], j).ravel(), (len(k), len(j)))[:][..., :: every[2]]
 
     def cropped(self, box: Box) -> RunMask:
         """Return what lies in a box of slices and rows, whose columns hold all of it."""
@@ -206,6 +216,10 @@ class RunMask:
         last = np.flatnonzero(np.append(first[1:], True)[: len(row)])
         begin = np.concatenate([[0], np.cumsum(np.bincount(row[first], minlength=len(self.begin) - 1))])
         return RunMask(self.shape, begin, starts[first], (reach[last] - row[last] * width).astype(np.int32))
+
+    def __and__(self, other: RunMask) -> RunMask:
+        """Return what lies in both."""
+        return ~(~self | ~other)
 
     def within(self, slabs: Iterable[Mask], threads: int = 0) -> Longs:
         """Count the voxels of another mask in each run, (r,); it is given as consecutive slabs (n, J, I)."""

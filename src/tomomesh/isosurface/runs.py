@@ -77,6 +77,11 @@ class Runs:
         found[self.parts[outer]] = True
         return found
 
+    def part_at(self, k: int, j: int, i: int) -> int:
+        """Return the component of a voxel of the mask."""
+        begin, end = self.mask.begin[k * self.mask.shape[1] + j :][:2]
+        return int(self.parts[begin + np.searchsorted(self.mask.starts[begin:end], i, side="right") - 1])
+
     def within(self, slabs: Iterable[Mask], threads: int = 0) -> Longs:
         """Count the voxels of another mask, given as consecutive slabs (n, J, I), in each component, (c,)."""
         return self._summed(self.mask.within(slabs, threads))

@@ -8,10 +8,12 @@ from collections import deque
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from queue import SimpleQueue
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+T = TypeVar("T")
 
 _share = 0
 _working = threading.local()
@@ -58,6 +60,20 @@ def in_blocks(
             done(min(start + block, total))
         return
     _in_pool(work, starts, total, block, workers, done)
+
+
+def in_order(
+    find: Callable[[int], T], total: int,
+    *, block: int = 1, threads: int = 0, done: Callable[[int], None] = lambda count: None,
+) -> list[T]:  # fmt: skip
+    """Return what ``find(number)`` finds of ``range(total)``, in this order; see `in_blocks`."""
+    found: dict[int, T] = {}
+
+    def work(start: int, stop: int) -> None:
+        found.update({number: find(number) for number in range(start, stop)})
+
+    in_blocks(work, total, block=block, threads=threads, done=done)
+    return [found[number] for number in range(total)]
 
 
 def _in_pool(

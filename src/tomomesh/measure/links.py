@@ -48,7 +48,7 @@ class Links:
         """Half edges, those of one undirected edge beside each other, (3 m,); and where each edge begins, (e + 1,)."""
         order = np.empty(self.faces.size, np.int32)
         first = np.empty(self.faces.size + 1, np.int32)
-        count = order_half_edges(self.faces, len(self.vertices), order, first)
+        count = order_half_edges(self.faces, len(self.vertices), order, first, np.empty_like(order))
         return order, first[: count + 1].copy()
 
     @cached_property

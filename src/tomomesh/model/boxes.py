@@ -7,17 +7,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
+
+    from .sliced import Sliced
 
     Box = tuple[slice, slice, slice]
 
 
-def box_of(mask: NDArray[np.bool_], around: Box | None = None) -> Box:
+def box_of(mask: Sliced, around: Box | None = None) -> Box:
     """Return the box (K, J, I) of what is true in a mask; empty where nothing is.
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : (K, J, I) bool array, or a `RunMask`, which knows its own
     around : box, optional
         Outside of which nothing is true: what lies there is not looked at.
 
@@ -26,6 +28,8 @@ def box_of(mask: NDArray[np.bool_], around: Box | None = None) -> Box:
     >>> box_of(np.array([[[False, True, True, False]]]))
     (slice(0, 1, None), slice(0, 1, None), slice(1, 3, None))
     """
+    if not isinstance(mask, np.ndarray):
+        return mask.box  # type: ignore[attr-defined, no-any-return]
     if around is not None:
         return within(around, box_of(mask[around]))
     plane = np.asarray(mask.any(axis=0))

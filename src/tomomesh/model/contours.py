@@ -110,9 +110,17 @@ class Contours:
         """How many tracks there are."""
         return len({contour.track for contour in self.contours})
 
+    @cached_property
+    def by_slice(self) -> dict[int, list[Contour]]:
+        """The contours of each slice that has any."""
+        found: dict[int, list[Contour]] = {}
+        for contour in self.contours:
+            found.setdefault(contour.slice, []).append(contour)
+        return found
+
     def on(self, number: int) -> list[Contour]:
         """Return the contours of a slice."""
-        return [contour for contour in self.contours if contour.slice == number]
+        return self.by_slice.get(number, [])
 
     def codebook_on(self, number: int) -> NDArray[np.float64]:
         """Return the neurons (u, 2) of all rings of a slice, one ring after the other."""

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .lazy import LazyVoxels
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -66,7 +68,8 @@ class Volume:
     Attributes
     ----------
     voxels : (K, J, I) or (K, J, I, L) array
-        Stored gray levels; HU where the study is CT.
+        Stored gray levels; HU where the study is CT. Those of a study that is read part by part are a `LazyVoxels`,
+        which does what a view needs and refuses the rest: `in_parts` tells.
     affine : (4, 4) float array
         Index (i, j, k) to patient millimeters (x, y, z), LPS.
     grid : Grid
@@ -112,7 +115,7 @@ class Volume:
     @classmethod
     def from_stored(
         cls,
-        stored: NDArray[Any],
+        stored: NDArray[Any] | LazyVoxels,
         affine: NDArray[np.float64],
         *,
         unit: str = "stored",
@@ -123,7 +126,7 @@ class Volume:
         Parameters
         ----------
         stored : (A, B, C) or (A, B, C, L) array
-            Voxels, slowest axis first.
+            Voxels, slowest axis first; a `LazyVoxels` stays one.
         affine : (4, 4) float array
             Index (c, b, a), fastest first, to patient millimeters, LPS.
         """
@@ -131,7 +134,7 @@ class Volume:
         order = np.argsort(world)
         canonical = affine[:, [*order, 3]].copy()
         k, j, i = (int(2 - order[2 - n]) for n in range(3))
-        voxels = np.transpose(stored, (k, j, i, *range(3, stored.ndim)))
+        voxels: Any = stored.transpose((k, j, i, *range(3, stored.ndim)))
         flips = [bool(canonical[2 - n, 2 - n] < 0) for n in range(3)]
         for n in (n for n in range(3) if flips[n]):
             canonical[:3, 3] += canonical[:3, 2 - n] * (voxels.shape[n] - 1)
@@ -145,6 +148,12 @@ class Volume:
     def shape(self) -> tuple[int, int, int]:
         """Sizes K, J, I."""
         return self.voxels.shape[0], self.voxels.shape[1], self.voxels.shape[2]
+
+    @property
+    def in_parts(self) -> LazyVoxels | None:
+        """The voxels, where they stay in their file and are read part by part."""
+        voxels: object = self.voxels
+        return voxels if isinstance(voxels, LazyVoxels) else None
 
     @property
     def layers(self) -> int:
@@ -204,7 +213,7 @@ class Volume:
             axes=(axes[order[0]], axes[order[1]], axes[order[2]]),
             flipped=(flipped[order[0]], flipped[order[1]], flipped[order[2]]),
         )
-        voxels = np.transpose(self.voxels, (*order, *range(3, self.voxels.ndim)))
+        voxels = self.voxels.transpose((*order, *range(3, self.voxels.ndim)))
         return replace(self, voxels=voxels, affine=self.affine[:, columns], grid=grid)
 
     def cropped(self, box: tuple[slice, slice, slice]) -> Volume:

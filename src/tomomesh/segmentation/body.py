@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
 
 from ..isosurface.run_mask import RunMask
 from ..isosurface.runs import Runs
-from ..model.boxes import box_of
 from .window import PRESETS_HU
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
     from numpy.typing import NDArray
 
     from ..model.boxes import Box
     from ..model.volume import Volume
+    from .slabwise.cut import Cut
+
+    Mask = NDArray[np.bool_]
 
 THICK = 6.0
 """Half the thickness in mm that a body has somewhere, and a table's shells and a head's holder nowhere. Measured: half
@@ -50,24 +55,58 @@ class Components:
 
     Attributes
     ----------
-    mask : (K, J, I) bool array
+    mask : RunMask
         Whole components.
     found, dropped : int
         Components of the window, and those that were left out.
     """
 
-    mask: NDArray[np.bool_]
+    mask: RunMask
     found: int
     dropped: int
 
 
-def largest_component(mask: NDArray[np.bool_]) -> Components:
+@dataclass(frozen=True)
+class Coarse:
+    """A mask in coarse voxels, which are drawn in a study's own slab by slab.
+
+    Attributes
+    ----------
+    mask : (k, j, i) bool array
+    every : sequence of int
+        How many voxels (K, J, I) a coarse one is long.
+    cut : Cut
+        The study.
+    """
+
+    mask: Mask
+    every: Sequence[int]
+    cut: Cut
+
+    def __iter__(self) -> Iterator[Mask]:
+        """Draw one slab after the other."""
+        return map(self.drawn, pairwise(self.cut.cuts))
+
+    def drawn(self, slices: tuple[int, int]) -> Mask:
+        """Draw the slices from a first to before another."""
+        fine = self.mask[np.arange(*slices) // self.every[0]]
+        for axis in (1, 2):
+            fine = np.repeat(fine, self.every[axis], axis=axis)
+        return fine[:, : self.cut.shape[1], : self.cut.shape[2]]
+
+    def sampled(self, every: Sequence[int]) -> Mask:
+        """Return it at every n-th voxel of the study along each axis."""
+        sides = zip(self.cut.shape, every, self.every, strict=True)
+        return self.mask[np.ix_(*(np.arange(0, size, step) // own for size, step, own in sides))]
+
+
+def largest_component(mask: RunMask) -> Components:
     """Keep the component of a window with the most voxels; of equals the first."""
     runs = Runs.of(mask, corners=True)
-    return _kept(runs, np.arange(len(runs.sizes)) == np.argmax(runs.sizes), mask)
+    return _kept(runs, np.arange(len(runs.sizes)) == np.argmax(runs.sizes))
 
 
-def components_of_body(mask: NDArray[np.bool_], volume: Volume) -> Components:
+def components_of_body(mask: RunMask, volume: Volume, cut: Cut) -> Components:
     """Keep the components of a window of a CT that lie in a body: those of which a tenth at least does.
 
     A body is what is denser than air (the window `skin`) once all that is thinner than twice `THICK` is taken away,
@@ -77,46 +116,55 @@ def components_of_body(mask: NDArray[np.bool_], volume: Volume) -> Components:
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : RunMask
     volume : Volume
         Hounsfield units.
+    cut : Cut
+        Its voxels.
     """
-    body = _body(volume)
+    (every, spacing), (finer, _) = _coarse(volume), _coarse(volume, RIM)
+    levels, dense = cut.sampled(every, finer)
+    body = Coarse(_opened(levels > PRESETS_HU["skin"][0], spacing), every, cut)
     kept = _in_body(mask, body)
-    beside = _holders(volume, body)
-    if not np.any(beside & kept.mask):
+    holders = zip(cut.over(kept.mask), _holders(volume, body, dense > PRESETS_HU["spongy-bone"][0]), strict=True)
+    without = RunMask.of(part[:] & ~holder for part, holder in holders)
+    if without.count == kept.mask.count:
         return kept
-    return Components(_in_body(kept.mask & ~beside, body).mask, kept.found, kept.dropped)
+    return Components(_in_body(without, body).mask, kept.found, kept.dropped)
 
 
-def _holders(volume: Volume, body: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return what is denser than the least bone, lies in no body and is larger than its ball, with its rim.
+def _holders(volume: Volume, body: Coarse, dense: Mask) -> Coarse:
+    """Return what is as dense as the least bone, lies in no body and is larger than its ball, with its rim.
 
-    It is found in voxels as wide as the rim. What is smaller may be a bit of bone in a thin part of the patient.
+    It is found in voxels as wide as the rim, which tell how dense they are. What is smaller may be a bit of bone in a
+    thin part of the patient.
     """
     every, spacing = _coarse(volume, RIM)
-    steps = tuple(slice(None, None, step) for step in every)
-    dense = volume.voxels[steps] > PRESETS_HU["spongy-bone"][0]
-    foreign = dense & ~_in_body(dense, body[steps]).mask
-    runs = Runs.of(foreign, corners=True)
-    runs.fill(foreign, runs.sizes * np.prod(spacing) <= 4 / 3 * np.pi * THICK**3, False)
+    runs = Runs.of(dense, corners=True)
+    inside = runs.only(_lie_in(runs, [body.sampled(every)]))
+    runs = Runs.of(dense & ~inside[:], corners=True)
+    foreign = runs.only(runs.sizes * np.prod(spacing) > 4 / 3 * np.pi * THICK**3)[:]
     if foreign.any():
         reach = max(float(spacing.min()), min(RIM, RIM_VOXELS * min(volume.spacing_mm)))
         foreign = scipy.ndimage.distance_transform_edt(~foreign, spacing) <= reach
-    return _fine(foreign, every, volume.shape)
+    return Coarse(foreign, every, body.cut)
 
 
-def thick_components(mask: NDArray[np.bool_], volume: Volume) -> Components:
+def thick_components(mask: RunMask, volume: Volume, cut: Cut) -> Components:
     """Keep the components that are thicker than twice `THICK` somewhere, as bodies are: a tenth of them at least."""
     every, spacing = _coarse(volume)
-    coarse = mask[tuple(slice(None, None, step) for step in every)]
-    return _in_body(mask, _fine(_opened(coarse, spacing), every, volume.shape))
+    return _in_body(mask, Coarse(_opened(mask.sampled(every), spacing), every, cut))
 
 
-def _in_body(mask: NDArray[np.bool_], body: NDArray[np.bool_]) -> Components:
-    """Keep the components that lie in bodies by a tenth at least."""
+def _in_body(mask: RunMask, body: Coarse) -> Components:
+    """Keep the components that lie in bodies."""
     runs = Runs.of(mask, corners=True)
-    return _kept(runs, runs.within([body]) >= LEAST * runs.sizes, mask)
+    return _kept(runs, _lie_in(runs, body))
+
+
+def _lie_in(runs: Runs, body: Iterable[Mask]) -> Mask:
+    """Tell of which components (c,) a tenth at least lies in bodies, given as slabs."""
+    return np.asarray(runs.within(body) >= LEAST * runs.sizes)
 
 
 @dataclass(frozen=True)
@@ -125,14 +173,14 @@ class Cleaned:
 
     Attributes
     ----------
-    mask : (K, J, I) bool array
+    mask : RunMask
     specks, speck_voxels, largest_speck : int
         Components that were left out, their voxels, and those of the largest.
     pores, pore_voxels : int
         Enclosed holes that were filled.
     """
 
-    mask: NDArray[np.bool_]
+    mask: RunMask
     specks: int = 0
     speck_voxels: int = 0
     largest_speck: int = 0
@@ -140,7 +188,7 @@ class Cleaned:
     pore_voxels: int = 0
 
 
-def without_specks(mask: NDArray[np.bool_], around: Box | None = None) -> Cleaned:
+def without_specks(mask: RunMask) -> Cleaned:
     """Leave out components that are specks, and fill enclosed holes as small as that (`SPECK`, `SMALL`).
 
     Components touch along faces, edges or at corners, and holes along faces: no voxel of a hole that is filled has a
@@ -148,27 +196,23 @@ def without_specks(mask: NDArray[np.bool_], around: Box | None = None) -> Cleane
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : RunMask
         One voxel at least.
-    around : box, optional
-        Outside of which nothing is true.
     """
-    box = box_of(mask, around)
-    pieces, holes = Runs.of(mask[box], corners=True), Runs.of(~RunMask.of([mask[box]]))
+    box = mask.box
+    held = mask.cropped(box)
+    pieces, holes = Runs.of(held, corners=True), Runs.of(~held)
     sizes, room = pieces.sizes, holes.sizes
     limit = min(float(SPECK), SMALL * float(sizes.max()))
     small, pores = sizes < limit, ~holes.bordering & (room < limit)
     if not (small.any() or pores.any()):
         return Cleaned(mask)
-    cleaned = np.zeros(mask.shape, np.bool_)
-    cleaned[box] = mask[box]
-    pieces.fill(cleaned[box], small, False)
-    holes.fill(cleaned[box], pores, True)
+    cleaned = (pieces.only(~small) | holes.only(pores)).placed(box, mask.shape)
     counts = (small.sum(), sizes[small].sum(), sizes[small].max(initial=0), pores.sum(), room[pores].sum())
     return Cleaned(cleaned, *map(int, counts))
 
 
-def solid(body: NDArray[np.bool_], volume: Volume) -> NDArray[np.bool_]:
+def solid(body: RunMask, volume: Volume, cut: Cut) -> RunMask:
     """Fill what the air of the room does not reach in a body: lungs, airways, sinuses, bowels.
 
     The air of the room comes from the sides of the study, not from its ends along the patient, which may cut through
@@ -176,13 +220,15 @@ def solid(body: NDArray[np.bool_], volume: Volume) -> NDArray[np.bool_]:
 
     Parameters
     ----------
-    body : (K, J, I) bool array
+    body : RunMask
         What is denser than air, without the table.
     volume : Volume
         Its affine tells which of its axes is the patient's.
+    cut : Cut
+        Its voxels; they are not looked at.
     """
     every, spacing = _coarse(volume)
-    coarse = body[tuple(slice(None, None, step) for step in every)]
+    coarse = body.sampled(every)
     if not coarse.any():
         return body
     radius = _radius(scipy.ndimage.distance_transform_edt(coarse, spacing))
@@ -193,32 +239,32 @@ def solid(body: NDArray[np.bool_], volume: Volume) -> NDArray[np.bool_]:
     wide, _ = scipy.ndimage.label(scipy.ndimage.distance_transform_edt(air, spacing) > radius)
     apart = scipy.ndimage.distance_transform_edt(wide != wide[0, 0, 0], spacing)
     apart = apart[tuple(slice(low, size - high) for (low, high), size in zip(pads, apart.shape, strict=True))]
-    open_, count = scipy.ndimage.label(_fine(apart <= (1 + DEEP) * radius, every, volume.shape) & ~body)
-    reached = np.zeros(count + 1, np.bool_)
-    reached[open_[_fine(apart <= radius, every, volume.shape)]] = True
-    reached[0] = False
-    return ~reached[open_]
+    deep = Coarse(apart <= (1 + DEEP) * radius, every, cut)
+    open_ = Runs.of(RunMask.of(near & ~part[:] for near, part in zip(deep, cut.over(body), strict=True)))
+    return ~open_.only(open_.within(Coarse(apart <= radius, every, cut)) > 0)
 
 
-def is_dense(mask: NDArray[np.bool_], volume: Volume) -> bool:
+def is_dense(mask: RunMask, cut: Cut) -> bool:
     """Tell whether over half of a window of a CT is as dense as a body; one of lungs or airways is not."""
-    return bool(2 * np.count_nonzero(volume.voxels[mask] > PRESETS_HU["skin"][0]) > np.count_nonzero(mask))
+    return bool(2 * cut.sum(_dense, cut.over(mask)) > mask.count)
 
 
-def _kept(runs: Runs, kept: NDArray[np.bool_], mask: NDArray[np.bool_]) -> Components:
+def _dense(levels: NDArray[Any], box: Box, mask: RunMask) -> int:
+    return int(mask.within([levels > PRESETS_HU["skin"][0]]).sum())
+
+
+def skin_of(cut: Cut) -> RunMask:
+    """Return what of a CT is denser than air."""
+    return cut.runs(_denser)
+
+
+def _denser(levels: NDArray[Any], box: Box) -> RunMask:
+    return RunMask.of([levels > PRESETS_HU["skin"][0]])
+
+
+def _kept(runs: Runs, kept: Mask) -> Components:
     found, left = len(kept), int(np.count_nonzero(kept))
-    if left == found:
-        return Components(mask, found, 0)
-    some = mask.copy()
-    runs.fill(some, ~kept, False)
-    return Components(some, found, found - left)
-
-
-def _body(volume: Volume) -> NDArray[np.bool_]:
-    """Return the voxels (K, J, I) of bodies; found in coarse voxels, so that it costs little."""
-    every, spacing = _coarse(volume)
-    levels = volume.voxels[tuple(slice(None, None, step) for step in every)]
-    return _fine(_opened(levels > PRESETS_HU["skin"][0], spacing), every, volume.shape)
+    return Components(runs.mask if left == found else runs.only(kept), found, found - left)
 
 
 def _coarse(volume: Volume, cell: float = CELL) -> tuple[list[int], NDArray[np.float64]]:
@@ -227,13 +273,6 @@ def _coarse(volume: Volume, cell: float = CELL) -> tuple[list[int], NDArray[np.f
     cell = min(cell, float((spacing * volume.shape).max()) / CELLS)
     every = [max(1, int(cell / edge)) for edge in spacing]
     return every, spacing * every
-
-
-def _fine(mask: NDArray[np.bool_], every: list[int], shape: tuple[int, int, int]) -> NDArray[np.bool_]:
-    """Return a mask of coarse voxels in a study's own."""
-    for axis, step in enumerate(every):
-        mask = np.repeat(mask, step, axis=axis)
-    return mask[tuple(slice(size) for size in shape)]
 
 
 def _opened(mask: NDArray[np.bool_], spacing: NDArray[np.float64]) -> NDArray[np.bool_]:

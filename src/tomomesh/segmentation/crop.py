@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import EmptyError
+from ..isosurface.run_mask import RunMask
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,7 +51,7 @@ def crop(volume: Volume, asked: CropSettings, axis: int) -> tuple[Volume, Box]:
     return volume.cropped(box), box
 
 
-def inside_roi(volume: Volume, roi: tuple[float, ...] | None) -> NDArray[np.bool_] | None:
+def inside_roi(volume: Volume, roi: tuple[float, ...] | None) -> RunMask | None:
     """Tell which voxels of a part (K, J, I) have their centers in a box of patient millimeters; None where all have.
 
     On an oblique or sheared grid the voxels that hold a box hold more than the box.
@@ -62,15 +63,20 @@ def inside_roi(volume: Volume, roi: tuple[float, ...] | None) -> NDArray[np.bool
     """
     if roi is None or not _turned(volume):
         return None
-    found = np.ones(volume.shape, np.bool_)
-    k, j, i = (np.arange(size, dtype=np.float64) for size in volume.shape)
+    found = RunMask.of(_slice_inside(volume, roi, k) for k in range(volume.shape[0]))
+    if not found.count:
+        raise _outside(volume, roi)
+    return found
+
+
+def _slice_inside(volume: Volume, roi: tuple[float, ...], k: int) -> NDArray[np.bool_]:
+    """Tell the same of one slice, (1, J, I)."""
+    found = np.ones((1, *volume.shape[1:]), np.bool_)
+    j, i = (np.arange(size, dtype=np.float64) for size in volume.shape[1:])
     for row, low, high in zip(volume.affine[:3], roi[::2], roi[1::2], strict=True):
         slack = NEAR * float(np.abs(row[:3]).max())
-        for n in range(len(k)):
-            places = row[0] * i[None, :] + row[1] * j[:, None] + (row[2] * k[n] + row[3])
-            found[n] &= (places >= low - slack) & (places <= high + slack)
-    if not found.any():
-        raise _outside(volume, roi)
+        places = row[0] * i[None, :] + row[1] * j[:, None] + (row[2] * float(k) + row[3])
+        found &= (places >= low - slack) & (places <= high + slack)
     return found
 
 

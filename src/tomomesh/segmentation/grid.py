@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import GeometryError
+from ..model.lazy import LazyVoxels
+from .slabwise.cut import HERE
+from .slabwise.sources import Placed
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
+    from ..model.boxes import Box
     from ..model.volume import Volume
+    from .slabwise.cut import Cutting
 
 NEAR = 0.1
 """Voxels by which labels may lie off the study's, at any corner. Spacings and directions of four or five digits, as
@@ -25,7 +30,7 @@ MOST_DIGITS = 17
 HINT = "labels on the study's own grid, or the labels alone as the study"
 
 
-def onto_grid(labels: Volume, study: Volume) -> Volume:
+def onto_grid(labels: Volume, study: Volume, cutting: Cutting = HERE) -> Volume:
     """Lay labels onto a study's grid, background where they hold nothing.
 
     Parameters
@@ -34,6 +39,8 @@ def onto_grid(labels: Volume, study: Volume) -> Volume:
         On the study's own lattice: the same voxels, up to the order and the direction of their axes, a whole number
         of voxels away. They may cover a part of it, and reach beyond.
     study : Volume
+    cutting : Cutting, optional
+        Who counts them.
 
     Returns
     -------
@@ -56,14 +63,16 @@ def onto_grid(labels: Volume, study: Volume) -> Volume:
     start, stop = np.maximum(low, 0), np.minimum(low + turned.shape[:3], study.shape)
     if (start >= stop).any():
         raise GeometryError("the labels lie outside of the study", found=_box(labels), expected=_box(study), hint=HINT)
-    voxels = np.zeros((*study.shape, *turned.shape[3:]), turned.dtype)
-    voxels[_slices(start, stop)] = turned[_slices(start - low, stop - low)]
+    within = turned[_slices(start - low, stop - low)]
+    placed = Placed(within, tuple(start.tolist()), study.shape)
+    voxels: Any = LazyVoxels.of(placed) if labels.in_parts else placed.read(_slices(np.zeros(3, int), study.shape))
     covered = " x ".join(map(str, (stop - start)[::-1]))
     notes = (
         *labels.notes,
         f"the labels cover {covered} of the study's {' x '.join(map(str, study.shape[::-1]))} voxels",
     )
-    lost = np.count_nonzero(turned) - np.count_nonzero(voxels)
+    held = [cutting.of(part).sum(_labelled) for part in (turned, within)]
+    lost = held[0] - held[1]
     beyond = (f"labeled voxels beyond the study, left out: {lost}",) if lost else ()
     return replace(study, voxels=voxels, unit=labels.unit, notes=notes + beyond)
 
@@ -112,19 +121,21 @@ def _described(volume: Volume, digits: int) -> str:
     return f"{sizes} voxels of {spacing} mm, axes {axes}"
 
 
-def _turned(
-    voxels: NDArray[np.generic], steps: NDArray[np.int64], offset: NDArray[np.int64]
-) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
+def _turned(voxels: Any, steps: NDArray[np.int64], offset: NDArray[np.int64]) -> tuple[Any, NDArray[np.int64]]:
     """Return voxels with the axes of a study, and where the first of them lies; steps and offset are (K, J, I)."""
     order = np.abs(steps).argmax(axis=1)
     backward = steps[np.arange(3), order] < 0
-    turned = np.transpose(voxels, (*order, *range(3, voxels.ndim)))
+    turned = voxels.transpose((*order.tolist(), *range(3, voxels.ndim)))
     low = offset - np.where(backward, np.array(turned.shape[:3]) - 1, 0)
     return turned[tuple(slice(None, None, -1 if flip else 1) for flip in backward)], low
 
 
-def _slices(start: NDArray[np.int64], stop: NDArray[np.int64]) -> tuple[slice, ...]:
-    return tuple(slice(a, b) for a, b in zip(start.tolist(), stop.tolist(), strict=True))
+def _slices(start: NDArray[np.int64], stop: ArrayLike) -> tuple[slice, ...]:
+    return tuple(slice(a, b) for a, b in zip(start.tolist(), np.asarray(stop).tolist(), strict=True))
+
+
+def _labelled(voxels: NDArray[Any], box: Box) -> int:
+    return int(np.count_nonzero(voxels))
 
 
 def _box(volume: Volume) -> str:

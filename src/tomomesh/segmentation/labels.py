@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import EmptyError, UsageError
+from ..isosurface.run_mask import RunMask
+from .slabwise.cut import HERE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from ..isosurface.walls.walls import Walls
     from ..model.boxes import Box
     from ..model.volume import Volume
+    from .slabwise.cut import Cut, Cutting
 
     Ints = NDArray[np.int64]
 
@@ -35,12 +40,14 @@ NEARLY = 1e-3
 a label would be a mixture of two."""
 
 
-def whole(labels: Volume) -> Volume:
+def whole(labels: Volume, cutting: Cutting = HERE) -> Volume:
     """Round labels that are nearly whole, as other programs' resampling leaves them (3.0000458), with a note.
 
     Parameters
     ----------
     labels : Volume
+    cutting : Cutting, optional
+        Who looks at them.
 
     Raises
     ------
@@ -52,16 +59,27 @@ def whole(labels: Volume) -> Volume:
         raise _no_labels(f"{voxels.dtype}, {voxels.ndim - 2} layer(s)")
     if voxels.dtype.kind != "f":
         return labels
-    rounded = np.rint(voxels)
-    with np.errstate(invalid="ignore"):  # what is infinite is NaN off
-        off = np.abs(voxels - rounded)
-    worst = np.unravel_index(int(off.argmax()), off.shape)
-    if not off[worst] < NEARLY:
-        raise _no_labels(f"{voxels[worst]:.9g} among {voxels.dtype} numbers")
-    if not off[worst]:
+    cut = cutting.of(voxels)
+    off, worst, counts = zip(*cut.each(_off), strict=True)
+    first = int(np.argmax(off))  # of NaN the first
+    if not off[first] < NEARLY:
+        raise _no_labels(f"{worst[first]:.9g} among {voxels.dtype} numbers")
+    if not off[first]:
         return labels
-    told = f"labels that are nearly whole, rounded: {int(np.count_nonzero(off))} voxels, as {voxels[worst]:.9g}"
-    return replace(labels, voxels=rounded, notes=(*labels.notes, told))
+    told = f"labels that are nearly whole, rounded: {sum(counts)} voxels, as {worst[first]:.9g}"
+    return replace(labels, voxels=cut.made(_rounded, voxels.dtype).voxels, notes=(*labels.notes, told))
+
+
+def _off(levels: NDArray[Any], box: Box) -> tuple[Any, Any, int]:
+    """Tell how far the worst label is off, which it is, and how many are."""
+    with np.errstate(invalid="ignore"):  # what is infinite is NaN off
+        off = np.abs(levels - np.rint(levels))
+    worst = np.unravel_index(int(off.argmax()), off.shape)
+    return off[worst], levels[worst], int(np.count_nonzero(off))
+
+
+def _rounded(levels: NDArray[Any], box: Box) -> NDArray[Any]:
+    return np.asarray(np.rint(levels))
 
 
 def _no_labels(found: str) -> UsageError:
@@ -80,6 +98,10 @@ class Labelled:
         Its labels in order, 0 among them where it has it.
     boxes : (n, 2, 3) int64 array
         First slice, row and column of each, and those behind its last.
+    cut : Cut
+        The voxels in slabs.
+    walls : Walls or None
+        Between all of them, where neighbors share them.
 
     Examples
     --------
@@ -92,21 +114,22 @@ class Labelled:
     volume: Volume
     numbers: Ints
     boxes: Ints
+    cut: Cut
+    walls: Walls | None = None
 
     @classmethod
-    def of(cls, volume: Volume) -> Labelled:
+    def of(cls, volume: Volume, cutting: Cutting = HERE) -> Labelled:
         """Look at every voxel of a label map once."""
-        voxels = volume.voxels
-        low, high = voxels.min(), voxels.max()
-        if float(high) - float(low) < HIGHEST_LABEL:
-            boxes = _boxes(voxels, int(low), int(high) - int(low) + 1)
-            found = np.flatnonzero(boxes[:, 1, 0])
-            return cls(volume, found + int(low), boxes[found])
-        numbers, places = np.unique(voxels, return_inverse=True)
-        return cls(volume, numbers.astype(np.int64), _boxes(places.reshape(voxels.shape), 0, len(numbers)))
+        cut = cutting.of(volume.voxels)
+        every, boxes = zip(*cut.each(_labels_of), strict=True)
+        numbers, places = np.unique(np.concatenate(every), return_inverse=True)
+        found = _none(len(numbers), volume.shape)
+        np.minimum.at(found[:, 0], places, np.concatenate(boxes)[:, 0])
+        np.maximum.at(found[:, 1], places, np.concatenate(boxes)[:, 1])
+        return cls(volume, numbers, found, cut)
 
-    def mask(self, wanted: Sequence[int]) -> tuple[NDArray[np.bool_], Box]:
-        """Return the voxels of some labels (K, J, I), and the box that they lie in: no others are looked at.
+    def mask(self, wanted: Sequence[int]) -> RunMask:
+        """Return the voxels of some labels: outside of their box none are looked at.
 
         Raises
         ------
@@ -123,9 +146,32 @@ class Labelled:
         boxes = self.boxes[np.isin(self.numbers, wanted)]
         low, high = boxes[:, 0].min(axis=0).tolist(), boxes[:, 1].max(axis=0).tolist()
         box = slice(low[0], high[0]), slice(low[1], high[1]), slice(low[2], high[2])
-        mask = np.zeros(self.volume.shape, np.bool_)  # what is not written takes no memory
-        mask[box] = np.isin(self.volume.voxels[box], wanted)
-        return mask, box
+        return self.cut.within(box).runs(partial(_chosen, wanted=tuple(wanted))).placed(box, self.volume.shape)
+
+
+def _chosen(labels: NDArray[Any], box: Box, *, wanted: tuple[int, ...]) -> RunMask:
+    return RunMask.of([np.isin(labels, wanted)])
+
+
+def _labels_of(labels: NDArray[Any], box: Box) -> tuple[Ints, Ints]:
+    """Return the labels of a slab, rising, and the box of each in the map."""
+    low, high = labels.min(), labels.max()
+    if float(high) - float(low) < HIGHEST_LABEL:
+        boxes = _boxes(labels, int(low), int(high) - int(low) + 1)
+        found = np.flatnonzero(boxes[:, 1, 0])
+        numbers, boxes = found + int(low), boxes[found]
+    else:
+        every, places = np.unique(labels, return_inverse=True)
+        numbers, boxes = every.astype(np.int64), _boxes(places.reshape(labels.shape), 0, len(every))
+    boxes[:, :, 0] += box[0].start
+    return numbers, boxes
+
+
+def _none(count: int, shape: tuple[int, ...]) -> Ints:
+    """Return boxes (count, 2, 3) that hold nothing of a shape: their first voxels behind all, their ends at 0."""
+    boxes = np.zeros((count, 2, 3), np.int64)
+    boxes[:, 0] = shape
+    return boxes
 
 
 def _boxes(voxels: NDArray[Any], low: int, count: int) -> Ints:
@@ -133,9 +179,7 @@ def _boxes(voxels: NDArray[Any], low: int, count: int) -> Ints:
 
     A run, the stretch of a row with one number, is all that is looked at of what lies inside.
     """
-    boxes = np.zeros((count, 2, 3), np.int64)
-    boxes[:, 0] = voxels.shape
-    columns = voxels.shape[2]
+    boxes, columns = _none(count, voxels.shape), voxels.shape[2]
     for k, plane in enumerate(voxels):
         flat = np.ascontiguousarray(plane).ravel()
         starts = np.flatnonzero(np.append(True, flat[1:] != flat[:-1]) | (np.arange(flat.size) % columns == 0))
@@ -166,17 +210,37 @@ def labels_in(voxels: NDArray[Any]) -> dict[str, int]:
     ----------
     voxels : (K, J, I[, L]) array
     """
-    if not (voxels.ndim == 3 and voxels.min() > -NEARLY and voxels.max() < HIGHEST_LABEL):
+    return labels_counted(HERE.of(voxels))
+
+
+def labels_counted(cut: Cut) -> dict[str, int]:
+    """Count the labels of a study in slabs: see `labels_in`."""
+    if cut.voxels.ndim != 3:
         return {}
-    if voxels.dtype.kind == "f":
-        rounded = np.rint(voxels)
-        if not np.abs(voxels - rounded).max() < NEARLY:
+    pairs, equal = np.zeros(2, np.int64)
+    for found in cut.each(_neighbors):
+        if found is None:  # as of most studies the first slab tells
             return {}
-        voxels = rounded
-    left, right = voxels[..., :-1], voxels[..., 1:]
-    inside = (left > 0) & (right > 0)
-    pairs = int(np.count_nonzero(inside))
-    if np.count_nonzero((left == right) & inside) < EVEN * pairs:
+        pairs, equal = pairs + found[0], equal + found[1]
+    if equal < EVEN * pairs:
         return {}
-    counts = np.bincount(voxels.ravel().astype(np.int64))
+    counts = cut.sum(_number)
     return {str(label): int(counts[label]) for label in np.flatnonzero(counts) if label > 0}
+
+
+def _neighbors(levels: NDArray[Any], box: Box) -> tuple[int, int] | None:
+    """Count neighbors in rows that are both over 0, and equal ones of them; None where levels are no labels."""
+    if not (levels.min() > -NEARLY and levels.max() < HIGHEST_LABEL):
+        return None
+    if levels.dtype.kind == "f":
+        rounded = np.rint(levels)
+        if not np.abs(levels - rounded).max() < NEARLY:
+            return None
+        levels = rounded
+    left, right = levels[..., :-1], levels[..., 1:]
+    inside = (left > 0) & (right > 0)
+    return int(np.count_nonzero(inside)), int(np.count_nonzero((left == right) & inside))
+
+
+def _number(levels: NDArray[Any], box: Box) -> Ints:
+    return np.bincount(np.rint(levels).ravel().astype(np.int64), minlength=HIGHEST_LABEL)

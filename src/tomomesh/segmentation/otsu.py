@@ -6,29 +6,30 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .slabwise.levels import TAILS, levels_of
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-TAILS, REACH = (2.0, 0.01), 0.5
-"""Percents of the levels at each end that have no say in the range of the histogram, tried in turn, and how far it
-reaches beyond the others, in parts of what they span; levels beyond are not counted. 2 % are twice the hot or metal
-voxels that the threshold must withstand. Where the rest is one class, a small object may lie in the tails: then only
-one level in 10,000 is left out. Chosen: tails of 1 and 4 %, and reaches of .25 and 1, move the threshold of no study at
-hand by more than a bin."""
+    from .slabwise.levels import Levels
+
+REACH = 0.5
+"""How far the histogram reaches beyond the levels between its tails (`TAILS`), in parts of what they span; levels
+beyond are not counted. Chosen: reaches of .25 and 1 move the threshold of no study at hand by more than a bin."""
 ONE_CLASS = 0.75
 """Share of the variance that lies between the two halves of a uniform class; of a normal one it is 2 / pi. A histogram
 that is split no better holds one class (Otsu 1979, eq. 17)."""
 
 
-def otsu_threshold(levels: NDArray[Any], *, bins: int = 256) -> float:
+def otsu_threshold(levels: NDArray[Any] | Levels, *, bins: int = 256) -> float:
     """Return the gray level that splits a histogram into two classes most unlike each other (Otsu 1979).
 
     Parameters
     ----------
-    levels : array
-        Gray levels of any shape; those that are not finite do not count.
+    levels : array or Levels
+        Gray levels of any shape, or what is told of those of slabs; those that are not finite do not count.
     bins : int
         Bins of the histogram over the bulk of the levels (`TAILS`).
 
@@ -41,7 +42,7 @@ def otsu_threshold(levels: NDArray[Any], *, bins: int = 256) -> float:
     return otsu_levels(levels, 2, bins=bins)[0]
 
 
-def otsu_levels(levels: NDArray[Any], classes: int, *, bins: int = 256) -> tuple[float, ...]:
+def otsu_levels(levels: NDArray[Any] | Levels, classes: int, *, bins: int = 256) -> tuple[float, ...]:
     """Return the gray levels that split a histogram into several classes most unlike each other (Otsu 1979, sec. V).
 
     Parameters
@@ -56,56 +57,41 @@ def otsu_levels(levels: NDArray[Any], classes: int, *, bins: int = 256) -> tuple
     tuple of float
         Rising, one fewer than classes; the level itself, alone, where there is only one.
     """
-    levels = levels[np.isfinite(levels)] if levels.dtype.kind == "f" else levels
-    low, high = float(levels.min()), float(levels.max())
-    if low == high:
-        return (low,)
-    counts, middles = _over_bulk(levels, low, high, bins)
+    held = levels_of(levels).finite
+    if held.ends[0] == held.ends[1]:
+        return (held.ends[0],)
+    counts, middles = _over_bulk(held, bins)
     classes = min(classes, int(np.count_nonzero(counts)))
     ends = _last_bins(counts, middles, classes)
     return tuple(_between(counts, middles, ends, n) for n in range(classes - 1))
 
 
-def two_classes(levels: NDArray[Any], *, bins: int = 256) -> bool:
+def two_classes(levels: Levels, *, bins: int = 256) -> bool:
     """Tell whether levels split into two classes better than one class does, without one pair of tails or the other."""
-    low, high = float(levels.min()), float(levels.max())
-    return any(_split(*found) > ONE_CLASS for found in _histograms(levels, low, high, bins))
+    return any(_split(*found) > ONE_CLASS for found in _histograms(levels, bins))
 
 
-def _over_bulk(
-    levels: NDArray[Any], low: float, high: float, bins: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _over_bulk(levels: Levels, bins: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return counts and middles of bins over the bulk of the levels; over more of them where that is one class."""
     found = None
-    for found in _histograms(levels, low, high, bins):
+    for found in _histograms(levels, bins):
         if _split(*found) > ONE_CLASS:
             break
-    return found or _binned(levels, low, high, bins)
+    return found or _binned(levels, *levels.ends, bins)
 
 
-def _histograms(
-    levels: NDArray[Any], low: float, high: float, bins: int
-) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+def _histograms(levels: Levels, bins: int) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64]]]:
     """Yield counts and middles of bins without one pair of tails after the other, but of no single level."""
+    low, high = levels.ends
     for tail in TAILS:
-        first, last = bulk(levels, tail)
+        first, last = levels.bulk(tail)
         if first < last:
             reach = REACH * (last - first)
             yield _binned(levels, max(low, first - reach), min(high, last + reach), bins)
 
 
-def bulk(levels: NDArray[Any], tail: float = TAILS[0]) -> tuple[float, float]:
-    """Return the percentiles that leave out so many percent of the levels at each end; levels that are held."""
-    if _is_short(levels):
-        present, counts = _counted(levels)
-        ranks = np.searchsorted(np.cumsum(counts), np.array([tail, 100 - tail]) / 100 * levels.size)
-        return float(present[ranks[0]]), float(present[ranks[1]])
-    low, high = np.percentile(levels, (tail, 100 - tail), method="inverted_cdf")
-    return float(low), float(high)
-
-
-def _binned(levels: NDArray[Any], low: float, high: float, bins: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    return histogram(levels, low, high, bins), low + (np.arange(bins) + 0.5) * (high - low) / bins
+def _binned(levels: Levels, low: float, high: float, bins: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    return levels.histogram(low, high, bins), low + (np.arange(bins) + 0.5) * (high - low) / bins
 
 
 def _split(counts: NDArray[np.int64], middles: NDArray[np.float64]) -> float:
@@ -151,22 +137,6 @@ def _last_bins(counts: NDArray[np.int64], middles: NDArray[np.float64], classes:
     return [end - 1 for end in reversed(ends[1:])]
 
 
-def histogram(levels: NDArray[Any], low: float, high: float, bins: int) -> NDArray[np.int64]:
+def histogram(levels: NDArray[Any] | Levels, low: float, high: float, bins: int) -> NDArray[np.int64]:
     """Count gray levels in equal bins; exact and quick for small integers, which most studies hold."""
-    levels = levels.view(np.uint8) if levels.dtype.kind == "b" else levels
-    if _is_short(levels):
-        present, counts = _counted(levels)
-        return np.histogram(present, bins, (low, high), weights=counts)[0].astype(np.int64)
-    return np.histogram(levels, bins, (low, high))[0].astype(np.int64)
-
-
-def _is_short(levels: NDArray[Any]) -> bool:
-    return levels.dtype.kind in "iu" and levels.dtype.itemsize <= 2
-
-
-def _counted(levels: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the levels of small integers that are present, rising, and how many there are of each."""
-    base = int(np.iinfo(levels.dtype).min)
-    counts = np.bincount(levels.ravel().astype(np.int64) - base)
-    present = np.flatnonzero(counts)
-    return present + base, counts[present]
+    return levels_of(levels).histogram(low, high, bins)

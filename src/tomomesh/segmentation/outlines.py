@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..isosurface.run_mask import RunMask
 from ..kernels.measure.edges import join_pairs
+from ..model.sliced import ranges
 from .signal import SOLID
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     Ints = NDArray[np.int64]
     Floats = NDArray[np.float64]
@@ -163,59 +165,85 @@ class _Runs:
         return roots.astype(np.int64)
 
 
-def outlines_of(mask: NDArray[np.bool_], pixel_mm: tuple[float, float] = (1.0, 1.0)) -> Outlines:
+def outlines_of(mask: NDArray[np.bool_] | RunMask, pixel_mm: tuple[float, float] = (1.0, 1.0)) -> Outlines:
     """Tell what each slice of a window is.
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : (K, J, I) bool array or RunMask
     pixel_mm : (float, float)
         Distance of the columns and of the rows.
     """
-    inside, outside = _runs(boxed := _boxed(mask))
-    count, rows = len(boxed), boxed.shape[1] + 2 * FRAME
-    beside, above = inside.meeting(1, 1), inside.meeting(rows)
-    pieces, gaps = inside.joined(beside), outside.joined(outside.meeting(1))
-    held = gaps != gaps[0]  # the outside of all slices is one, through their frames
-    hollow = outside.of(held)
-    bodies = _sum(inside.joined(beside, above), inside.size)
-    bodies = bodies[bodies > 0]
-    return Outlines(
-        *_parts(inside, pieces, count), *_parts(hollow, gaps[held], count), _lengths(inside, beside, count, pixel_mm),
-        _ellipses(inside, rows, count), _sum(inside.slice, _shared(inside, above), count)[:-1], len(bodies),
-        float(bodies.max(initial=0.0) / max(bodies.sum(), 1.0)), _forks(pieces, above), pixel_mm,
-    )  # fmt: skip
+    boxed = _boxed(mask if isinstance(mask, RunMask) else RunMask.of([mask]))
+    count = boxed.shape[0]
+    parts = [
+        _Part.of(boxed.part(start, min(stop + 1, count)), stop - start, pixel_mm) for start, stop in ranges(0, count)
+    ]
+    *columns, shared = (np.concatenate(each) for each in zip(*(part.columns for part in parts), strict=True))
+    bodies, forks = _bodies(parts), sum(part.forks for part in parts)
+    largest = float(bodies.max(initial=0.0) / max(bodies.sum(), 1.0))
+    return Outlines(*columns, shared[:-1], len(bodies), largest, forks, pixel_mm)
 
 
-def _boxed(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+@dataclass(frozen=True)
+class _Part:
+    """What some slices are, by the columns of `Outlines`, and the pixels (p,) of their pieces, slice after slice.
+
+    Links (2, q) are pieces that share pixels with those of the next slice, as far as the one that follows the last.
+    """
+
+    columns: list[NDArray[Any]]
+    sizes: Floats
+    links: Ints
+    forks: int
+
+    @classmethod
+    def of(cls, mask: RunMask, own: int, pixel_mm: tuple[float, float]) -> _Part:
+        """Look at some slices, of which the one that follows their `own` only tells how these go on."""
+        inside, outside = _runs(mask)
+        count, rows = mask.shape[0], mask.shape[1] + 2 * FRAME
+        beside, above = inside.meeting(1, 1), inside.meeting(rows)
+        pieces, gaps = inside.joined(beside), outside.joined(outside.meeting(1))
+        held = gaps != gaps[0]  # the outside of all slices is one, through their frames
+        columns = [
+            *_parts(inside, pieces, count), *_parts(outside.of(held), gaps[held], count),
+            _lengths(inside, beside, count, pixel_mm), _ellipses(inside, rows, count),
+            _sum(inside.slice, _shared(inside, above), count),
+        ]  # fmt: skip
+        first, pieces = np.unique(pieces, return_inverse=True)
+        links = np.stack(np.divmod(np.unique(pieces[above[0]] * len(first) + pieces[above[1]]), max(len(first), 1)))
+        known = np.count_nonzero(inside.slice[first] < own)
+        return cls([one[:own] for one in columns], _sum(pieces, inside.size)[:known], links, _forks(links))
+
+
+def _bodies(parts: list[_Part]) -> Floats:
+    """Return the pixels of the pieces in space."""
+    sizes = np.concatenate([part.sizes for part in parts])
+    first = np.cumsum([0, *(len(part.sizes) for part in parts)])
+    roots = np.arange(len(sizes), dtype=np.int32)
+    for part, before in zip(parts, first.tolist(), strict=False):
+        join_pairs(*(part.links + before), roots)
+    found = _sum(roots, sizes)
+    return found[found > 0]
+
+
+def _boxed(mask: RunMask) -> RunMask:
     """Leave out the rows and columns that hold nothing of a window; all slices stay."""
-    return mask[:, _reach(mask.any(axis=(0, 2))), _reach(mask.any(axis=(0, 1)))]
+    _, j, i = mask.box
+    return mask.cropped((slice(0, mask.shape[0]), j, i)) if mask.count else mask
 
 
-def _reach(held: ArrayLike) -> slice:
-    """Return the stretch from the first to the last that is true."""
-    places = np.flatnonzero(held)
-    return slice(int(places[0]), int(places[-1]) + 1) if len(places) else slice(0, 1)
-
-
-def _runs(mask: NDArray[np.bool_]) -> tuple[_Runs, _Runs]:
+def _runs(mask: RunMask) -> tuple[_Runs, _Runs]:
     """Part the rows of slices in a frame into what lies in the window and what lies outside, before and after each."""
-    count, (rows, columns) = len(mask), np.array(mask.shape[1:]) + 2 * FRAME
-    ends = np.concatenate([_changes(one) + k * rows * columns for k, one in enumerate(mask)])  # no copy of the window
-    row = ends[::2] // columns
-    start, stop = ends[::2] - row * columns, ends[1::2] - row * columns
+    count, rows, columns = mask.shape[0], mask.shape[1] + 2 * FRAME, mask.shape[2] + 2 * FRAME
+    k, j = np.divmod(mask.rows, mask.shape[1])
+    row, start, stop = k * rows + j + FRAME, mask.starts + np.int64(FRAME), mask.stops + np.int64(FRAME)
     gap = np.arange(len(row)) + row  # the stretch outside before each inside: every row has one more than insides
     around = np.repeat(np.arange(count * rows), np.bincount(row, minlength=count * rows) + 1)
     after, before = np.zeros_like(around), np.full_like(around, columns)
     after[gap + 1], before[gap] = stop, start
     width = columns + 2 * FRAME
     return _Runs(row, start, stop, row // rows, width), _Runs(around, after, before, around // rows, width)
-
-
-def _changes(pixels: NDArray[np.bool_]) -> Ints:
-    """Return where, row after row of a slice in its frame, the window begins or ends."""
-    flat = np.pad(pixels, FRAME).ravel()
-    return np.flatnonzero(flat[1:] != flat[:-1]) + 1
 
 
 def _sum(where: Ints, values: NDArray[Any], count: int = 0) -> Floats:
@@ -257,7 +285,6 @@ def _ellipses(runs: _Runs, rows: int, count: int) -> Floats:
     return np.where(area > 0, 4 * np.pi * np.sqrt(spread), 0.0)
 
 
-def _forks(pieces: Ints, above: tuple[Ints, Ints]) -> int:
+def _forks(links: Ints) -> int:
     """Count the pieces that go on as several, or come of several."""
-    links = np.stack(np.divmod(np.unique(pieces[above[0]] * len(pieces) + pieces[above[1]]), max(len(pieces), 1)))
     return sum(int(np.count_nonzero(np.bincount(ends) > 1)) for ends in links) if links.size else 0

@@ -3,26 +3,40 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import EmptyError, UsageError
-from ..model.boxes import box_of
-from .body import Cleaned, components_of_body, is_dense, largest_component, solid, thick_components, without_specks
+from ..isosurface.run_mask import RunMask
+from ..model.lazy import LazyVoxels
+from .body import (
+    Cleaned,
+    components_of_body,
+    is_dense,
+    largest_component,
+    skin_of,
+    solid,
+    thick_components,
+    without_specks,
+)  # fmt: skip
 from .contours.labelled import filled_slices, gaps_in
-from .padding import all_padding, named_padding
-from .window import PRESETS_HU, choose_window, window
+from .padding import as_background, padding_in
+from .slabwise.cut import HERE
+from .slabwise.sources import MaskVoxels
+from .window import otsu_in, window_in, window_limits
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..isosurface.walls.walls import Walls
     from ..model.boxes import Box
     from ..model.volume import Volume
     from ..settings import Settings, WindowSettings
     from .body import Components
     from .labels import Labelled
+    from .slabwise.cut import Cut, Cutting
     from .window import Limit
 
 
@@ -66,7 +80,8 @@ class Chosen:
     ----------
     volume : Volume
         The gray levels that were asked for; for labels, 1 where one of them is, else 0.
-    mask : (K, J, I) bool array
+    runs : RunMask
+        The voxels that are kept.
     lower, upper : float or (L,) float array
         Bounds on the levels of `volume`.
     counts : Counts
@@ -74,37 +89,43 @@ class Chosen:
         Specks and pores.
     told : str
         What is to be said of slices without labels.
-    around : box or None
-        Outside of which no voxel is kept, where that is known.
+    walls : Walls or None
+        Of all labels, where neighbors share them.
     """
 
     volume: Volume
-    mask: NDArray[np.bool_]
+    runs: RunMask
     lower: Limit
     upper: Limit
     counts: Counts = field(default_factory=Counts)
     cleaned: Cleaned | None = None
     told: str = ""
-    around: Box | None = None
+    walls: Walls | None = None
 
-    @cached_property
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """The voxels that are kept, (K, J, I), all in memory."""
+        return self.runs.dense
+
+    @property
     def box(self) -> Box:
         """What the voxels that are kept lie in: outside of it nothing has to be looked at."""
-        return box_of(self.mask, self.around)
+        return self.runs.box
 
-    @cached_property
+    @property
     def kept(self) -> int:
         """How many voxels are kept."""
-        return int(np.count_nonzero(self.mask[self.box]))
+        return self.runs.count
 
-    def counted(self, mask: NDArray[np.bool_], **counts: int) -> Chosen:
+    def counted(self, runs: RunMask, **counts: int) -> Chosen:
         """Return the same with another mask and some counts."""
-        return replace(self, mask=mask, counts=replace(self.counts, **counts))
+        return replace(self, runs=runs, counts=replace(self.counts, **counts))
 
 
 def choose(
-    stack: Volume, labels: Labelled | None, settings: Settings, inside: NDArray[np.bool_] | None = None
-) -> Chosen:
+    stack: Volume, labels: Labelled | None, settings: Settings, inside: RunMask | None = None,
+    cutting: Cutting = HERE,
+) -> Chosen:  # fmt: skip
     """Return what the settings keep of a study.
 
     Parameters
@@ -113,8 +134,10 @@ def choose(
     labels : Labelled or None
         A label map on its grid, for ``select``: the study itself, or one beside it.
     settings : Settings
-    inside : (K, J, I) bool array, optional
+    inside : RunMask, optional
         The voxels that may be kept.
+    cutting : Cutting, optional
+        Who looks at them: no result depends on it.
 
     Raises
     ------
@@ -122,62 +145,65 @@ def choose(
         As `window` and `Labelled.mask`.
     """
     asked = settings.window
-    chosen = _of_levels(stack, asked) if labels is None else _of_labels(stack, labels, asked)
-    chosen = chosen if inside is None else replace(chosen, mask=_within(chosen.mask, inside))
-    chosen = _parts(chosen.counted(chosen.mask, window=chosen.kept), stack, asked)
-    if asked.keep == "all":
+    chosen = _of_levels(stack, asked, cutting) if labels is None else _of_labels(stack, labels, asked)
+    chosen = chosen if inside is None else replace(chosen, runs=_within(chosen.runs, inside))
+    chosen = _parts(chosen.counted(chosen.runs, window=chosen.kept), stack, asked, cutting.of(chosen.volume.voxels))
+    if asked.keep == "all" or settings.cubes.shared_walls:  # a speck left out of one label would be a gap
         return chosen
-    cleaned = without_specks(chosen.mask, chosen.around)
-    return replace(chosen, mask=cleaned.mask, cleaned=cleaned)
+    cleaned = without_specks(chosen.runs)
+    return replace(chosen, runs=cleaned.mask, cleaned=cleaned)
 
 
 def _of_labels(stack: Volume, labels: Labelled, asked: WindowSettings) -> Chosen:
-    mask, box = labels.mask(asked.select or ())
+    runs = labels.mask(asked.select or ())
     if asked.fill_slices:
-        volume, told = filled_slices(mask, stack)
-        return Chosen(volume, volume.voxels > 0, 0.0, np.inf, told=told)
-    gaps = gaps_in(mask, box)
+        return _interpolated(stack, runs, labels.volume)
+    gaps = gaps_in(runs)
     told = f"{gaps.told}: --fill-slices interpolates them" if gaps else ""
-    return Chosen(replace(stack, voxels=mask.view(np.uint8)), mask, 0.5, np.inf, told=told, around=box)
+    voxels: Any = LazyVoxels.of(MaskVoxels(runs)) if labels.volume.in_parts else runs.dense.view(np.uint8)
+    return Chosen(replace(stack, voxels=voxels), runs, 0.5, np.inf, told=told, walls=labels.walls)
 
 
-def _of_levels(stack: Volume, asked: WindowSettings) -> Chosen:
+def _interpolated(stack: Volume, runs: RunMask, labels: Volume) -> Chosen:
+    """Fill the slices between labelled ones, which looks at all of them at once."""
+    if labels.in_parts:
+        raise UsageError(
+            "slices are filled in memory alone", found="--fill-slices, and a study that is read part by part",
+            hint="the same without it, or a study that fits into the memory",
+        )  # fmt: skip
+    volume, told = filled_slices(runs.dense, stack)
+    return Chosen(volume, RunMask.of([volume.voxels > 0]), 0.0, np.inf, told=told)
+
+
+def _of_levels(stack: Volume, asked: WindowSettings, cutting: Cutting) -> Chosen:
     """Window a study whose padding is background: what its header names, and what is found where no window is given."""
     given = asked.lower is not None or asked.upper is not None
-    padded, named = all_padding(stack, guessed=not given), named_padding(stack)
-    stack, changed = _as_background(stack, padded)
-    lower, upper = choose_window(stack, asked, padded)
-    mask = window(stack, lower=lower, upper=upper, layers=asked.layers)
-    counts = [0 if one is None else int(np.count_nonzero(changed & one)) for one in (padded, named)]
-    return Chosen(stack, mask, lower, upper, Counts(padding=counts[0], named_padding=counts[1]))
+    cut = cutting.of(stack.voxels)
+    padded = padding_in(cut, stack.padding, guessed=not given)
+    shown, changed, named = (cut, 0, 0) if padded is None else as_background(cut, padded)
+    lower, upper = window_limits(stack, shown, asked, partial(otsu_in, cut, padded))
+    runs = window_in(shown, lower=lower, upper=upper, layers=asked.layers)
+    counts = Counts(padding=changed, named_padding=named)
+    return Chosen(replace(stack, voxels=shown.voxels), runs, lower, upper, counts)
 
 
-def _as_background(stack: Volume, padded: NDArray[np.bool_] | None) -> tuple[Volume, NDArray[np.bool_] | np.bool_]:
-    """Give padding the lowest of the other levels; return also which voxels had another."""
-    if padded is None:
-        return stack, np.False_
-    lowest = stack.voxels.min(where=~padded, initial=stack.voxels.max())
-    changed = padded & (stack.voxels != lowest)
-    return replace(stack, voxels=np.where(padded, lowest, stack.voxels)), changed
-
-
-def _within(mask: NDArray[np.bool_], inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    mask = mask & inside
-    if not mask.any():
+def _within(runs: RunMask, inside: RunMask) -> RunMask:
+    runs = runs & inside
+    if not runs.count:
         raise EmptyError("nothing of the window lies in the box", expected="a window with voxels in --roi")
-    return mask
+    return runs
 
 
-def _parts(chosen: Chosen, stack: Volume, asked: WindowSettings) -> Chosen:
+def _parts(chosen: Chosen, stack: Volume, asked: WindowSettings, cut: Cut) -> Chosen:
     """Leave out components, and what is no body; where it is asked for, fill or look into the body."""
     ct = stack.layers == 1 and (stack.unit == "HU" or asked.preset is not None)
     guessed, keep = asked.keep == "auto", asked.keep
     if keep == "all":
         return chosen
     if asked.preset == "lung" and guessed:
-        return _inside_body(chosen)
+        return _inside_body(chosen, cut)
     if guessed:
-        keep = "body" if ct and asked.select is None and is_dense(chosen.mask, chosen.volume) else "all"
+        keep = "body" if ct and asked.select is None and is_dense(chosen.runs, cut) else "all"
     if keep == "body" and not ct:
         raise UsageError(
             "the body is found in Hounsfield units, which the study is not in", found="--keep = body",
@@ -185,34 +211,34 @@ def _parts(chosen: Chosen, stack: Volume, asked: WindowSettings) -> Chosen:
         )  # fmt: skip
     if keep != "all":
         by_body = keep == "body"
-        kept = components_of_body(chosen.mask, chosen.volume) if by_body else largest_component(chosen.mask)
+        kept = components_of_body(chosen.runs, chosen.volume, cut) if by_body else largest_component(chosen.runs)
         chosen = _some(chosen, kept, guessed=guessed)
-    return _filled(chosen) if asked.preset == "skin" else chosen
+    return _filled(chosen, cut) if asked.preset == "skin" else chosen
 
 
 def _some(chosen: Chosen, kept: Components, *, guessed: bool) -> Chosen:
     """Leave components out; not all of them, where a study shows no body at all, nor most of a window on a guess."""
     voxels = chosen.counts.window
-    dropped = voxels - int(np.count_nonzero(kept.mask))
+    dropped = voxels - kept.mask.count
     if dropped == voxels or (guessed and 2 * dropped > voxels):
-        return chosen.counted(chosen.mask, components=kept.found, spared_voxels=dropped)
+        return chosen.counted(chosen.runs, components=kept.found, spared_voxels=dropped)
     return chosen.counted(kept.mask, components=kept.found, dropped=kept.dropped, dropped_voxels=dropped)
 
 
-def _filled(chosen: Chosen) -> Chosen:
+def _filled(chosen: Chosen, cut: Cut) -> Chosen:
     """Fill what a skin encloses."""
-    filled = solid(chosen.mask, chosen.volume)
-    return chosen.counted(filled, lining=int(np.count_nonzero(filled) - np.count_nonzero(chosen.mask)))
+    filled = solid(chosen.runs, chosen.volume, cut)
+    return chosen.counted(filled, lining=filled.count - chosen.kept)
 
 
-def _inside_body(chosen: Chosen) -> Chosen:
+def _inside_body(chosen: Chosen, cut: Cut) -> Chosen:
     """Leave out the air of the room, and then what is nowhere thick; not where nothing would be left."""
     volume, window = chosen.volume, chosen.counts.window
-    skin = volume.voxels > PRESETS_HU["skin"][0]
-    mask = chosen.mask & solid(components_of_body(skin, volume).mask, volume)
-    if not mask.any():
-        return chosen.counted(chosen.mask, spared_voxels=window)
-    inside = int(np.count_nonzero(mask))
-    found = replace(chosen, mask=mask, counts=replace(chosen.counts, window=inside))
-    kept = _some(found, thick_components(mask, volume), guessed=True)
-    return kept.counted(kept.mask, window=window, room=window - inside)
+    body = components_of_body(skin_of(cut), volume, cut).mask
+    runs = chosen.runs & solid(body, volume, cut)
+    if not runs.count:
+        return chosen.counted(chosen.runs, spared_voxels=window)
+    inside = runs.count
+    found = replace(chosen, runs=runs, counts=replace(chosen.counts, window=inside))
+    kept = _some(found, thick_components(runs, volume, cut), guessed=True)
+    return kept.counted(kept.runs, window=window, room=window - inside)

@@ -10,11 +10,13 @@ import scipy
 from ..kernels.contours.closing import close_plane
 from ..kernels.contours.moments import plane_moments
 from ..model.columns import for_kernels
+from ..model.sliced import areas_of, parts_of, some_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..isosurface.crossings import Levels
+    from ..model.sliced import Sliced
 
 SOLID = 0.4
 """Share of its ellipse that a window must fill to count as a solid, whose outline is taken.
@@ -33,7 +35,7 @@ WORD = 64
 """Pixels in a word of bits."""
 
 
-def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
+def fills_most(mask: Sliced, *, solid: float = SOLID) -> bool:
     """Tell whether the window of a study is a solid, like skin, and not a wall, like a skull.
 
     Compares the pixels of all slices with the areas of the ellipses that have the same second moments; a ring
@@ -41,10 +43,11 @@ def fills_most(mask: NDArray[np.bool_], *, solid: float = SOLID) -> bool:
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : (K, J, I) bool array or slices of it
     """
-    sums = np.empty((len(mask), 6))
-    plane_moments(for_kernels(mask, np.bool_), sums)
+    sums = np.empty((mask.shape[0], 6))
+    for start, stop in parts_of(mask):
+        plane_moments(for_kernels(some_of(mask, start, stop), np.bool_), sums[start:stop])
     count, x, y, xx, xy, yy = sums[sums[:, 0] > 2].T
     spread = (xx / count - (x / count) ** 2 + 1 / 12) * (yy / count - (y / count) ** 2 + 1 / 12)
     ellipses = 4 * np.pi * np.sqrt(np.maximum(spread - (xy / count - x * y / count**2) ** 2, 0.0))
@@ -96,24 +99,27 @@ def crossings_around(plane: NDArray[np.bool_], levels: Levels, k: int) -> NDArra
     if len(inner) == 0:
         return np.empty((0, 2))
     inner = inner - margin
-    near, far = (
-        np.column_stack([pixels, np.full(len(pixels), k)]).astype(np.int32) for pixels in (inner, inner + steps)
-    )
-    inside, outside = (levels.inside(levels.at(one)) for one in (near, far))
-    share = np.where(inside & ~outside, levels.crossed(near, far), 0.5)
+    own, near, far = levels.on(k), on_slice(inner, 0), on_slice(inner + steps, 0)
+    inside, outside = (own.inside(own.at(one)) for one in (near, far))
+    share = np.where(inside & ~outside, own.crossed(near, far), 0.5)
     return np.asarray(inner + share[:, None] * steps)
 
 
-def is_stepped(mask: NDArray[np.bool_], levels: Levels) -> bool:
+def is_stepped(mask: Sliced, levels: Levels) -> bool:
     """Tell whether the gray levels at the border of a window in its slices are those of a mask, no finer than it."""
-    full = np.flatnonzero(mask.any(axis=(1, 2)))
-    some = full[:: max(1, len(full) // STEPPED_ON)]
+    full = np.flatnonzero(areas_of(mask))
+    some = full[:: max(1, len(full) // STEPPED_ON)].tolist()
     if len(some) == 0:
         return False
-    found = [(k, *border_pairs(np.pad(mask[k], 1))) for k in some]
-    inner = np.concatenate([np.column_stack([pixels - 1, np.full(len(pixels), k)]) for k, pixels, _ in found])
-    steps = np.concatenate([np.pad(step, ((0, 0), (0, 1))) for _, _, step in found])
-    return len(inner) > 0 and levels.stepped(inner.astype(np.int32), steps.astype(np.int32))
+    found = [border_pairs(np.pad(mask[k], 1)) for k in some]
+    inner = np.concatenate([on_slice(pixels - 1, n) for n, (pixels, _) in enumerate(found)])
+    steps = np.concatenate([on_slice(step, 0) for _, step in found])
+    return len(inner) > 0 and levels.on(*some).stepped(inner, steps)
+
+
+def on_slice(pixels: NDArray[np.int64], k: int) -> NDArray[np.int32]:
+    """Return pixels (n, 2) of a slice, columns and rows, as voxels (n, 3)."""
+    return np.column_stack([pixels, np.full(len(pixels), k)]).astype(np.int32)
 
 
 def border_pairs(filled: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -9,18 +10,21 @@ import numpy as np
 
 from ..errors import GeometryError, UsageError
 from ..model.volume import AXES, Volume, order_along
-from ..stage import Stage, folded, timed
+from ..stage import Stage, folded, measured
 from .body import Cleaned
 from .crop import crop, inside_roi
 from .grid import onto_grid
-from .labels import Labelled, doubted, labels_in, whole
+from .labels import Labelled, doubted, labels_counted, whole
 from .selection import Chosen, choose
+from .slabwise.cut import HERE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..isosurface.run_mask import RunMask
     from ..settings import Settings
     from .selection import Counts
+    from .slabwise.cut import Cutting
     from .window import Limit
 
 CUT_OFF = 0.25
@@ -66,16 +70,19 @@ class LaidOut:
         Of the slices: axial, coronal or sagittal.
     labels : Labelled or None
         Where labels choose: the label map on its grid, itself or one beside it.
-    inside : (K, J, I) bool array or None
+    inside : RunMask or None
         The voxels that may be chosen, where not all may.
     cropped : dict or None
+    cutting : Cutting
+        How it is looked at, slab by slab.
     """
 
     volume: Volume
     plane: str
     labels: Labelled | None
-    inside: NDArray[np.bool_] | None
+    inside: RunMask | None
     cropped: dict[str, list[int]] | None
+    cutting: Cutting = HERE
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -84,7 +91,9 @@ class LaidOut:
         return self.volume.notes + beside
 
 
-def lay_out(volume: Volume, labels: Volume | None, settings: Settings, *, labelled: bool) -> LaidOut:
+def lay_out(
+    volume: Volume, labels: Volume | None, settings: Settings, *, labelled: bool, cutting: Cutting = HERE
+) -> LaidOut:
     """Turn the slices of a study the way they are asked for, crop them, and lay a label map over them.
 
     Parameters
@@ -95,6 +104,8 @@ def lay_out(volume: Volume, labels: Volume | None, settings: Settings, *, labell
     settings : Settings
     labelled : bool
         Whether labels choose the voxels.
+    cutting : Cutting, optional
+        How the study is looked at, slab by slab: no result depends on it.
 
     Raises
     ------
@@ -107,14 +118,14 @@ def lay_out(volume: Volume, labels: Volume | None, settings: Settings, *, labell
             expected="read_volume(path) or Volume.from_stored(array, affine)",
         )  # fmt: skip
     _check_labelled(labels, settings, labelled=labelled)
-    volume = whole(volume) if labelled and labels is None else volume
+    volume = whole(volume, cutting) if labelled and labels is None else volume
     axis = _slice_axis(volume, settings.network.slices)
     part, box = crop(volume, settings.crop, axis)
     study = part.along(axis)
-    laid = study if labels is None else _fitting(labels, volume).cropped(box).along(axis)
+    laid = study if labels is None else _fitting(labels, volume, cutting).cropped(box).along(axis)
     cropped = _cropped(tuple(box[n] for n in order_along(axis)), volume.along(axis).shape)
-    found = Labelled.of(laid) if labelled else None
-    return LaidOut(study, AXES[axis], found, inside_roi(study, settings.crop.roi), cropped)
+    found = Labelled.of(laid, cutting) if labelled else None
+    return LaidOut(study, AXES[axis], found, inside_roi(study, settings.crop.roi), cropped, cutting)
 
 
 def _check_labelled(labels: Volume | None, settings: Settings, *, labelled: bool) -> None:
@@ -126,18 +137,12 @@ def _check_labelled(labels: Volume | None, settings: Settings, *, labelled: bool
 
 
 def select_in(study: LaidOut, settings: Settings) -> Stage[Selected]:
-    """Choose voxels of a study by gray level or label.
-
-    Raises
-    ------
-    UsageError, EmptyError
-        As `choose`.
-    """
-    chosen = _choose(study, settings)
-    notes = study.notes + _dropped(chosen, settings) + _sparse(chosen) + _cut_off(chosen.value)
+    """Choose voxels of a study by gray level or label; raises as `choose` does."""
+    chosen = measured("window", choose, study.volume, study.labels, settings, study.inside, study.cutting)
+    notes = study.notes + _dropped(chosen.value, settings) + _cut_off(chosen.value)
     section = _section(study.volume, study.plane, study.cropped, notes)
     doubt = () if study.labels is None else doubted(study.labels)
-    warnings = (*_doubts(chosen.value, settings), *doubt)
+    warnings = (*_doubts(chosen.value, settings, study.cutting), *doubt)
     window = {"window": _window(chosen.value, settings)}
     selected = Selected(study.volume, study.plane, chosen.value)
     return folded(selected, Stage(None, {"study": section}), chosen, Stage(None, window, warnings))
@@ -154,22 +159,17 @@ def _slice_axis(volume: Volume, slices: str) -> int:
     return volume.stored_axis if slices == "stored" else AXES.index(slices)
 
 
-def _fitting(labels: Volume, volume: Volume) -> Volume:
+def _fitting(labels: Volume, volume: Volume, cutting: Cutting) -> Volume:
     """Lay a label map onto the study's grid."""
-    labels = whole(labels)
+    labels = whole(labels, cutting)
     try:
-        return onto_grid(labels, volume)
+        return onto_grid(labels, volume, cutting)
     except GeometryError as fault:
         if option := volume.other_frame or labels.other_frame:
             whose = "study" if volume.other_frame else "label map"
             fault.args = (f"{fault} Or: {option}, for the {whose} holds two frames that disagree.",)
             fault.flags += (option.split()[0],)
         raise
-
-
-@timed("window")
-def _choose(study: LaidOut, settings: Settings) -> Stage[Chosen]:
-    return Stage(choose(study.volume, study.labels, settings, study.inside))
 
 
 def _section(study: Volume, plane: str, cropped: dict[str, list[int]] | None, notes: tuple[str, ...]) -> dict[str, Any]:
@@ -195,34 +195,30 @@ def _cropped(box: tuple[slice, ...], sizes: tuple[int, int, int]) -> dict[str, l
     return None if whole else dict(zip(("slices", "rows", "columns"), kept, strict=True))
 
 
-def _dropped(chosen: Stage[Chosen], settings: Settings) -> tuple[str, ...]:
-    """Say which components a guess has left out."""
-    found = chosen.value.counts
+def _dropped(chosen: Chosen, settings: Settings) -> tuple[str, ...]:
+    """Say which components a guess has left out, and what there is to say of slices without labels."""
+    found, told = chosen.counts, (chosen.told,) if chosen.told else ()
     if not found.dropped or settings.window.keep != "auto":
-        return ()
+        return told
     return (
         f"{found.dropped} of {found.components} components of the window ({found.dropped_voxels} voxels) were "
         "left out, which lie in nothing that is 12 mm thick, as a scanner's table: --keep all keeps them",
+        *told,
     )
 
 
 def _cut_off(chosen: Chosen) -> tuple[str, ...]:
     """Say at which end slices a window is cut off, and goes on beyond the study."""
-    pixels = np.zeros(len(chosen.mask), np.int64)
-    pixels[chosen.box[0]] = np.count_nonzero(chosen.mask[chosen.box], axis=(1, 2))
+    pixels = chosen.runs.areas()
     ends = [name for name, end in (("first", 0), ("last", -1)) if pixels[end] > CUT_OFF * pixels.max()]
     return (
         (f"the window is cut off at the {' and the '.join(ends)} slice: the surface is closed there",) if ends else ()
     )
 
 
-def _sparse(chosen: Stage[Chosen]) -> tuple[str, ...]:
-    return (chosen.value.told,) if chosen.value.told else ()
-
-
 def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:
     """Tell what the window kept, and the limits of its layers."""
-    asked, mask, layers = settings.window, chosen.mask, chosen.volume.layers
+    asked, runs, layers = settings.window, chosen.runs, chosen.volume.layers
     lower, upper = (chosen.lower, chosen.upper) if asked.select is None else (-np.inf, np.inf)
     return {
         "lower": _limits(lower),
@@ -233,9 +229,9 @@ def _window(chosen: Chosen, settings: Settings) -> dict[str, Any]:
         "lower_from": _from("lower", lower, settings),
         "upper_from": _from("upper", upper, settings),
         "voxels": chosen.kept,
-        "share": chosen.kept / mask.size,
+        "share": chosen.kept / math.prod(runs.shape),
         "touches_border": any(_edges(chosen)),
-        **_became(chosen.counts, chosen.cleaned or Cleaned(mask)),
+        **_became(chosen.counts, chosen.cleaned or Cleaned(runs)),
     }
 
 
@@ -273,11 +269,11 @@ def _from(name: str, limit: Limit, settings: Settings) -> str | None:
 
 def _edges(chosen: Chosen) -> list[bool]:
     """Tell of both sides of each axis whether a kept voxel lies on them."""
-    sides = zip(chosen.box, chosen.mask.shape, strict=True)
+    sides = zip(chosen.box, chosen.runs.shape, strict=True)
     return [end for side, size in sides for end in (side.start == 0, side.stop == size)]
 
 
-def _doubts(chosen: Chosen, settings: Settings) -> list[str]:
+def _doubts(chosen: Chosen, settings: Settings, cutting: Cutting) -> list[str]:
     """Say what about a window may not be as it was meant."""
     warnings, counts = [], chosen.counts
     if 0 < counts.spared_voxels == counts.window:
@@ -287,7 +283,7 @@ def _doubts(chosen: Chosen, settings: Settings) -> list[str]:
             f"most of the window ({counts.spared_voxels} of {counts.window} voxels) lies in nothing that is "
             "12 mm thick, and was kept for all that: --keep body leaves it out"
         )
-    if chosen_by(settings) == "otsu" and len(labels_in(chosen.volume.voxels[::APART])) > 1:
+    if chosen_by(settings) == "otsu" and len(labels_counted(cutting.of(chosen.volume.voxels[::APART]))) > 1:
         warnings.append("labels of a label map were taken for gray levels: --select chooses labels")
     if any(_edges(chosen)[2:]):
         warnings.append("the window touches the border of the slices: the surface is closed along it")

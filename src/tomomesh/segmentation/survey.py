@@ -8,8 +8,9 @@ import numpy as np
 
 from ..model.volume import AXES
 from .labels import labels_in
-from .otsu import REACH, bulk, histogram, otsu_levels
+from .otsu import REACH, otsu_levels
 from .padding import all_padding
+from .slabwise.levels import levels_of
 from .window import PRESETS_HU, may_be_ct, otsu_thresholds
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.volume import Volume
+    from .slabwise.levels import Levels
 
 BARS = 32
 """Bars of the printed histogram. A line of the terminal."""
@@ -30,8 +32,8 @@ on it."""
 OBLONG = 0.01
 """Part by which the sides of a pixel may differ without a remark. Only a remark depends on it."""
 FAR = 4.0
-"""How many times as wide as the bulk of the levels (`segmentation.otsu.TAILS`) their whole range is from which on the
-histogram is that of the bulk. Only a picture depends on it: the bulk keeps a quarter of the bars at least."""
+"""How many times as wide as the bulk of the levels (`segmentation.slabwise.levels.TAILS`) their whole range is from
+which on the histogram is that of the bulk. Only a picture depends on it: a quarter of the bars at least is its."""
 AIR = PRESETS_HU["skin"][0]
 """Where 2 % of the levels are below this, those without a unit may be Hounsfield units. Only suggestions need it."""
 THICK = 5
@@ -52,7 +54,7 @@ def survey(volume: Volume) -> dict[str, Any]:
         voxels in each, the labels of a label map, the reader's notes, and remarks on what a mesh of it will show.
     """
     voxels, padded = volume.voxels, all_padding(volume)
-    measured = voxels if padded is None else voxels[~padded]
+    measured = levels_of(voxels if padded is None else voxels[~padded])
     low, high = _drawn_from(measured)
     return {
         "slices_rows_columns": list(volume.shape),
@@ -70,7 +72,7 @@ def survey(volume: Volume) -> dict[str, Any]:
         "gray_unit": volume.unit,
         "lowest": float(voxels.min()),
         "highest": float(voxels.max()),
-        "histogram": histogram(measured, low, high, BARS).tolist() if high > low else [measured.size],
+        "histogram": measured.histogram(low, high, BARS).tolist() if high > low else [measured.size],
         "histogram_from": low,
         "histogram_to": high,
         "windows": _windows(volume, measured, padded),
@@ -88,16 +90,15 @@ def _tilt(volume: Volume) -> float:
     return float(np.degrees(np.arccos(min(1.0, cosine))))
 
 
-def _drawn_from(measured: NDArray[Any]) -> tuple[float, float]:
+def _drawn_from(measured: Levels) -> tuple[float, float]:
     """Return the range of the histogram: all levels, unless a few far ones would leave the others too few bars."""
-    low, high = float(measured.min()), float(measured.max())
-    first, last = bulk(measured)
+    (low, high), (first, last) = measured.ends, measured.bulk()
     reach = REACH * (last - first)
     first, last = max(low, first - reach), min(high, last + reach)
     return (first, last) if 0 < FAR * (last - first) < high - low else (low, high)
 
 
-def _windows(volume: Volume, measured: NDArray[Any], padded: NDArray[np.bool_] | None) -> dict[str, dict[str, Any]]:
+def _windows(volume: Volume, measured: Levels, padded: NDArray[np.bool_] | None) -> dict[str, dict[str, Any]]:
     """Suggest windows: Otsu's, those above three and four classes, and for what may be a CT the presets."""
     limits: dict[str, Any] = {"otsu": otsu_thresholds(volume, padded)}
     if volume.layers == 1:
@@ -105,7 +106,8 @@ def _windows(volume: Volume, measured: NDArray[Any], padded: NDArray[np.bool_] |
             limit = otsu_levels(measured, classes)[-1]
             limits |= {} if limit in limits.values() else {f"otsu of {classes}": limit}
     windows = {name: (limit, np.inf) for name, limit in limits.items()}
-    windows |= PRESETS_HU if may_be_ct(volume) and (volume.unit == "HU" or bulk(measured)[0] < AIR) else {}
+    ct = may_be_ct(volume, volume.voxels.min()) and (volume.unit == "HU" or measured.bulk()[0] < AIR)
+    windows |= PRESETS_HU if ct else {}
     return {name: _window(volume.voxels, *bounds) for name, bounds in windows.items()}
 
 

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import EmptyError, UsageError
-from .labels import labels_in
+from ..isosurface.run_mask import RunMask
+from .labels import labels_counted
 from .otsu import otsu_threshold
+from .slabwise.cut import HERE
+from .slabwise.levels import gathered
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
+    from ..model.boxes import Box
     from ..model.volume import Volume
     from ..settings import WindowSettings
+    from .padding import Padding
+    from .slabwise.cut import Cut
+    from .slabwise.levels import Levels, Looked
+    from .slabwise.sources import Voxels
 
     Limit = float | NDArray[np.float64]
 
@@ -67,33 +78,53 @@ def window(volume: Volume, *, lower: Limit = -np.inf, upper: Limit = np.inf, lay
     >>> window(study, lower=2, upper=5).sum(axis=(1, 2))
     array([1, 2])
     """
-    kept, levels = by_layer(volume, lower=lower, upper=upper), volume.voxels
-    joined = kept if levels.ndim == 3 else ~any_of_layers(~kept) if layers == "all" else any_of_layers(kept)
-    mask = np.ascontiguousarray(joined)
-    if not mask.any():
-        hint = "--layers any, or " if levels.ndim == 4 and layers == "all" else ""
+    cut = HERE.of(volume.voxels)
+    return window_in(cut, lower=lower, upper=upper, layers=layers).dense
+
+
+def window_in(cut: Cut, *, lower: Limit = -np.inf, upper: Limit = np.inf, layers: str = "all") -> RunMask:
+    """Return the window of a study in slabs; parameters and errors are those of `window`."""
+    _check_limits(cut.voxels, lower, upper)
+    found = cut.runs(partial(_kept_in, lower=lower, upper=upper, layers=layers))
+    if not found.count:
+        hint = "--layers any, or " if cut.voxels.ndim == 4 and layers == "all" else ""
+        low, high = cut.ends
         raise EmptyError(
             "the window selects nothing",
             found=f"lower = {said(lower)}, upper = {said(upper)}",
-            expected=f"gray levels between {levels.min():g} and {levels.max():g}",
+            expected=f"gray levels between {low:g} and {high:g}",
             hint=f"{hint}`tomomesh inspect` to see the histogram",
         )
-    return mask
+    return found
+
+
+def _kept_in(levels: NDArray[Any], box: Box, *, lower: Limit, upper: Limit, layers: str) -> RunMask:
+    kept = _within(levels, lower, upper)
+    joined = kept if levels.ndim == 3 else ~any_of_layers(~kept) if layers == "all" else any_of_layers(kept)
+    return RunMask.of([joined])
 
 
 def by_layer(volume: Volume, *, lower: Limit = -np.inf, upper: Limit = np.inf) -> NDArray[np.bool_]:
     """Tell which levels lie in their layer's window, (K, J, I[, L]); parameters and errors are those of `window`."""
+    _check_limits(volume.voxels, lower, upper)
+    return _within(volume.voxels, lower, upper)
+
+
+def _check_limits(voxels: Voxels, lower: Limit, upper: Limit) -> None:
     if not np.less(lower, upper).all():
         found = f"lower = {said(lower)}, upper = {said(upper)}"
         raise UsageError("the window is empty", found=found, expected="lower < upper")
+    layers = voxels.shape[3] if voxels.ndim == 4 else 1
     for limit in (lower, upper):
-        if np.ndim(limit) and np.size(limit) != volume.layers:
-            kind = "gray" if volume.layers == 1 else f"of {volume.layers} layers"
+        if np.ndim(limit) and np.size(limit) != layers:
+            kind = "gray" if layers == 1 else f"of {layers} layers"
             raise UsageError(
                 "the limits do not fit the layers of the study", found=f"{np.size(limit)} limits: {said(limit)}",
                 expected=f"one, or one a layer; the study is {kind}",
             )  # fmt: skip
-    levels = volume.voxels
+
+
+def _within(levels: NDArray[Any], lower: Limit, upper: Limit) -> NDArray[np.bool_]:
     if np.isneginf(lower).all():
         return np.asarray(levels <= upper)
     kept = np.asarray(levels > lower)
@@ -112,9 +143,13 @@ def said(limit: Limit) -> str:
     return ", ".join(f"{value:g}" for value in np.ravel(limit))
 
 
-def choose_window(
-    volume: Volume, settings: WindowSettings, padded: NDArray[np.bool_] | None = None
-) -> tuple[Limit, Limit]:
+def choose_window(volume: Volume, settings: WindowSettings) -> tuple[Limit, Limit]:
+    """Return the limits that the settings ask for of a study in memory that has no padding; see `window_limits`."""
+    cut = HERE.of(volume.voxels)
+    return window_limits(volume, cut, settings, lambda: otsu_in(cut))
+
+
+def window_limits(volume: Volume, cut: Cut, settings: WindowSettings, otsu: Callable[[], Limit]) -> tuple[Limit, Limit]:
     """Return the limits that the settings ask for; Otsu's threshold, in each layer its own, where they ask for none.
 
     A layer that has one level alone tells nothing, and is not limited.
@@ -122,9 +157,11 @@ def choose_window(
     Parameters
     ----------
     volume : Volume
+    cut : Cut
+        Its voxels.
     settings : WindowSettings
-    padded : (K, J, I) bool array, optional
-        Voxels that have no say in Otsu's threshold.
+    otsu : callable
+        Finds Otsu's threshold.
 
     Raises
     ------
@@ -135,34 +172,50 @@ def choose_window(
         np.array(limit) if isinstance(limit, tuple) else limit for limit in (settings.lower, settings.upper)
     )
     if settings.preset is not None:
-        _check_ct(volume, settings.preset)
+        _check_ct(volume, cut, settings.preset)
         return PRESETS_HU[settings.preset]
     if lower is None and upper is None:
-        lower = otsu_thresholds(volume, padded)
+        lower = otsu()
     return -np.inf if lower is None else lower, np.inf if upper is None else upper
 
 
-def may_be_ct(volume: Volume) -> bool:
+def may_be_ct(volume: Volume, lowest: float) -> bool:
     """Tell whether gray levels may be Hounsfield units: where the file says so, or says nothing and air is below 0."""
-    return volume.layers == 1 and volume.unit in ("HU", "stored") and bool(volume.voxels.min() < 0)
+    return volume.layers == 1 and volume.unit in ("HU", "stored") and bool(lowest < 0)
 
 
-def _check_ct(volume: Volume, preset: str) -> None:
-    if may_be_ct(volume):
+def _check_ct(volume: Volume, cut: Cut, preset: str) -> None:
+    lowest = cut.ends[0]
+    if may_be_ct(volume, lowest):
         return
     raise UsageError(
         "the study is not in Hounsfield units",
-        found=f"--preset = {preset}, lowest gray level = {volume.voxels.min():g} ({volume.unit})",
+        found=f"--preset = {preset}, lowest gray level = {lowest:g} ({volume.unit})",
         expected="a CT whose air lies below 0",
-        hint="--select, which chooses labels" if labels_in(volume.voxels)
+        hint="--select, which chooses labels" if labels_counted(cut)
         else "--lower and --upper, in the study's own gray levels",
     )  # fmt: skip
 
 
 def otsu_thresholds(volume: Volume, padded: NDArray[np.bool_] | None = None) -> Limit:
-    """Return Otsu's threshold of a gray volume, without its padding, or those of the layers of a color one, (L,)."""
-    levels = volume.voxels
-    if levels.ndim == 3:
-        return otsu_threshold(levels if padded is None else levels[~padded])
-    layers = [levels[..., n] for n in range(levels.shape[3])]
-    return np.array([otsu_threshold(one) if one.min() < one.max() else -np.inf for one in layers])
+    """Return Otsu's threshold of a gray volume in memory, without its padding, or those of a color one, (L,)."""
+    if padded is not None and volume.voxels.ndim == 3:
+        return otsu_threshold(volume.voxels[~padded])
+    return otsu_in(HERE.of(volume.voxels))
+
+
+def otsu_in(cut: Cut, padded: Padding | None = None) -> Limit:
+    """Return Otsu's threshold of a gray study in slabs, without its padding, or those of the layers of a color one."""
+    if cut.voxels.ndim == 3:
+        return otsu_threshold(cut.levels if padded is None else _beside(cut, padded))
+    layers = [cut.layer(n) for n in range(cut.voxels.shape[3])]
+    return np.array([otsu_threshold(one) if one.ends[0] < one.ends[1] else -np.inf for one in layers])
+
+
+def _beside(cut: Cut, padded: Padding) -> Levels:
+    """Look at the levels that are no padding."""
+    return gathered(lambda work: cut.sum(partial(_unpadded, work, padded)), cut.voxels.dtype)
+
+
+def _unpadded(work: Looked, padded: Padding, levels: NDArray[Any], box: Box) -> Any:
+    return work(levels[~padded.within(levels, box)])

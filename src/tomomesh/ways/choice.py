@@ -62,7 +62,7 @@ def take_way(kept: Selected, settings: Settings) -> Stage[Settings]:
         What is looked at of the study.
     settings : Settings
     """
-    seen = measured("way", outlines_of, kept.mask[kept.chosen.box], kept.study.spacing_mm[:2])
+    seen = measured("way", outlines_of, kept.chosen.runs.cropped(kept.chosen.box), kept.study.spacing_mm[:2])
     found, asked = seen.value, settings.network
     against = against_one_ring(found, chosen_by(settings))
     taken = asked_way(asked) or chosen_way(asked, against)

@@ -16,8 +16,8 @@ from ..progress import Progress, silent
 from ..results import Enclosed, Segmentation, Surface
 from ..segmentation.contours.between import filled_between
 from ..segmentation.contours.train import train_contours
+from ..segmentation.networks.training import regions
 from ..segmentation.sample import sample_contours
-from ..segmentation.training import regions
 from ..stage import Stage, folded, measured
 from .sections import body_of_voxels, boundary_found, missed, networks_on_slices, sampling_found
 from .way import POINTS, TRAINING, Way, parameters
@@ -32,7 +32,7 @@ NOTHING = np.empty(0, np.int32)
 
 def segment_by_contours(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Contours]]:
     """Train a ring on every contour of each slice, and place their neurons in space."""
-    study, mask, run = kept.study, kept.mask, settings.run
+    study, mask, run = kept.study, kept.chosen.runs, settings.run
     pixel_mm = study.spacing_mm[:2]
     chosen = kept.chosen
     levels = Levels(chosen.volume.voxels, chosen.lower, chosen.upper, settings.window.layers)
@@ -74,9 +74,9 @@ def surface_by_contours(found: Segmentation[Contours], settings: Settings, progr
 def _followed(found: Segmentation[Contours], threads: int) -> Followed:
     """Return what of the window the contours are to follow."""
     if found.source.kind != "components":
-        return boundary_followed(found.mask, found.volume)
+        return boundary_followed(found.runs, found.volume)
     outlined = all(one.outlined for one in found.source.contours)
-    return components_followed(found.mask, found.volume, outlined=outlined, threads=threads)
+    return components_followed(found.runs, found.volume, outlined=outlined, threads=threads)
 
 
 def boundary_of_rings(
@@ -85,7 +85,7 @@ def boundary_of_rings(
     """Return the boundary of what rings enclose on their slices and between them, crossed where they pass."""
     contours = found.source
     _refuse_one_slice(contours)
-    filled = filled_between(contours, found.mask, found.volume, levels=found.levels, threads=threads, progress=progress)
+    filled = filled_between(contours, found.runs, found.volume, levels=found.levels, threads=threads, progress=progress)
     inside = filled.voxels > 0
     if not inside.any():
         raise EmptyError(
@@ -106,7 +106,7 @@ def _contours_found(contours: Contours, kept: Selected, settings: Settings) -> S
     """Tell what was trained, and which slices have no contour."""
     each = contours.contours
     seen = {"boundary" if one.outlined else "region" for one in each}
-    without, lost = missed(contours.slices, kept.mask)
+    without, lost = missed(contours.slices, kept.chosen.runs)
     counted = contours.kind == "loops" and settings.network.neurons is None
     stats: dict[str, dict[str, Any]] = {
         "networks": {

@@ -16,6 +16,7 @@ from ..dynamics.moving_least_squares import fit_to_surface
 from ..dynamics.untangle import untangle
 from ..errors import GeometryError
 from ..measure.intersections import CrossingFaces
+from ..model.boxes import box_of
 from ..model.columns import any_of
 from ..model.mesh import TriMesh
 from ..results import LEAST, Enclosed, Surface
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from ..model.cubes import CubeGrid
     from ..model.mesh import QuadMesh
     from ..model.points import PointSet
+    from ..model.sliced import Sliced
     from ..model.trace import Trace
     from ..pointcloud.samples import Samples
     from ..progress import Progress
@@ -59,13 +61,13 @@ class Inside:
 
     rings_mm3: float = 0.0
     window_mm3: float = 0.0
-    mask: NDArray[np.bool_] | None = None
+    mask: Sliced | None = None
     follows: Followed | None = None
 
     @property
     def may_be_flat(self) -> bool:
         """Whether points may rightly lie in a plane, as those of a flat cloud or of a window of one slice do."""
-        return self.mask is None or bool(min(np.ptp(self.mask.nonzero(), axis=1)) == 0)
+        return self.mask is None or min(int(side.stop - side.start) for side in box_of(self.mask)) == 1
 
     def or_more(self, hollow: Enclosed) -> Enclosed:
         """Return the largest that is known; what a shell of cubes is hollow by counts where there are no rings."""

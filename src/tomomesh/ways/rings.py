@@ -11,10 +11,10 @@ from ..measure.rings import assess_contours
 from ..model.lattice import other_number
 from ..results import Enclosed, Segmentation
 from ..segmentation.contours.inputs import share_of_holes, slices_with_several
+from ..segmentation.networks.slices import ByLayer
+from ..segmentation.networks.training import regions, train_study
+from ..segmentation.networks.under_rings import surface_under
 from ..segmentation.sample import sample
-from ..segmentation.training import regions, train_study
-from ..segmentation.under_rings import surface_under
-from ..segmentation.window import by_layer
 from ..som.schedules import schedule_warnings
 from ..stage import Stage, folded, measured, timed
 from .cubes import Inside, surface_on_cubes
@@ -22,10 +22,8 @@ from .sections import body_of_cubes, missed, networks_on_slices, sampling_found
 from .way import CUBES, POINTS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from ..model.networks import Networks
+    from ..model.sliced import Sliced
     from ..progress import Progress
     from ..results import Surface
     from ..segmentation.study import Selected
@@ -43,7 +41,7 @@ warning's threshold, chosen: no mesh depends on it."""
 
 def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Networks]]:
     """Train a network on every slice, and place its neurons in space."""
-    study, mask, run = kept.study, kept.mask, settings.run
+    study, mask, run = kept.study, kept.chosen.runs, settings.run
     trained = measured(
         "networks", train_study, mask, settings.network, layers=_layers(kept, settings),
         levels=levels_of(kept, settings), pixel_mm=study.spacing_mm[:2], seed=run.seed, threads=run.threads,
@@ -76,10 +74,10 @@ def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress
 def inside_of(found: Segmentation[Networks], settings: Settings) -> Stage[Inside]:
     """Tell what is known of the inside of networks, and what of the window they are to follow."""
     follows = outline_followed(
-        found.mask, found.volume, outlined=bool(found.source.outlined), threads=settings.run.threads
+        found.runs, found.volume, outlined=bool(found.source.outlined), threads=settings.run.threads
     )  # fmt: skip
     follows = follows if settings.cubes.caps else follows.as_closed(follows.what)
-    return Stage(Inside(found.sampling.volume_mm3, Enclosed.window(found).volume, found.mask, follows))
+    return Stage(Inside(found.sampling.volume_mm3, Enclosed.window(found).volume, found.runs, follows))
 
 
 def levels_of(kept: Selected, settings: Settings) -> Levels:
@@ -88,17 +86,17 @@ def levels_of(kept: Selected, settings: Settings) -> Levels:
     return Levels(chosen.volume.voxels, chosen.lower, chosen.upper, settings.window.layers)
 
 
-def _layers(kept: Selected, settings: Settings) -> NDArray[np.bool_] | None:
+def _layers(kept: Selected, settings: Settings) -> Sliced | None:
     """Return the window of each layer (K, J, I, L), where networks are shown layers."""
     chosen = kept.chosen
     if chosen.volume.layers == 1 or settings.network.inputs != "layers":
         return None
-    return by_layer(chosen.volume, lower=chosen.lower, upper=chosen.upper) & chosen.mask[..., None]
+    return ByLayer(chosen.volume, chosen.runs, chosen.lower, chosen.upper)
 
 
 def _networks_found(networks: Networks, kept: Selected, settings: Settings) -> Stage[None]:
     """Tell what was trained, and what one network a slice does not show."""
-    without, lost = missed(networks.slices, kept.mask)
+    without, lost = missed(networks.slices, kept.chosen.runs)
     stats: dict[str, dict[str, Any]] = {
         "networks": {
             "topology": networks.lattice.name,
@@ -126,12 +124,12 @@ def _rings_measured(networks: Networks, pixel_mm: tuple[float, float]) -> Stage[
 def _overlooked(networks: Networks, kept: Selected, settings: Settings) -> list[str]:
     """Warn where many slices hold several components, and of outlines that fill what is not in the window."""
     warnings, threads = [], settings.run.threads
-    several = slices_with_several(kept.mask, threads)
+    several = slices_with_several(kept.chosen.runs, threads)
     if several > CROWDED * len(networks.slices):
         warnings.append(
             f"{several} slices hold several components side by side: --contours components has a ring for each"
         )
-    share = share_of_holes(kept.mask, threads) if networks.outlined else 0.0
+    share = share_of_holes(kept.chosen.runs, threads) if networks.outlined else 0.0
     if share > HOLES:
         warnings.append(f"holes of {share:.0%} of the window's area are filled: --way contours follows them too")
     return warnings

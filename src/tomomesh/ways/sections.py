@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.points import BRIDGE, CAP, NEURON
+from ..model.sliced import areas_of
 from ..results import Enclosed
 from ..stage import Stage
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from ..cuberille.leak_test import LeakTest
     from ..isosurface.voxels import Boundary, VoxelSurface
     from ..model.points import PointSet
+    from ..model.sliced import Sliced
     from ..model.trace import Trace
     from ..results import Segmentation
     from ..segmentation.sample import Sampling
@@ -52,11 +54,12 @@ def points_found(points: PointSet, spacing: float, *, unit: str = "mm", bridged:
     return Stage(None, {"points": section})
 
 
-def missed(slices: NDArray[np.int32], mask: NDArray[np.bool_]) -> tuple[list[int], tuple[str, ...]]:
+def missed(slices: NDArray[np.int32], mask: Sliced) -> tuple[list[int], tuple[str, ...]]:
     """Return the slices that have no network, and the warning that some of them should have one."""
-    without = np.setdiff1d(np.arange(len(mask)), slices)
+    areas = areas_of(mask)
+    without = np.setdiff1d(np.arange(len(areas)), slices)
     inside = (without > slices[0]) & (without < slices[-1])
-    lost = without[inside | mask[without].any(axis=(1, 2))]
+    lost = without[inside | (areas[without] > 0)]
     named = ", ".join(map(str, lost[:8])) + (", ..." if len(lost) > 8 else "")
     warning = f"{len(lost)} slice(s) without pixels enough for a network: {named}"
     return without.tolist(), (warning,) if len(lost) else ()

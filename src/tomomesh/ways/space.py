@@ -108,7 +108,7 @@ def segment_in_space(kept: Selected, settings: Settings, progress: Progress) -> 
     labels = partial(regions_in_space, mask, voxels, trained.value, run.threads)
     network, sampling = trained.value, _sampled(trained.value)
     source = SpaceFound(network, places, shown.value.follows)
-    found = Segmentation(kept.study, kept.plane, kept.mask, labels, sampling.points, sampling, source)
+    found = Segmentation(kept.study, kept.plane, kept.chosen.runs, labels, sampling.points, sampling, source)
     inside = not outlined and settings.network.network in SURFACES and not is_wall(mask)
     dropped = int(np.count_nonzero(kept.mask) - np.count_nonzero(mask))
     asked = settings.network.neurons

@@ -36,7 +36,7 @@ def segment_by_voxels(kept: Selected, settings: Settings, progress: Progress) ->
     found, spacing = bounded.value, max(kept.study.spacing_mm)
     sampling = Sampling(found.points, spacing, found.added, NOTHING, NOTHING)
     labels = kept.mask.view(np.uint8)
-    made = Segmentation(kept.study, kept.plane, kept.mask, labels, found.points, sampling, found)
+    made = Segmentation(kept.study, kept.plane, kept.chosen.runs, labels, found.points, sampling, found)
     return folded(made, bounded, points_found(found.points, spacing, bridged=found.added))
 
 

@@ -106,8 +106,8 @@ class PlyHeader:
         return self.elements[:at], (*self.elements, PlyElement(name, 0, ()))[at]
 
 
-def parse_header(data: bytes, *, file: str) -> PlyHeader:
-    """Read a PLY header and compare what it promises with what the file holds.
+def parse_header(data: bytes, *, file: str, size: int | None = None) -> PlyHeader:
+    """Read a PLY header and compare what it promises with what the file holds: `size` bytes, or those of `data`.
 
     Raises
     ------
@@ -127,7 +127,8 @@ def parse_header(data: bytes, *, file: str) -> PlyHeader:
     except (IndexError, KeyError, ValueError):
         raise FormatError("the PLY header cannot be understood", file=file) from None
     # the last row of a text needs no line end
-    require_bytes(promised - (1 if text else 0), len(data) - length, file=file)
+    held = len(data) if size is None else size
+    require_bytes(promised - (1 if text else 0), held - length, file=file)
     return header
 
 

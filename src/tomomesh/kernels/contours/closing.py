@@ -1,4 +1,4 @@
-"""Planes of pixels as bits: grown by octagons, and what their outside reaches.
+"""Sliced of pixels as bits: grown by octagons, and what their outside reaches.
 
 A plane's row is a row of words: pixel i is bit i % 64 of word i // 64.
 """

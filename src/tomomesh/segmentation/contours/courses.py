@@ -14,9 +14,9 @@ from ...measure.polygon import along, evenly
 from ...model.cubics import cubic, limited
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Sequence
 
-    from .insides import Insides
+    from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
     Indices = NDArray[np.int64]
@@ -58,12 +58,14 @@ class Course:
         return points, np.concatenate([self.below - points, self.above - points], axis=1)
 
 
-def courses_of(insides: Insides, step: float, threads: int = 0) -> list[list[Course]]:
+def courses_of(curves: Sequence[dict[int, Floats]], pixel: Floats, step: float, threads: int = 0) -> list[list[Course]]:
     """Match the points of each ring to those of the next on its track, and find how they pass between the slices.
 
     Parameters
     ----------
-    insides : Insides
+    curves : sequence of dict
+        Of each slice, as those of `Insides`.
+    pixel : (2,) float array
     step : float
         Distance of the slices.
     threads : int
@@ -71,22 +73,22 @@ def courses_of(insides: Insides, step: float, threads: int = 0) -> list[list[Cou
     Returns
     -------
     list of lists of Course
-        For the space above each slice; none above the last.
+        For the space above each slice; none above the last. Of some slices of a study, all but those above the first
+        and the last but one are those of the whole.
     """
-    points = [{track: _even(curve, insides.pixel) for track, curve in row.items()} for row in insides.curves]
+    points = [{track: _even(curve, pixel) for track, curve in row.items()} for row in curves]
     gaps = [sorted(set(row) & set(after)) for row, after in pairwise(points)]
     pairs: list[dict[int, Indices]] = [{} for _ in gaps]
 
     def work(start: int, stop: int) -> None:
         for k in range(start, stop):
             for track in gaps[k]:
-                pairs[k][track] = _matched(points[k][track] * insides.pixel, points[k + 1][track] * insides.pixel)
+                pairs[k][track] = _matched(points[k][track] * pixel, points[k + 1][track] * pixel)
 
     in_blocks(work, len(gaps), block=1, threads=threads)
     slopes = _slopes(points, pairs)
     return [
-        [_course(points, slopes, k, track, pairs[k][track], insides.pixel, step) for track in gaps[k]]
-        for k in range(len(gaps))
+        [_course(points, slopes, k, track, pairs[k][track], pixel, step) for track in gaps[k]] for k in range(len(gaps))
     ]
 
 

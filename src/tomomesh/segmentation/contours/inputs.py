@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
 
 from ...isosurface.runs import Runs
-from ...kernels.threads import in_blocks
+from ...kernels.threads import in_order
 from ...model.contours import HOLE, OUTER
+from ...model.sliced import parts_of, some_of
 from ...som.starts import moments
 from ..signal import SOLID, outline, pixels_of
 from .loops import Loop, Patch, trace
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
+
+    from ...model.sliced import Sliced
 
     Crossed = Callable[[NDArray[np.int64], NDArray[np.int64]], NDArray[np.float64]]
 
@@ -152,14 +155,14 @@ class Component:
         return Inputs(shown + self.low, None, patch, OUTER, len(loop), outlined=solid)
 
 
-def components_of(plane: NDArray[np.bool_], bodies: NDArray[np.int32]) -> tuple[list[Component], int]:
+def components_of(plane: NDArray[np.bool_], body_at: Callable[[int, int], int]) -> tuple[list[Component], int]:
     """Part the window of a slice into its connected components.
 
     Parameters
     ----------
     plane : (J, I) bool array
-    bodies : (J, I) int32 array
-        The numbers of the connected components of the whole window.
+    body_at : callable
+        Told a pixel (row, column), returns the number of the connected component of the whole window there.
 
     Returns
     -------
@@ -173,12 +176,13 @@ def components_of(plane: NDArray[np.bool_], bodies: NDArray[np.int32]) -> tuple[
     for number, (rows, columns) in enumerate(boxes, 1):
         if 2 * (rows.stop - rows.start + columns.stop - columns.start) >= SHORTEST:
             pixels = labels[rows, columns] == number
-            body = int(bodies[rows, columns][pixels][0])
+            row, column = divmod(int(np.argmax(pixels)), pixels.shape[1])
+            body = body_at(rows.start + row, columns.start + column)
             found.append(Component(body, np.array([columns.start, rows.start]), pixels))
     return found, len(boxes) - len(found)
 
 
-def solids(components: Sequence[Component]) -> set[int]:
+def solids(components: Iterable[Component]) -> set[int]:
     """Return the bodies that are solids, and not walls, over all their slices; see `signal.fills_most`."""
     filled: dict[int, float] = {}
     for one in components:
@@ -187,7 +191,7 @@ def solids(components: Sequence[Component]) -> set[int]:
     return {body for body, more in filled.items() if more > 0}
 
 
-def slices_with_several(mask: NDArray[np.bool_], threads: int = 0) -> int:
+def slices_with_several(mask: Sliced, threads: int = 0) -> int:
     """Count the slices in which components of the window lie side by side, for which one network is too few.
 
     A component counts where its box covers at least `BESIDE` of the largest one's and lies in no other; they are
@@ -195,37 +199,37 @@ def slices_with_several(mask: NDArray[np.bool_], threads: int = 0) -> int:
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : (K, J, I) bool array or slices of it
     threads : int
     """
-    several = np.zeros(len(mask), bool)
-
-    def work(start: int, stop: int) -> None:
-        for k in range(start, stop):
-            several[k] = _side_by_side(mask[k])
-
-    in_blocks(work, len(mask), block=8, threads=threads)
-    return int(several.sum())
+    return int(_of_planes(_side_by_side, mask, threads).sum())
 
 
-def share_of_holes(mask: NDArray[np.bool_], threads: int = 0) -> float:
+def share_of_holes(mask: Sliced, threads: int = 0) -> float:
     """Return the area of the holes in the slices of a window over its own, which an outline fills, in coarse pixels.
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : (K, J, I) bool array or slices of it
     threads : int
     """
-    areas = np.zeros((len(mask), 2))
+    filled, own = _of_planes(_filled_and_own, mask, threads).sum(axis=0)
+    return float(filled / max(own, 1) - 1.0)
 
-    def work(start: int, stop: int) -> None:
-        for k in range(start, stop):
-            coarse = _coarse(mask[k])
-            areas[k] = scipy.ndimage.binary_fill_holes(coarse).sum(), coarse.sum()
 
-    in_blocks(work, len(mask), block=8, threads=threads)
-    filled, own = areas.sum(axis=0)
-    return float(filled / max(own, 1.0) - 1.0)
+def _of_planes(find: Callable[[NDArray[np.bool_]], int | tuple[int, int]], mask: Sliced, threads: int) -> NDArray[Any]:
+    """Return what is found on each slice, (K, ...)."""
+    found: list[int | tuple[int, int]] = []
+    for start, stop in parts_of(mask):
+        some = some_of(mask, start, stop)
+        found += in_order(lambda k: find(some[k]), stop - start, block=8, threads=threads)  # noqa: B023
+    return np.array(found)
+
+
+def _filled_and_own(plane: NDArray[np.bool_]) -> tuple[int, int]:
+    """Count the coarse pixels of a plane, with its holes and without."""
+    coarse = _coarse(plane)
+    return int(scipy.ndimage.binary_fill_holes(coarse).sum()), int(coarse.sum())
 
 
 def _coarse(plane: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...kernels.contours.rings import draw_rings
 from ...kernels.threads import in_blocks
 from ...measure.polygon import area
+from ...model.sliced import some_of
 from .curved import finely
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...model.contours import Contour, Contours
+    from ...model.sliced import Sliced
 
     Floats = NDArray[np.float64]
     Depths = NDArray[np.float32]
@@ -37,13 +39,46 @@ middle of a voxel (`isosurface.crossings.CLOSEST`)."""
 
 
 @dataclass(frozen=True)
-class Insides:
-    """The depths of pixels inside of the rings of every slice, from the first to the last that has one.
+class Frame:
+    """The pixels around the rings of all slices, from the first slice to the last that has one.
 
     Attributes
     ----------
     pixel : (2,) float array
         Edges (x, y) of a pixel; depths and distances are in their unit.
+    low : (3,) int64 array
+        The first pixel: column, row and slice.
+    shape : (int, int, int)
+        Slices, rows and columns.
+    """
+
+    pixel: Floats
+    low: NDArray[np.int64]
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def of(cls, contours: Contours, pixel_mm: tuple[float, float]) -> Frame:
+        """Look at the pixels around the rings."""
+        every = np.concatenate([one.codebook for one in contours.contours])
+        low = np.append(np.floor(every.min(axis=0)).astype(np.int64) - MARGIN, contours.slices[0])
+        columns, rows = (np.ceil(every.max(axis=0)).astype(np.int64) + MARGIN + 1 - low[:2]).tolist()
+        return cls(np.array(pixel_mm), low, (int(contours.slices[-1] - contours.slices[0]) + 1, rows, columns))
+
+    def curves(self, contours: Contours, start: int, stop: int) -> list[dict[int, Floats]]:
+        """Return the curves of some slices; see `Insides`."""
+        first = int(self.low[2])
+        return [
+            {one.track: turned(one) - self.low[:2] for one in contours.on(first + k)} for k in range(start, stop)
+        ]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Insides:
+    """The depths of pixels inside of the rings of some slices.
+
+    Attributes
+    ----------
+    pixel : (2,) float array
     low : (3,) int64 array
         The first pixel: column, row and slice.
     curves : list of dict
@@ -63,13 +98,18 @@ class Insides:
         """The greatest depth that is told."""
         return REACH * float(self.pixel.max())
 
-    def over(self, voxels: NDArray[Any], beyond: float) -> NDArray[np.float32]:
+    def over(self, voxels: Sliced, beyond: float) -> NDArray[np.float32]:
         """Return voxels (K, J, I) of the study over the pixels that are looked at; `beyond` where it has none."""
         found = np.full(self.depths.shape, beyond, np.float32)
         low = self.low[::-1]
         first, stop = np.maximum(low, 0), np.minimum(low + found.shape, voxels.shape)
-        found[tuple(map(slice, first - low, stop - low))] = voxels[tuple(map(slice, first, stop))]
+        slices, *box = map(slice, first, stop)
+        found[tuple(map(slice, first - low, stop - low))] = some_of(voxels, slices.start, slices.stop)[:, *box]
         return found
+
+    def only(self, start: int, stop: int) -> Insides:
+        """Return some of the slices."""
+        return Insides(self.pixel, np.add(self.low, (0, 0, start)), self.curves[start:stop], self.depths[start:stop])
 
     def draw(self, curves: Sequence[Floats], depths: Depths) -> None:
         """Measure how deep pixels (J, I) lie inside of curves."""
@@ -80,8 +120,10 @@ class Insides:
         draw_rings(np.concatenate(curves), onward, self.pixel, self.reach, depths, around)
 
 
-def insides_of(contours: Contours, mask: NDArray[np.bool_], pixel_mm: tuple[float, float], threads: int = 0) -> Insides:
-    """Draw the rings of all slices onto the pixels around them.
+def insides_of(
+    contours: Contours, mask: Sliced, frame: Frame, threads: int = 0, start: int = 0, stop: int | None = None
+) -> Insides:
+    """Draw the rings of some slices onto the pixels around all.
 
     A pixel is over 0 where the rings enclose its middle. Loops have been shown the window's own outlines: which side of
     a ring a pixel lies on that is no farther away than the next is then for the window to say.
@@ -89,40 +131,31 @@ def insides_of(contours: Contours, mask: NDArray[np.bool_], pixel_mm: tuple[floa
     Parameters
     ----------
     contours : Contours
-    mask : (K, J, I) bool array
+    mask : (K, J, I) bool array or slices of it
         The window.
-    pixel_mm : (float, float)
-        Distance of the columns and of the rows.
+    frame : Frame
     threads : int
+    start, stop : int
+        The slices, counted from the first of the frame; all where not given.
 
     Returns
     -------
     Insides
     """
-    insides = _empty(contours, np.array(pixel_mm))
+    stop = frame.shape[0] if stop is None else stop
+    depths = np.full((stop - start, *frame.shape[1:]), -REACH * frame.pixel.max(), np.float32)
+    insides = Insides(frame.pixel, np.add(frame.low, (0, 0, start)), frame.curves(contours, start, stop), depths)
     window = insides.over(mask, 0) > 0 if contours.kind == "loops" else None
 
-    def work(start: int, stop: int) -> None:
-        for k in range(start, stop):
+    def work(first: int, last: int) -> None:
+        for k in range(first, last):
             if insides.curves[k]:
-                insides.draw(list(insides.curves[k].values()), insides.depths[k])
+                insides.draw(list(insides.curves[k].values()), depths[k])
                 if window is not None:
-                    _side_with(window[k], insides.depths[k], float(insides.pixel.min()))
+                    _side_with(window[k], depths[k], float(frame.pixel.min()))
 
-    in_blocks(work, len(insides.curves), block=1, threads=threads)
+    in_blocks(work, len(depths), block=1, threads=threads)
     return insides
-
-
-def _empty(contours: Contours, pixel: Floats) -> Insides:
-    """Return the insides before anything is drawn."""
-    every = np.concatenate([one.codebook for one in contours.contours])
-    first, count = int(contours.slices[0]), int(contours.slices[-1] - contours.slices[0]) + 1
-    low = np.append(np.floor(every.min(axis=0)).astype(np.int64) - MARGIN, first)
-    columns, rows = (np.ceil(every.max(axis=0)).astype(np.int64) + MARGIN + 1 - low[:2]).tolist()
-    curves: list[dict[int, Floats]] = [{} for _ in range(count)]
-    for one in contours.contours:
-        curves[one.slice - first][one.track] = turned(one) - low[:2]
-    return Insides(pixel, low, curves, np.full((count, rows, columns), -REACH * pixel.max(), np.float32))
 
 
 def _side_with(plane: NDArray[np.bool_], depths: Depths, pixel: float) -> None:

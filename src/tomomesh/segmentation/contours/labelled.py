@@ -12,14 +12,13 @@ import scipy
 from ...contours.slices import Slices
 from ...contours.stack import solid_between
 from ...errors import UsageError
-from ...model.boxes import box_of
+from ...isosurface.run_mask import RunMask
 from ...progress import Progress, silent
 from .loops import trace
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...model.boxes import Box
     from ...model.volume import Volume
 
     Mask = NDArray[np.bool_]
@@ -64,7 +63,7 @@ class Gaps:
         return f"{len(gone)} {across} are empty between {len(self.labelled)} that hold labels ({named})"
 
 
-def gaps_in(mask: Mask, around: Box | None = None) -> Gaps | None:
+def gaps_in(mask: RunMask) -> Gaps | None:
     """Find the empty slices of labels of which some slices alone were drawn; None where there are none.
 
     Either no two of the slices with labels are neighbors, for the most part, or a body is cut off on both sides of a
@@ -72,33 +71,28 @@ def gaps_in(mask: Mask, around: Box | None = None) -> Gaps | None:
 
     Parameters
     ----------
-    mask : (K, J, I) bool array
+    mask : RunMask
         The voxels of the labels that are wanted.
-    around : box, optional
-        Outside of which there are none.
     """
-    box = box_of(mask, around)
-    found = [_gaps_across(mask[box], axis) for axis in range(mask.ndim)]
-    return next((Gaps(one.axis, box[one.axis].start + one.labelled) for one in found if one is not None), None)
+    return next((gaps for axis in range(3) if (gaps := _gaps_across(mask, axis)) is not None), None)
 
 
-def _gaps_across(mask: Mask, axis: int) -> Gaps | None:
-    areas = np.count_nonzero(mask, axis=tuple(other for other in range(mask.ndim) if other != axis))
+def _gaps_across(mask: RunMask, axis: int) -> Gaps | None:
+    areas = mask.areas(axis)
     labelled = np.flatnonzero(areas)
     runs = np.split(labelled, np.flatnonzero(np.diff(labelled) > 1) + 1)
     if len(runs) < 2:
         return None
     alone = np.median([len(run) for run in runs]) == 1
-    planes = np.moveaxis(mask, axis, 0)
-    cut = any(_is_cut(planes, areas, int(a[-1]), int(b[0])) for a, b in pairwise(runs))
+    cut = any(_is_cut(mask, axis, areas, int(a[-1]), int(b[0])) for a, b in pairwise(runs))
     return Gaps(axis, labelled) if alone or cut else None
 
 
-def _is_cut(planes: Mask, areas: NDArray[np.int64], below: int, above: int) -> bool:
+def _is_cut(mask: RunMask, axis: int, areas: NDArray[np.int64], below: int, above: int) -> bool:
     """Tell whether the slices beside a gap lie over one another, and are about as large as those behind them."""
     beyond = (max(below - 1, 0), min(above + 1, len(areas) - 1))
     blunt = all(areas[one] >= BLUNT * areas[next_] for one, next_ in zip((below, above), beyond, strict=True))
-    shared = np.count_nonzero(planes[below] & planes[above])
+    shared = np.count_nonzero(mask.plane(axis, below) & mask.plane(axis, above))
     return blunt and bool(2 * shared >= min(areas[below], areas[above]))
 
 
@@ -125,7 +119,7 @@ def filled_slices(mask: Mask, study: Volume, *, threads: int = 0, progress: Prog
     UsageError
         Where no slice is empty between others, or the labels lie on one slice alone.
     """
-    found = gaps_in(mask) or _likeliest_gaps(mask)
+    found = gaps_in(RunMask.of([mask])) or _likeliest_gaps(mask)
     if found is None:
         raise UsageError(
             "no slice without labels lies between others", found="--fill-slices",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,73 +17,60 @@ if TYPE_CHECKING:
     from .loops import Patch
 
 
-@dataclass(frozen=True)
-class Tracks:
-    """The track of every contour.
-
-    Attributes
-    ----------
-    numbers : list of lists of int
-        For each slice and each of its contours; tracks are numbered as they begin.
-    events : list of Event
-    """
-
-    numbers: list[list[int]]
-    events: list[Event]
-
-    @property
-    def members(self) -> list[list[tuple[int, int]]]:
-        """Return the slice and the ring of every contour of each track, in order."""
-        found: list[list[tuple[int, int]]] = [
-            [] for _ in range(1 + max((n for row in self.numbers for n in row), default=-1))
-        ]
-        for k, row in enumerate(self.numbers):
-            for ring, number in enumerate(row):
-                found[number].append((k, ring))
-        return found
-
-
-def track(insides: Sequence[Sequence[Patch]], sides: Sequence[Sequence[int]]) -> Tracks:
-    """Link contours of neighboring slices by what their insides have in common.
+class Tracker:
+    """Links contours slice by slice, by what their insides have in common with those of the slice before.
 
     Each contour has one successor at most, of a like area: those pairs that share most pixels over the whole slice
     (Kuhn 1955). What is left over branches off, or merges into, the contour that it shares most with; else it is born,
     or dies.
 
-    Parameters
+    Attributes
     ----------
-    insides : sequence of sequences of Patch
-        The pixels inside each contour of every slice.
-    sides : sequence of sequences of int
-        What each contour is; only contours of one side go on as each other.
-
-    Returns
-    -------
-    Tracks
+    events : list of Event
+        As far as it has come.
     """
-    numbers: list[list[int]] = []
-    events: list[Event] = []
-    count = 0
-    for k, here in enumerate(insides):
-        before = insides[k - 1] if k else []
-        shared = _shared(before, here, sides[k - 1] if k else [], sides[k])
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+        self._slices = self._tracks = 0
+        self._insides: Sequence[Patch] = ()
+        self._sides: Sequence[int] = ()
+        self._numbers: list[int] = []
+
+    def follow(self, here: Sequence[Patch], sides: Sequence[int]) -> list[int]:
+        """Return the tracks of the contours of the next slice; tracks are numbered as they begin.
+
+        Parameters
+        ----------
+        here : sequence of Patch
+            The pixels inside each contour.
+        sides : sequence of int
+            What each contour is; only contours of one side go on as each other.
+        """
+        before, k = self._insides, self._slices
+        shared = _shared(before, here, self._sides, sides)
         pairs = _successors(shared, [patch.area for patch in before], [patch.area for patch in here])
         row = []
         for b in range(len(here)):
             if b in pairs:
-                row.append(numbers[k - 1][pairs[b]])
+                row.append(self._numbers[pairs[b]])
                 continue
-            row.append(count)
             source = _most(shared[:, b])
-            events.append(Event(BIRTH, k, count) if source < 0 else Event(BRANCH, k, count, numbers[k - 1][source]))
-            count += 1
+            row.append(self._tracks)
+            self._happens((BIRTH, BRANCH), k, self._tracks, source, self._numbers)
+            self._tracks += 1
         for a in sorted(set(range(len(before))) - set(pairs.values())):
-            target = _most(shared[a])
-            ended = numbers[k - 1][a]
-            events.append(Event(DEATH, k - 1, ended) if target < 0 else Event(MERGE, k - 1, ended, row[target]))
-        numbers.append(row)
-    events += [Event(DEATH, len(numbers) - 1, number) for number in (numbers[-1] if numbers else [])]
-    return Tracks(numbers, events)
+            self._happens((DEATH, MERGE), k - 1, self._numbers[a], _most(shared[a]), row)
+        self._slices, self._insides, self._sides, self._numbers = k + 1, here, sides, row
+        return row
+
+    def _happens(self, kinds: tuple[str, str], k: int, track: int, other: int, numbers: Sequence[int]) -> None:
+        """Note what happens to a track: the one by itself, the other with one of the contours beside it."""
+        self.events.append(Event(kinds[0], k, track) if other < 0 else Event(kinds[1], k, track, numbers[other]))
+
+    def end(self) -> tuple[Event, ...]:
+        """Return all events: what is on the last slice ends there."""
+        return (*self.events, *(Event(DEATH, self._slices - 1, number) for number in self._numbers))
 
 
 def _successors(shared: NDArray[np.int64], before: Sequence[int], here: Sequence[int]) -> dict[int, int]:

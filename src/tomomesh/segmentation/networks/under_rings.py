@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model.columns import any_of
-from ..model.points import CAP
-from ..pointcloud.samples import Samples
-from ..som.fit import match
-from .sample import REACH
+from ...model.columns import any_of
+from ...model.points import CAP
+from ...model.sliced import ranges
+from ...pointcloud.samples import Samples
+from ...som.fit import match
+from ..sample import REACH
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..model.networks import Networks
-    from ..model.volume import Volume
-    from .sample import Sampling
+    from ...model.networks import Networks
+    from ...model.volume import Volume
+    from ..sample import Sampling
 
     Floats = NDArray[np.float64]
 
@@ -60,25 +61,40 @@ def surface_under(networks: Networks, sampling: Sampling, volume: Volume) -> Sam
     count, size = lines.shape[:2]
     slices = np.repeat(networks.slices, size).astype(np.float64)
     places = volume.to_mm(np.column_stack([lines.reshape(-1, 2), slices])).reshape(count, size, 3)
-    up, down = (_Steps.along(places, networks.slices, way) for way in (1, -1))
-    along, apart = _along(places, broken)
-    normals = np.cross(along, _across(up, down))
-    wide = np.maximum(up.lengths, down.lengths)
-    kept = any_of((normals != 0).reshape(-1, 3)) & ~_alone(broken).ravel()
-    spacing = np.clip(np.maximum(wide, apart), sampling.spacing_mm / DENSEST, sampling.spacing_mm).ravel()
+    del lines, slices
+    found = [
+        _under(places, broken, networks.slices, sampling.spacing_mm, start, stop) for start, stop in ranges(0, count)
+    ]
     caps = sampling.points.positions[sampling.points.kinds == CAP]
-    facing = np.cross(volume.affine[:3, 0], volume.affine[:3, 1])
-    return _samples(
-        np.concatenate([places.reshape(-1, 3)[kept], caps]),
-        np.concatenate([normals.reshape(-1, 3)[kept], np.broadcast_to(facing, caps.shape)]),
-        np.concatenate([spacing[kept], np.full(len(caps), sampling.spacing_mm)]),
-    )
-
-
-def _samples(places: Floats, normals: Floats, spacing: Floats) -> Samples:
-    """Return samples without noise."""
-    normals = normals / np.sqrt((normals**2).sum(axis=1, keepdims=True))
+    facing = np.broadcast_to(np.cross(volume.affine[:3, 0], volume.affine[:3, 1]), caps.shape)
+    found.append((caps, _long_one(facing), np.full(len(caps), sampling.spacing_mm)))
+    columns = list(zip(*found, strict=True))
+    del places, found
+    places, normals, spacing = (np.concatenate(columns.pop(0)) for _ in range(3))  # one after the other is let go
     return Samples(places, normals, spacing, np.zeros_like(spacing), np.zeros_like(spacing), 0, 0.0)
+
+
+def _under(
+    places: Floats, broken: NDArray[np.bool_], slices: NDArray[np.int32], widest: float, start: int, stop: int
+) -> tuple[Floats, Floats, Floats]:
+    """Return places along some of the rings, the normals there and how far apart they are, as they are kept.
+
+    A ring is told of by two on each side of it.
+    """
+    low, high = max(start - 2, 0), min(stop + 2, len(places))
+    own, around = slice(start - low, stop - low), places[low:high]
+    up, down = (_Steps.along(around, slices[low:high], way) for way in (1, -1))
+    along, apart = _along(places[start:stop], broken[start:stop])
+    normals = np.cross(along, _across(up, down)[own])
+    wide = np.maximum(up.lengths[own], down.lengths[own])
+    kept = any_of((normals != 0).reshape(-1, 3)) & ~_alone(broken[start:stop]).ravel()
+    spacing = np.clip(np.maximum(wide, apart), widest / DENSEST, widest).ravel()
+    return places[start:stop].reshape(-1, 3)[kept], _long_one(normals.reshape(-1, 3)[kept]), spacing[kept]
+
+
+def _long_one(normals: Floats) -> Floats:
+    """Return vectors (n, 3) of length 1."""
+    return np.asarray(normals / np.sqrt((normals**2).sum(axis=1, keepdims=True)))
 
 
 def _curves(networks: Networks, volume: Volume) -> tuple[Floats, NDArray[np.bool_]]:

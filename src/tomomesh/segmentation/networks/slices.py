@@ -1,36 +1,35 @@
-"""Train a network on every slice of a study."""
+"""What the networks of a study are shown on its slices, how they are trained there, and how many neurons they need."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import EmptyError
-from ..kernels.som.neighborhoods import GAUSSIAN
-from ..kernels.threads import in_blocks
-from ..measure.polygon import side_lengths
-from ..model.lattice import lattice
-from ..model.networks import Networks
-from ..progress import Progress, silent
-from ..settings import IN_SLICE, MOST_NEURONS
-from ..som.even_spacing import bridged_edges, even_spacing
-from ..som.fit import fit, match, radii, shape_of
-from .contours.curved import evened
-from .contours.inputs import FEWEST, SIDES_EACH
-from .contours.shrinking import unshrunk
-from .signal import crossings_around, fills_most, is_stepped, outline, pixels_of
+from ...kernels.som.neighborhoods import GAUSSIAN
+from ...measure.polygon import side_lengths
+from ...model.lattice import lattice
+from ...model.sliced import areas_of, parts_of, some_of
+from ...settings import IN_SLICE, MOST_NEURONS
+from ...som.even_spacing import bridged_edges, even_spacing
+from ...som.fit import fit, radii, shape_of
+from ..contours.curved import evened
+from ..contours.inputs import FEWEST, SIDES_EACH
+from ..contours.shrinking import unshrunk
+from ..signal import crossings_around, fills_most, is_stepped, outline, pixels_of
+from ..window import by_layer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..isosurface.crossings import Levels
-    from ..model.contours import Contours
-    from ..model.lattice import Lattice
-    from ..settings import NetworkSettings
-    from ..som.fit import Fitted
+    from ...isosurface.crossings import Levels
+    from ...model.lattice import Lattice
+    from ...model.sliced import Sliced
+    from ...model.volume import Volume
+    from ...settings import NetworkSettings
+    from ...som.fit import Fitted
+    from ..window import Limit
 
 LOOKED_AT = 6
 """Slices on which the number of neurons is found: a tenth of a study's, and of its time. Chosen: half of it changes the
@@ -50,112 +49,24 @@ NEAR = 2.0
 neighbor's place needs 3 epochs from there, and a start at 4 fails on two-sided walls."""
 
 
-def train_study(
-    mask: NDArray[np.bool_],
-    settings: NetworkSettings,
-    *,
-    layers: NDArray[np.bool_] | None = None,
-    levels: Levels | None = None,
-    pixel_mm: tuple[float, float] = (1.0, 1.0),
-    seed: int = 0,
-    first: int = 0,
-    threads: int = 0,
-    progress: Progress = silent,
-) -> Networks:
-    """Run one self-organising map on each slice of a window (the paper's Fig. 5, 7).
-
-    Slices are the unit of parallel work, and each draws from a generator of its own, so the result does not
-    depend on the number of threads. With ``start="neighbor"`` each starts from the one below, one after the other.
-
-    Parameters
-    ----------
-    mask : (K, J, I) bool array
-    settings : NetworkSettings
-    layers : (K, J, I, L) bool array, optional
-        The layers of a color study that lie in their windows. Eq. 4 has an input x_ijl for each k_ijl that is not 0:
-        it is read as a pixel that is presented once for every layer in which it lies in the window, at
-        (i, j, l), layers lying as far apart as columns. A neuron's place is its first two coordinates. Outlines have
-        no layers, and are presented once.
-    levels : Levels, optional
-        The gray levels and the window on them: an outline is then shown where they cross its bounds between pixels,
-        unless they are those of a mask, or networks are trained one presentation at a time.
-    pixel_mm : (float, float)
-        Distance of the columns and of the rows: the networks live in millimeters.
-    seed : int
-    first : int
-        Number of the first slice in the study that these are of: a part is then trained as in the whole, unless each
-        slice starts from the one below, or ``signal="auto"`` or the number of neurons looks at all of them.
-    threads : int
-    progress : callable
-
-    Returns
-    -------
-    Networks
-        Slices with fewer pixels than neurons have none. Where the number of neurons follows from the outlines, a
-        smaller ring is trained on them, and its curve gets as many neurons as the others.
-
-    Raises
-    ------
-    EmptyError
-        Where no slice has pixels enough.
-    """
-    slices = Slices.of(mask, layers, levels, settings, pixel_mm, seed, first)
-    graph = lattice(settings.topology, slices.enough() if settings.neurons_follow else settings.neuron_count)
-    least = SIDES_EACH * FEWEST if settings.neurons_follow else len(graph)
-    count = len(mask)
-    codebooks, bridged = np.zeros((count, len(graph), 2)), np.zeros((count, len(graph.edges)), bool)
-    pixels, strays = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    followed = settings.start == "neighbor"
-    below: NDArray[np.float64] | None = None
-
-    def work(start: int, stop: int) -> None:
-        nonlocal below
-        for k in range(start, stop):
-            shown = slices.shown(k)
-            pixels[k] = len(shown)
-            if len(shown) >= least:
-                fitted = slices.fitted(k, shown, graph, below)
-                below = fitted.codebook if followed and len(fitted.codebook) == len(graph) else None
-                codebooks[k], bridged[k] = slices.spaced(fitted, graph)
-                strays[k] = (~fitted.kept).sum()
-
-    workers = 1 if followed else threads
-    in_blocks(work, count, block=1, threads=workers, done=lambda done: progress("networks", done, count))
-    trained = pixels >= least
-    if not trained.any():
-        raise EmptyError(
-            "no slice has pixels enough for a network",
-            found=f"at most {pixels.max()} pixels in a slice",
-            expected=f"at least {least}" + (", one a neuron" if least == len(graph) else ""),
-            hint="a wider window, or fewer --neurons",
-        )
-    return Networks(
-        graph,
-        np.flatnonzero(trained).astype(np.int32),
-        codebooks[trained],
-        bridged[trained],
-        slices.outlined,
-        pixels[trained],
-        strays[trained],
-    )
-
-
 @dataclass(frozen=True)
 class Slices:
     """What the networks of a study see, and how they are trained."""
 
-    mask: NDArray[np.bool_]
-    layers: NDArray[np.bool_] | None
+    mask: Sliced
+    layers: Sliced | None
     levels: Levels | None
     settings: NetworkSettings
     pixel_mm: tuple[float, float]
     seed: int
     first: int
     outlined: bool
+    times_shown: float = 1.0
+    """How often a pixel is shown: once, or for each of its layers."""
 
     @classmethod
     def of(
-        cls, mask: NDArray[np.bool_], layers: NDArray[np.bool_] | None, levels: Levels | None,
+        cls, mask: Sliced, layers: Sliced | None, levels: Levels | None,
         settings: NetworkSettings, pixel_mm: tuple[float, float], seed: int, first: int,
     ) -> Slices:  # fmt: skip
         """Choose what is shown; for the whole study, which would else have a step in its surface."""
@@ -164,7 +75,15 @@ class Slices:
         fine = levels if outlined and settings.training == "batch" else None
         if fine is not None and is_stepped(mask, fine):
             fine = None
-        return cls(mask, layers, fine, settings, pixel_mm, seed, first, outlined)
+        shown = 1.0 if outlined or layers is None else _times_shown(layers)
+        return cls(mask, layers, fine, settings, pixel_mm, seed, first, outlined, shown)
+
+    def part(self, start: int, stop: int) -> Slices:
+        """Return a range of the slices, in the memory."""
+        mask, layers = (None if one is None else some_of(one, start, stop) for one in (self.mask, self.layers))
+        levels = None if self.levels is None else self.levels.part(start, stop)
+        assert mask is not None
+        return replace(self, mask=mask, layers=layers, levels=levels, first=self.first + start)
 
     def shown(self, k: int) -> NDArray[np.float64]:
         """Return what the network of a slice sees, in millimeters."""
@@ -179,13 +98,6 @@ class Slices:
     def pixel_area(self) -> float:
         """Area that an input stands for, mm^2; 0 where the inputs are on a line."""
         return 0.0 if self.levels is not None else self.pixel_mm[0] * self.pixel_mm[1]
-
-    @cached_property
-    def times_shown(self) -> float:
-        """How often a pixel is shown: once, or for each of its layers."""
-        if self.outlined or self.layers is None:
-            return 1.0
-        return float(self.layers.sum()) / max(float(self.layers.any(axis=-1).sum()), 1.0)
 
     def fitted(
         self, k: int, shown: NDArray[np.float64], graph: Lattice, below: NDArray[np.float64] | None = None
@@ -230,7 +142,7 @@ class Slices:
         Some slices are looked at, evenly spaced: a ring of `IN_SLICE` is trained on each, and the one that it asks for
         where that is much larger, for it may show bends which the first could not.
         """
-        full = np.flatnonzero(self.mask.any(axis=(1, 2)))
+        full = np.flatnonzero(areas_of(self.mask))
         some = full[np.linspace(0, len(full) - 1, min(LOOKED_AT, len(full))).round().astype(int)]
         return max([FEWEST, *(self._wanted_on(int(k)) for k in some)])
 
@@ -260,37 +172,32 @@ def neurons_for(ring: NDArray[np.float64], gaps: NDArray[np.bool_], pixel: float
     return int(np.ceil(len(ring) * np.sqrt(float(np.quantile(lengths, 1 - REST)) / (CHORD * pixel))))
 
 
-def regions(
-    mask: NDArray[np.bool_],
-    found: Networks | Contours,
-    *,
-    pixel_mm: tuple[float, float] = (1.0, 1.0),
-    threads: int = 0,
-) -> NDArray[np.uint16]:
-    """Compare networks with the image: give every window pixel its winner's label (Fig. 5).
+@dataclass(frozen=True)
+class ByLayer:
+    """The window of each layer of the voxels that are kept, (K, J, I, L), made as it is asked for."""
 
-    Parameters
-    ----------
-    mask : (K, J, I) bool array
-    found : Networks or Contours
-        One network a slice, or several.
-    pixel_mm : (float, float)
-        Distance of the columns and of the rows.
-    threads : int
+    volume: Volume
+    mask: Sliced
+    lower: Limit
+    upper: Limit
 
-    Returns
-    -------
-    (K, J, I) uint16 array
-        0 outside the window and on slices without a network, else the neuron's number within its slice plus 1,
-        counted through the rings of the slice where there are several.
-    """
-    labels = np.zeros(mask.shape, np.uint16)
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Sizes K, J, I, L."""
+        return (*self.volume.shape, self.volume.layers)
 
-    def work(start: int, stop: int) -> None:
-        for k in found.slices[start:stop]:
-            codebook = found.codebook_on(int(k)) * pixel_mm
-            winners, _ = match(codebook, pixels_of(mask[k]) * pixel_mm)
-            labels[k][mask[k]] = winners + 1
+    def __getitem__(self, slices: int | slice) -> NDArray[np.bool_]:
+        """Return a slice, or those of a range."""
+        if not isinstance(slices, slice):
+            return np.asarray(self[slices : slices + 1][0])
+        start, stop, _ = slices.indices(self.shape[0])
+        some = replace(self.volume, voxels=some_of(self.volume.voxels, start, stop))
+        return by_layer(some, lower=self.lower, upper=self.upper) & some_of(self.mask, start, stop)[..., None]
 
-    in_blocks(work, len(found.slices), block=1, threads=threads)
-    return labels
+
+def _times_shown(layers: Sliced) -> float:
+    shown = pixels = 0
+    for start, stop in parts_of(layers):
+        some = some_of(layers, start, stop)
+        shown, pixels = shown + int(some.sum()), pixels + int(some.any(axis=-1).sum())
+    return float(shown) / max(float(pixels), 1.0)

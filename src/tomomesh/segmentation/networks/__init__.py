@@ -1,0 +1,1 @@
+"""One network on every slice: window -> networks, and the surface that rings lie on."""
