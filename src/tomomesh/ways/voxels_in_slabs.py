@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import UsageError
 from ..segmentation.slabwise.sources import Drawn
 from ..settings import option_of
@@ -101,7 +103,7 @@ def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> S
     InternalCheckError
     """
     progress("checks", 0, 1)
-    across = kept.study.affine[:3, 2]
+    across = np.linalg.inv(kept.study.affine)[2, :3]  # at right angles to the slices, also where these are tilted
     patches = patches_of(made.mesh, tuple(map(float, across)))
     whole = check_patches(patches, cavities=made.cavities)
     progress("checks", 1, 1)
