@@ -99,7 +99,7 @@ class TestArrays:
             del small
 
     def test_those_of_other_threads_and_of_later_are_as_ever(self) -> None:
-        found = list[str]()
+        found = list[str | None]()
 
         def look() -> None:
             found.append(get_handler_name(np.empty(8 * MIB, np.uint8)))
@@ -187,7 +187,7 @@ class TestLimits:
             pass
 
     def test_in_units(self) -> None:
-        asked = ["1GB", "1 gb", "1G", "1000MB", "1.0e9".replace("e9", "GB"), 1e9, 10**9]
+        asked: list[str | float] = ["1GB", "1 gb", "1G", "1000MB", "1.0 GB", 1e9, 10**9]
         assert {limit.bytes_of(one) for one in asked} == {10**9}
         assert limit.bytes_of("1GiB") == limit.bytes_of("1024 MiB") == 2**30
 

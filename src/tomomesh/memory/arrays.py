@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -82,9 +83,8 @@ def _start() -> int:
 
 def swapped(capsule: Any) -> Any:
     """Have NumPy ask another handler from now on, in this thread; return the one before."""
-    from numpy._core import _multiarray_umath
-
-    table = _api().PyCapsule_GetPointer(_multiarray_umath._ARRAY_API, None)  # type: ignore[attr-defined] # as import_array() of NumPy's headers does
+    functions = import_module("numpy._core._multiarray_umath")._ARRAY_API  # as import_array() of its headers does
+    table = _api().PyCapsule_GetPointer(functions, None)
     address = ctypes.cast(table, ctypes.POINTER(ctypes.c_void_p))[SET_HANDLER]
     return ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.py_object)(address or 0)(capsule)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
-from ..segmentation.slabwise.sources import Drawn
+from ..segmentation.slabwise.sources import MaskVoxels
 from ..settings import option_of
 from ..slabs.patches.patch import patches_of
 from ..slabs.patches.promise import check_patches
@@ -63,7 +63,7 @@ def _asked(chosen: Chosen, settings: Settings) -> Asked:
     """Ask for the boundary of the voxels that are kept; of labels that all are, they tell all that there is to know."""
     volume, runs = chosen.volume, chosen.runs
     source = getattr(volume.voxels, "source", None)
-    alone = isinstance(source, Drawn) and source.mask.count == runs.count
+    alone = isinstance(source, MaskVoxels) and source.mask.count == runs.count
     surface = "outer" if settings.cubes.surface == "outer" else "all"
     return Asked(
         runs, None if alone else volume.voxels, volume.affine, chosen.lower, chosen.upper, settings.window.layers,

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...kernels.threads import in_blocks
 from ...model.lazy import LazyVoxels
-from ...model.sliced import ranges, some_of
+from ...model.sliced import SOME, ranges, some_of
 from ...progress import Progress, silent
 from .gray import Gray
 from .insides import Frame, insides_of
@@ -145,9 +145,9 @@ def filled_between(
         As of `Between.of`.
     progress : callable
     """
-    volume = Between.of(contours, mask, study, levels, threads).over(study)
-    count, found = volume.shape[0], np.empty(volume.voxels.shape, volume.voxels.dtype)
-    for start, stop in ranges(0, count):
+    between = Between.of(contours, mask, study, levels, threads)
+    volume, count, found = between.over(study), between.shape[0], np.empty(between.shape, between.dtype)
+    for start, stop in ranges(0, count, SOME * between.times):
         found[start:stop] = some_of(volume.voxels, start, stop)
         progress("slices", stop, count)
     return replace(volume, voxels=found)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ....errors import FormatError, ResourceError
+from ....errors import FormatError, ResourceError, UnreadableError
 from ....model.lazy import LazyVoxels, in_memory
 from ...files.detached import beside
 from ...files.extras import required
@@ -82,7 +82,7 @@ def open_array(folder: Path, *, file: str) -> Any:
     described = document_of(folder, DOCUMENTS[3 - version], file=file)
     _check_codecs(described, file)
     with third_party("zarr", file):
-        store = zarr.storage.LocalStore(folder, read_only=True)
+        store = zarr.storage.LocalStore(folder.absolute(), read_only=True)
         array = zarr.open_array(store, mode="r", zarr_format=version)
         least = array.chunks if read_later() else tuple(map(max, array.shape, _unit(array)))
     require_memory(math.prod(least) * array.dtype.itemsize, file=file)
@@ -187,6 +187,9 @@ class Chunks:
 
     def _check_length(self, key: str) -> None:
         """Compare what a chunk holds with its voxels; shards, and zstd's that do not say it, are passed over."""
+        if not (self.folder / key).is_file():
+            found, hint = f"chunk = {key}", "the same command again, once nothing writes to the folder"
+            raise UnreadableError("a chunk is gone since the array was opened", file=self.file, found=found, hint=hint)
         codecs = self.array.compressors[-1:] if not self.array.shards else ()
         packing = next((str(getattr(codec, "codec_id", type(codec).__name__)) for codec in codecs), "")
         most = 2 * math.prod(self.array.chunks) * self.array.dtype.itemsize + 2**16
@@ -224,7 +227,7 @@ def read_array(array: Any, folder: Path, *, fill_chunks: bool, file: str) -> tup
     """
     missing = _missing(array, folder, file)
     document = next(folder / name for name in DOCUMENTS if (folder / name).exists())
-    lazy = LazyVoxels.of(Chunks(array, folder, Seen.of(document), missing, file))
+    lazy = LazyVoxels.of(Chunks(array, folder.absolute(), Seen.of(document), missing, file))
     voxels = native(lazy, file=file) if read_later() else native(lazy.read(), file=file)
     if not missing.any():
         return voxels, ()
