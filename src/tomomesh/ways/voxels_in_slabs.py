@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..slabs.cuts import Cuts
     from ..slabs.keep import Slabs
     from ..slabs.patches.patch import Patches
-    from ..slabs.patches.seams import Whole
+    from ..slabs.patches.seams import Gathered
     from ..slabs.surface import SlabSurface
 
 WHOLE = ("smooth", "edge", "target_faces")
@@ -95,7 +95,7 @@ def _told(made: SlabSurface, kept: Selected, *, labels: bool) -> tuple[dict[str,
 
 
 @timed("quality")
-def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> Stage[tuple[Patches, Whole, int]]:
+def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> Stage[tuple[Patches, Gathered, int]]:
     """Check across all seams what is promised of a mesh; return it as patches, what was counted, and its cavities.
 
     Raises
@@ -113,6 +113,6 @@ def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> S
 
 
 @timed("quality")
-def measured_in_slabs(patches: Patches, whole: Whole, cavities: int) -> Stage[None]:
+def measured_in_slabs(patches: Patches, whole: Gathered, cavities: int) -> Stage[None]:
     """Measure a mesh that is never whole."""
     return Stage(None, {"quality": assess_patches(patches, whole, cavities=cavities)})
