@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...measure.shape import Extent
+from ...measure.shape import MeshExtent
 from ...model.columns import any_of, box, carried, parts_of
 from ..keep import InMemory
 from ..mesh import Piece, SlabMesh
@@ -74,7 +74,7 @@ class Patches:
         Of `MeshPatch`.
     vertex_count : int
         Of the whole mesh.
-    extent : Extent
+    extent : MeshExtent
         The box around it.
     shared : (s,) int64 array
         Numbers of the vertices that several patches may use, rising.
@@ -86,7 +86,7 @@ class Patches:
     slabs: Slabs
     kept: list[Kept]
     vertex_count: int
-    extent: Extent
+    extent: MeshExtent
     shared: Ints
     along: tuple[float, ...]
 
@@ -180,9 +180,9 @@ def in_one_patch(mesh: TriMesh) -> Patches:
     return patches_of(SlabMesh.of([piece], InMemory()))
 
 
-def _extent(slabs: Slabs, kept: list[Kept], faces: int) -> Extent:
+def _extent(slabs: Slabs, kept: list[Kept], faces: int) -> MeshExtent:
     boxes = [one for one in slabs.fetch(slabs.each(_box, kept)) if one is not None] or [np.zeros((2, 3))]
-    return Extent(np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1], faces)
+    return MeshExtent(np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1], faces)
 
 
 def _carried(patch: MeshPatch, matrix: Floats) -> MeshPatch:
