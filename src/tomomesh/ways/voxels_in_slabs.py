@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import UsageError
 from ..segmentation.slabwise.sources import MaskVoxels
 from ..settings import option_of
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from ..slabs.cuts import Cuts
     from ..slabs.keep import Slabs
     from ..slabs.patches.patch import Patches
-    from ..slabs.patches.seams import Whole
+    from ..slabs.patches.seams import Gathered
     from ..slabs.surface import SlabSurface
 
 WHOLE = ("smooth", "edge", "target_faces")
@@ -93,7 +95,7 @@ def _told(made: SlabSurface, kept: Selected, *, labels: bool) -> tuple[dict[str,
 
 
 @timed("quality")
-def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> Stage[tuple[Patches, Whole, int]]:
+def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> Stage[tuple[Patches, Gathered, int]]:
     """Check across all seams what is promised of a mesh; return it as patches, what was counted, and its cavities.
 
     Raises
@@ -101,7 +103,7 @@ def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> S
     InternalCheckError
     """
     progress("checks", 0, 1)
-    across = kept.study.affine[:3, 2]
+    across = np.linalg.inv(kept.study.affine)[2, :3]  # at right angles to the slices, also where these are tilted
     patches = patches_of(made.mesh, tuple(map(float, across)))
     whole = check_patches(patches, cavities=made.cavities)
     progress("checks", 1, 1)
@@ -111,6 +113,6 @@ def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> S
 
 
 @timed("quality")
-def measured_in_slabs(patches: Patches, whole: Whole, cavities: int) -> Stage[None]:
+def measured_in_slabs(patches: Patches, whole: Gathered, cavities: int) -> Stage[None]:
     """Measure a mesh that is never whole."""
     return Stage(None, {"quality": assess_patches(patches, whole, cavities=cavities)})

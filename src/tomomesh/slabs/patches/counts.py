@@ -14,7 +14,7 @@ from ...measure.shape import areas_and_volumes
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...measure.shape import Extent
+    from ...measure.shape import MeshExtent
     from .patch import MeshPatch
 
     Floats = NDArray[np.float64]
@@ -71,7 +71,7 @@ class Rim:
 
 
 @dataclass(frozen=True)
-class Counted:
+class PatchCounts:
     """What a patch has away from shared vertices, whose neighborhoods are left to the whole.
 
     Attributes
@@ -93,7 +93,7 @@ class Counted:
     rim: Rim
 
 
-def counted(patch: MeshPatch, extent: Extent) -> Counted:
+def counted(patch: MeshPatch, extent: MeshExtent) -> PatchCounts:
     """Count what no other patch has a part in."""
     links = Links(patch)
     corner = links.faces.reshape(-1)
@@ -107,7 +107,7 @@ def counted(patch: MeshPatch, extent: Extent) -> Counted:
     roots = np.flatnonzero(fans == np.arange(len(fans)))
     rim = np.flatnonzero(patch.beside)
     lines, loops = _borders(fans, alone, rim)
-    return Counted(
+    return PatchCounts(
         _table(patch, links, extent, inner, alone, loops),
         int((~patch.shared[corner[roots]]).sum()),
         int((links.uses[inner] > 2).sum()),
@@ -143,7 +143,7 @@ def _borders(
 
 
 def _table(
-    patch: MeshPatch, links: Links, extent: Extent, inner: NDArray[np.bool_], alone: NDArray[np.int32],
+    patch: MeshPatch, links: Links, extent: MeshExtent, inner: NDArray[np.bool_], alone: NDArray[np.int32],
     loops: NDArray[np.int32],
 ) -> Tally:  # fmt: skip
     count, piece = links.pieces, links.face_pieces

@@ -13,7 +13,7 @@ from ...measure.links import Links
 from ...measure.shape import unfolded
 from ...measure.topology import Topology
 from ...model.mesh import TriMesh
-from .counts import Counted, Rim, Tally, at_marked, counted
+from .counts import PatchCounts, Rim, Tally, at_marked, counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -151,7 +151,7 @@ def whole_of(patches: Patches, *, cavities: int = 0) -> Gathered:
     -------
     Gathered
     """
-    found: list[Counted] = patches.told(counted, [patches.extent])
+    found: list[PatchCounts] = patches.told(counted, [patches.extent])
     seams = Seams.between([one.rim for one in found], [len(one.table.faces) for one in found], patches.shared)
     table, numbers = _joined([one.table for one in found], seams)
     return Gathered(_topology(found, table, seams, cavities), table, seams, numbers, all(one.finite for one in found))
@@ -191,7 +191,7 @@ def _added(values: NDArray[Any], numbers: NDArray[np.int64], count: int) -> NDAr
     return sums
 
 
-def _topology(found: list[Counted], table: Tally, seams: Seams, cavities: int) -> Topology:
+def _topology(found: list[PatchCounts], table: Tally, seams: Seams, cavities: int) -> Topology:
     vertices, edges, loops = (int(values.sum()) for values in (table.vertices, table.edges, table.loops))
     euler, components = vertices - edges + int(table.faces.sum()), len(table.faces)
     overused = int((seams.theirs & (seams.links.uses > 2)).sum())
