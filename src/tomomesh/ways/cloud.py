@@ -71,10 +71,11 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     tangled = CrossingFaces(settings.run.threads)
     apart = measured("untangle", untangle, rest.value.mesh, smoothed, ring, tangled, rough.value.lattice)
     mesh, taken_back, crossing = apart.value
-    followed = follows(shell.value, mesh, samples, origin, tangled.tree, threads=settings.run.threads)
+    trace, filled = None if rest.value.fitted is None else rest.value.fitted.trace, rest.value.filled
+    rest, apart = folded(None, rest), folded(None, apart)  # where the mesh was before is let go of
+    followed = follows(shell.value, mesh, samples, origin, tangled, threads=settings.run.threads)
     del samples, settled, tangled  # before more is made
-    trace = None if rest.value.fitted is None else rest.value.fitted.trace
-    filled = rest.value.filled | interpolated(mesh.moved(mesh.vertices + origin), points)
+    filled = filled | interpolated(mesh.moved(mesh.vertices + origin), points)
     enclosed = hollow(shell.value.leak_test, shell.value.taken(settings), shell.value.cubes, shell.value.cell)
     surface = Surface(
         points.cloud, rough.value.cuberille(origin), mesh.moved(smoothed + origin),
