@@ -72,7 +72,8 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     apart = measured("untangle", untangle, rest.value.mesh, smoothed, ring, tangled, rough.value.lattice)
     mesh, taken_back, crossing = apart.value
     trace, filled = None if rest.value.fitted is None else rest.value.fitted.trace, rest.value.filled
-    rest, apart = folded(None, rest), folded(None, apart)  # where the mesh was before is let go of
+    moved = folded(None, rest, apart)
+    del rest, apart  # and with them where the mesh was before
     followed = follows(shell.value, mesh, samples, origin, tangled, threads=settings.run.threads)
     del samples, settled, tangled  # before more is made
     filled = filled | interpolated(mesh.moved(mesh.vertices + origin), points)
@@ -84,7 +85,7 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
         encloses=enclosed if walls.value == 1 else None,
     )  # fmt: skip
     fitted = fit_found(trace, len(smoothed), taken_back=taken_back, filled=filled)
-    return folded(surface, told, shell, walls, rough, rest, apart, fitted, followed, place_found(points))
+    return folded(surface, told, shell, walls, rough, moved, fitted, followed, place_found(points))
 
 
 def _smoothed(shell: Shell, settings: Settings) -> Rough:
