@@ -130,7 +130,8 @@ class Between:
         affine[:3, 2] /= self.times
         low = self.frame.low * (1, 1, self.times) - (0, 0, self.around)
         affine[:3, 3] += affine[:3, :3] @ low
-        return replace(study, voxels=LazyVoxels.of(self), affine=affine)
+        voxels: Any = LazyVoxels.of(self)
+        return replace(study, voxels=voxels, affine=affine)
 
 
 def filled_between(

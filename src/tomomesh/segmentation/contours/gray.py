@@ -77,14 +77,14 @@ class Gray:
                 if full > 0:
                     here = side * depths > 0
                     deep[here] *= np.clip(side * within[here] / full, 0, 1)
-            return np.clip(depths, -deep, deep)
+            return np.asarray(np.clip(depths, -deep, deep))
 
         return np.stack(in_order(temper, len(seen), threads=threads))
 
 
 def _within(levels: Levels, seen: NDArray[np.float32]) -> Values:
     """Return how far levels are within the bounds; infinitely beyond them where they are not known."""
-    return np.nan_to_num(np.minimum(seen - levels.lower, levels.upper - seen), nan=-np.inf)
+    return np.asarray(np.nan_to_num(np.minimum(seen - levels.lower, levels.upper - seen), nan=-np.inf))
 
 
 def _full(insides: Insides, levels: Levels, threads: int) -> list[list[Values]]:
