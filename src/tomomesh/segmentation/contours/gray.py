@@ -29,7 +29,7 @@ BEYOND = (1.0, 2.5)
 
 
 @dataclass(frozen=True)
-class Gray:
+class FullLevels:
     """The gray levels of a study that tell how near the surface is, and what levels are full.
 
     Attributes
@@ -44,7 +44,7 @@ class Gray:
     full: tuple[float, float]
 
     @classmethod
-    def of(cls, levels: Levels | None, mask: Sliced, parts: Iterable[Insides], threads: int = 0) -> Gray | None:
+    def of(cls, levels: Levels | None, mask: Sliced, parts: Iterable[Insides], threads: int = 0) -> FullLevels | None:
         """Find what levels are full, over all slices; None where there are no levels, or those of a mask or of layers.
 
         Parameters
