@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tomomesh.results import Segmentation, Surface
+    from tomomesh.ways.way import Way
 
     Floats = NDArray[np.float64]
 
@@ -112,7 +113,7 @@ class TestNetworks:
     def test_those_of_any_ranges_are_those_of_the_whole(self, seed: int, most: int, start: str, signal: str) -> None:
         gray = gray_levels(seed)
         gray[3] = -9.0
-        settings = NetworkSettings(start=start, signal=signal, neurons=16)  # type: ignore[arg-type]
+        settings = NetworkSettings(start=start, signal=signal, neurons=16)
         whole = train_study(gray > 0.3, settings, levels=Levels(gray, 0.3, np.inf))
         source = Watched(gray, max(most, 1))
         with pytest.MonkeyPatch.context() as patch:
@@ -141,14 +142,14 @@ class TestNetworks:
     @given(seeds, thickness)
     def test_layers_are_shown_as_in_memory(self, seed: int, most: int) -> None:
         color = np.stack([gray_levels(seed + n, 6) for n in range(3)], axis=-1)
-        volume, kept = Volume.from_stored(color, np.eye(4)), (color > 0.3).any(axis=-1)
+        volume, kept = Volume.from_stored(color, np.eye(4)), np.asarray((color > 0.3).any(axis=-1))
         settings = NetworkSettings(inputs="layers", neurons=16, signal="region")
         whole = train_study(kept, settings, layers=by_layer(volume, lower=0.3) & kept[..., None])
         source = Watched(color, most)
         with pytest.MonkeyPatch.context() as patch:
             runs = RunMask.of([kept])
             some_at_once(patch, most)
-            lazy = Volume.from_stored(LazyVoxels.of(source), np.eye(4))  # type: ignore[arg-type]
+            lazy = Volume.from_stored(LazyVoxels.of(source), np.eye(4))
             parts = train_study(runs, settings, layers=ByLayer(lazy, runs, 0.3, np.inf))
         assert bytes_of(parts.codebooks, parts.pixels) == bytes_of(whole.codebooks, whole.pixels)
 
@@ -160,7 +161,7 @@ class TestContours:
     @given(seeds, thickness, st.sampled_from(["loops", "components", "walls"]), st.sampled_from(["auto", "boundary"]))
     def test_those_of_any_ranges_are_those_of_the_whole(self, seed: int, most: int, kind: str, signal: str) -> None:
         gray = gray_levels(seed)
-        settings = NetworkSettings(contours=kind, signal=signal, neurons=40)  # type: ignore[arg-type]
+        settings = NetworkSettings(contours=kind, signal=signal, neurons=40)
         levels = Levels(gray, 0.3, np.inf)
         try:
             whole = train_contours(gray > 0.3, settings, levels=levels)
@@ -231,7 +232,7 @@ class TestJudgement:
 
 
 HEAD = phantom((26, 64, 64), (3.75, 3.75, 5.7))
-WAYS = {
+WAYS: dict[str, tuple[Way, dict[str, Any]]] = {
     "ring": (rings.WAY, {"network": "ring", "neurons": 40}),
     "contours": (contours.WAY, {"contours": "loops"}),
     "components": (contours.WAY, {"contours": "components", "neurons": 60}),
