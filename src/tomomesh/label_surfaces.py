@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from .begin import laid_out, settled
 from .errors import EmptyError, UsageError
-from .pipeline import laid_out, reconstructed, settled
+from .pipeline import reconstructed
 from .progress import Progress, silent
 from .segmentation.labels import MOST
 
