@@ -67,14 +67,11 @@ class LabelSurfaces(Mapping[int, "Surface"]):
         assert labels is not None
         if labels.walls is not None:
             return study
+        on_study = replace(labels, volume=replace(study.volume, voxels=labels.volume.voxels))
         walls = walls_between(
-            labels,
-            settings.fit,
-            inside=study.inside,
-            divide=settings.cubes.divide,
-            threads=settings.run.threads,
+            on_study, settings.fit, inside=study.inside, divide=settings.cubes.divide, threads=settings.run.threads,
             progress=progress,
-        )
+        )  # fmt: skip
         return replace(study, labels=replace(labels, walls=walls))
 
     def __iter__(self) -> Iterator[int]:
