@@ -45,7 +45,7 @@ ALWAYS = {
     "structure", "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "fill_slices", "keep",
     "slices", "way", "network", "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow",
     "drain", "least_wall", "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge",
-    "precision", "one_piece", "fill_cavities", "thicken",
+    "precision", "one_piece", "fill_cavities", "thicken", "shared_walls",
 }  # fmt: skip
 """Parameters that matter on every way, or that choose what is read, the way, or what becomes of the mesh."""
 STUDY: dict[str, dict[str, Any]] = {

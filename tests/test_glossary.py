@@ -27,6 +27,9 @@ WALLS = {
     "followed.py", "segmentation/outlines.py", "ways/choice.py",
     "measure/thickness.py", "settings/printing.py",  # of a solid
     "judgement.py", "ways/clouds/shell.py", "ways/cubes.py", "ways/sections.py",  # the report's *two walls*
+    *(f"isosurface/walls/{name}.py" for name in ("__init__", "block", "net", "thick", "walls")),  # between two labels
+    "kernels/isosurface/walls.py", "label_surfaces.py", "segmentation/labels.py", "segmentation/selection.py",
+    "settings/cubes.py", "ways/walls.py",
 }  # fmt: skip
 """Modules that may name walls. Nothing else has any: not a cell, a ray, a sheet or a contour's triangles."""
 SEVERAL = {"Components", "Net", "Part", "Rest", "Segmentation", "Shell", "Shown", "Slices", "Stack"}

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from conftest import law
 from tomomesh.errors import ResourceError
-from tomomesh.model.lazy import Held, LazyVoxels, in_memory
+from tomomesh.model.lazy import ArraySource, LazyVoxels, in_memory
 from tomomesh.model.volume import Volume
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ STEPS = st.slices(6)
 VIEWS = st.lists(st.one_of(st.permutations(range(4)), st.tuples(STEPS, STEPS, STEPS, STEPS)), max_size=5)
 
 
-class Counting(Held):
+class Counting(ArraySource):
     """An array that says how many of its numbers were read."""
 
     numbers = 0
@@ -39,7 +39,7 @@ class Counting(Held):
 @law(200)
 @given(VIEWS)
 def test_turns_and_parts_are_those_of_numpy(views: list[Any]) -> None:
-    whole, lazy = ARRAY, LazyVoxels.of(Held(ARRAY))
+    whole, lazy = ARRAY, LazyVoxels.of(ArraySource(ARRAY))
     for view in views:
         turned = isinstance(view, list)
         whole, lazy = (whole.transpose(view), lazy.transpose(view)) if turned else (whole[view], lazy[view])
@@ -47,6 +47,11 @@ def test_turns_and_parts_are_those_of_numpy(views: list[Any]) -> None:
     np.testing.assert_array_equal(lazy.read(), whole, strict=True)
     for n in range(-whole.shape[0], whole.shape[0]):
         np.testing.assert_array_equal(lazy[n], whole[n], strict=True)
+        np.testing.assert_array_equal(lazy[n, ::-1], whole[n, ::-1], strict=True)
+    with pytest.raises(IndexError):
+        lazy[whole.shape[0]]
+    if whole.size:
+        np.testing.assert_array_equal(lazy[:, -1, :, 0], whole[:, -1, :, 0], strict=True)
     if whole.shape[3]:
         np.testing.assert_array_equal(lazy.layer(0).read(), whole[..., 0], strict=True)
 
@@ -58,7 +63,7 @@ def test_a_volume_of_them_is_that_of_the_array(
 ) -> None:
     affine = np.eye(4)
     affine[:3, :3] = np.diag([*signs])[:, order]
-    both = [Volume.from_stored(stored, affine).along(axis) for stored in (ARRAY, LazyVoxels.of(Held(ARRAY)))]
+    both = [Volume.from_stored(stored, affine).along(axis) for stored in (ARRAY, LazyVoxels.of(ArraySource(ARRAY)))]
     sides = [sorted(data.draw(st.tuples(*2 * [st.integers(0, size)]))) for size in both[0].shape]
     box = slice(*sides[0]), slice(*sides[1]), slice(*sides[2])
     whole, lazy = (volume.cropped(box) for volume in both)
@@ -96,6 +101,10 @@ ALL_AT_ONCE: dict[str, Callable[[Any], Any]] = {
     "count": np.count_nonzero,
     "take": lambda voxels: np.take(voxels, 0, 0),
     "contiguous": np.ascontiguousarray,
+    "layers": lambda voxels: voxels[..., 0],
+    "mask": lambda voxels: voxels[np.ones(5, bool)],
+    "list": lambda voxels: voxels[[0, 1]],
+    "deeper": lambda voxels: voxels[0, 0, 0, 0, 0],
 }
 
 
@@ -108,7 +117,7 @@ def test_what_needs_all_of_them_is_refused_and_reads_nothing(use: Callable[[Any]
 
 
 def test_they_travel_to_another_process() -> None:
-    lazy = LazyVoxels.of(Held(ARRAY)).map(np.negative, ARRAY.dtype)[1:3].transpose((1, 0, 2, 3))
+    lazy = LazyVoxels.of(ArraySource(ARRAY)).map(np.negative, ARRAY.dtype)[1:3].transpose((1, 0, 2, 3))
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(lazy)).read(), -ARRAY[1:3].transpose(1, 0, 2, 3))
     assert not hasattr(lazy, "__array_interface__")
     assert len(list(lazy)) == len(lazy) == 4

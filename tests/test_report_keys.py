@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tomomesh import Volume, reconstruct, reconstruct_points, segment
+from tomomesh import Volume, reconstruct, reconstruct_labels, reconstruct_points, segment
 
 GOLDEN = Path(__file__).parent / "report_keys.json"
 ROOT = Path(__file__).parents[1]
@@ -71,6 +71,8 @@ def keys_of(report: dict[str, Any]) -> dict[str, Any]:
 def reports() -> dict[str, dict[str, Any]]:
     """Return the keys of each way's report."""
     found = {name: keys_of(reconstruct(ball(), lower=40.0, **asked).report) for name, asked in STUDIES.items()}
+    labels = Volume.from_stored((ball().voxels > 40).astype(np.uint8), np.eye(4))
+    found["walls"] = keys_of(reconstruct_labels(labels, shared_walls=True)[1].report)
     found["stage one"] = keys_of(segment(ball(), lower=40.0).report)
     return found | {name: keys_of(reconstruct_points(cloud(name), **asked).report) for name, asked in CLOUDS.items()}
 

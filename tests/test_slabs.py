@@ -97,12 +97,13 @@ def cuts_of(data: st.DataObject, slices: int) -> Cuts:
 
 
 def assert_same(found: Any, study: Study) -> None:
-    """The mesh, how many voxels were added, what the levels are and how the net came to rest are those in memory."""
+    """The mesh, what it encloses, what was added to the mask and how the net came to rest are as in memory."""
     bounded, surface = study.in_memory()
     mesh, expected = found.mesh.joined(), surface.mesh
     assert mesh.faces.tobytes() == expected.faces.tobytes()
     assert mesh.vertices.tobytes() == expected.vertices.tobytes()
     assert (found.added, found.stepped) == (bounded.added, bounded.crossings.stepped)
+    assert (found.enclosed, found.cavities) == (bounded.volumes.sum(), bounded.cavities)
     trace, before = found.trace, surface.net_fit.trace
     assert trace.speed.tolist() == before.speed.tolist()
     assert trace.converged == before.converged
@@ -161,7 +162,7 @@ class TestContacts:
     @given(seed=seeds, share=st.sampled_from([0.12, 0.2, 0.35]), thickness=st.integers(2, 12))
     def test_noise_takes_more_rounds_than_one_halo_allows(self, seed: int, share: float, thickness: int) -> None:
         gray = np.random.default_rng(seed).random((64, size(16, 8), size(16, 8)))
-        study, slabs = Study(volume_of(gray), gray > 1 - share, 1 - share), Counted()
+        study, slabs = Study(volume_of(gray), gray > 1 - share, 1 - share), CountedSlabs()
         found = study.in_slabs(Cuts.every(64, thickness), slabs)
         assert slabs.grounds > 1
         assert_same(found, study)
@@ -175,7 +176,7 @@ class TestContacts:
         assert_same(outer.in_slabs(cuts_of(data, len(study.mask)), Shuffled(0)), outer)
 
 
-class Counted(InMemory):
+class CountedSlabs(InMemory):
     """Counts how often the slabs were looked at."""
 
     grounds = 0

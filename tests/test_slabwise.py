@@ -13,9 +13,13 @@ from hypothesis import strategies as st
 from conftest import law, seeds
 from tomomesh import Settings, Volume
 from tomomesh.errors import EmptyError, TomomeshError, UsageError
-from tomomesh.model.lazy import Held, LazyVoxels, in_memory
+from tomomesh.isosurface.run_mask import RunMask
+from tomomesh.model.lazy import ArraySource, LazyVoxels, in_memory
+from tomomesh.segmentation.otsu import otsu_threshold
+from tomomesh.segmentation.padding import beside
 from tomomesh.segmentation.slabwise.cut import Cutting
-from tomomesh.segmentation.slabwise.levels import TAILS, levels_in, levels_of
+from tomomesh.segmentation.slabwise.levels import TAILS, levels_of
+from tomomesh.segmentation.slabwise.sources import MaskVoxels, Placed
 from tomomesh.segmentation.study import lay_out, select_in
 from tomomesh.slabs.keep import InMemory, OnDisk
 from tomomesh.ways.choice import take_way
@@ -76,11 +80,10 @@ def label_maps(draw: st.DrawFn) -> NDArray[Any]:
     rng = np.random.default_rng(draw(seeds))
     labels = np.where(BALL, 1 + (COLUMNS > 8), 0) * draw(st.sampled_from([1, 3, 70_000]))
     labels[rng.random(SHAPE) < draw(st.sampled_from([0, 0.01]))] = 5
-    labels[:, :: draw(st.sampled_from([1, 2]))] *= 1
     labels[draw(st.sampled_from([slice(0), slice(4, 6), slice(1, None, 2)]))] = 0
     if draw(st.booleans()):
-        return labels.astype(np.float32) + np.float32(draw(st.sampled_from([0, 1e-5, 0.3]))) * (labels == 1)
-    return labels.astype(draw(st.sampled_from(["i4", "u4", "i8"])))
+        return np.asarray(labels + draw(st.sampled_from([0, 1e-5, 0.3])) * (labels == 1), np.float32)
+    return np.asarray(labels, draw(st.sampled_from(["i4", "u4", "i8"])))
 
 
 ASKED = st.fixed_dictionaries(
@@ -102,7 +105,7 @@ def kept(volume: Volume, asked: dict[str, Any], cutting: Cutting, labels: Volume
 
 def lazily(volume: Volume) -> Volume:
     """Have its voxels stay where they are until they are read."""
-    voxels: Any = LazyVoxels.of(Held(volume.voxels))
+    voxels: Any = LazyVoxels.of(ArraySource(volume.voxels))
     return replace(volume, voxels=voxels)
 
 
@@ -197,9 +200,26 @@ class TestSelection:
         with pytest.raises(UsageError, match="in memory alone"):
             kept(lazily(Volume.from_stored(labels, np.eye(4))), {"select": (1,), "fill_slices": True}, Cutting())
 
-    def test_nothing_in_the_window_names_the_range_of_the_whole(self) -> None:
+    @pytest.mark.parametrize("kind", ["i2", "f4"])
+    def test_nothing_in_the_window_names_the_range_of_the_whole(self, kind: str) -> None:
         with pytest.raises(EmptyError, match="between 0 and 1"):
-            kept(lazily(Volume.from_stored(BALL.astype(np.int16), np.eye(4))), {"lower": 7.0}, Cutting(range_of))
+            kept(lazily(Volume.from_stored(BALL.astype(kind), np.eye(4))), {"lower": 7.0}, Cutting(range_of))
+
+
+class TestPadding:
+    @pytest.mark.parametrize("kind", ["i2", "f4", "f8"])
+    @pytest.mark.parametrize("level", [0.4, -9.0])
+    @pytest.mark.parametrize("place", [SLICES < 4, SLICES > 8, COLUMNS > 12, ROWS < 3, CIRCLE])
+    def test_is_found_in_slabs_and_has_no_say(self, place: NDArray[np.bool_], level: float, kind: str) -> None:
+        noise = 0.06 * np.random.default_rng(4).normal(size=SHAPE)
+        levels = (np.where(place, level, BALL + noise) * (500 if kind == "i2" else 1)).astype(kind)
+        for cutting in (Cutting(whole), Cutting(range_of), Cutting(lambda shape: [0, 2, 10, shape[0]])):
+            for study in (Volume.from_stored(levels, np.eye(4)), lazily(Volume.from_stored(levels, np.eye(4)))):
+                found = kept(study, {}, cutting).value.chosen
+                assert found.counts.padding == np.count_nonzero(place)
+                assert found.lower == otsu_threshold(levels[~place])
+                background = np.where(place, levels[~place].min(), levels)
+                np.testing.assert_array_equal(in_memory(found.volume.voxels), background)
 
 
 def range_of(shape: tuple[int, ...]) -> range:
@@ -224,23 +244,73 @@ class TestBody:
     @law(25)
     @given(
         cutting=cuttings(), preset=st.sampled_from(["bone", "skin", "lung", "fat", None]), slices=st.integers(0, 2),
-        keep=st.sampled_from(["auto", "body", "all"]), padded=st.booleans(), edge=st.sampled_from([1.0, 4.0]),
+        keep=st.sampled_from(["auto", "body", "all"]), padded=st.booleans(), edge=st.sampled_from([0.7, 4.0]),
+        cells=st.sampled_from([20, 160]),
     )  # fmt: skip
     def test_of_a_head_on_a_table(
-        self, cutting: Cutting, preset: str | None, slices: int, keep: str, padded: bool, edge: float
+        self,
+        cutting: Cutting,
+        preset: str | None,
+        slices: int,
+        keep: str,
+        padded: bool,
+        edge: float,
+        cells: int,
     ) -> None:
         levels = head()
         levels[:, :2] = -3000 if padded else levels[:, :2]
         study = replace(Volume.from_stored(levels, np.diag([edge, edge, edge, 1.0])), unit="HU")
         asked = {"keep": keep, "slices": ("axial", "coronal", "sagittal")[slices]}
-        assert_the_same(study, asked | ({"preset": preset} if preset else {}), cutting)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("tomomesh.segmentation.body.CELLS", cells)
+            assert_the_same(study, asked | ({"preset": preset} if preset else {}), cutting)
+
+
+@st.composite
+def sides(draw: st.DrawFn, size: int) -> slice:
+    """Draw some of so many numbers, in either direction."""
+    numbers = range(size)[draw(st.slices(size))]
+    return slice(numbers.start, numbers.stop if numbers.stop >= 0 else None, numbers.step)
+
+
+class TestSources:
+    """Voxels that are made as they are read are those of the array that is made at once."""
+
+    @law(150)
+    @given(
+        low=st.tuples(*[st.integers(0, 4)] * 3), sizes=st.tuples(*[st.integers(1, 4)] * 3),
+        at=st.tuples(*[sides(8)] * 3), here=st.booleans(),
+    )  # fmt: skip
+    def test_of_voxels_in_a_larger_lattice(
+        self, low: tuple[int, ...], sizes: tuple[int, ...], at: tuple[slice, ...], here: bool
+    ) -> None:
+        inner = np.arange(1, 1 + np.prod(sizes)).reshape(sizes)
+        whole = np.zeros((8, 8, 8), inner.dtype)
+        whole[tuple(slice(a, a + size) for a, size in zip(low, sizes, strict=True))] = inner
+        placed = LazyVoxels.of(Placed(inner if here else LazyVoxels.of(ArraySource(inner)), low, (8, 8, 8)))
+        np.testing.assert_array_equal(placed[at].read(), whole[at])
+
+    @law(100)
+    @given(seed=seeds, at=st.tuples(sides(7), sides(6), sides(5)))
+    def test_of_masks_and_of_other_voxels(self, seed: int, at: tuple[slice, ...]) -> None:
+        mask = np.random.default_rng(seed).random((7, 6, 5)) < 0.5
+        drawn = LazyVoxels.of(MaskVoxels(RunMask.of([mask])))
+        np.testing.assert_array_equal(drawn[at].read(), mask[at].view(np.uint8))
+        made = Cutting(whole).of(drawn).made(numbered, np.int64).voxels
+        np.testing.assert_array_equal(made[at].read(), np.indices(mask.shape).sum(axis=0)[at] + mask[at])
+
+
+def numbered(levels: NDArray[Any], box: tuple[slice, ...]) -> NDArray[np.int64]:
+    """Add the numbers of slice, row and column to each voxel."""
+    places = np.ogrid[tuple(slice(side.start, side.stop, side.step) for side in box)]
+    return np.asarray(levels + sum(places), np.int64)
 
 
 class TestLevels:
     @law(150)
     @given(levels=grays(), cutting=cuttings(), level=st.integers(0, 11 * 16 * 17 - 1))
     def test_are_those_that_numpy_finds(self, levels: NDArray[Any], cutting: Cutting, level: int) -> None:
-        found = levels_in(cutting.of(levels))
+        found = cutting.of(levels).levels
         out = levels.flat[level]
         for ours, theirs in ((found, levels), (found.finite, levels[np.isfinite(levels)])):
             assert_levels(ours, theirs)
@@ -253,6 +323,15 @@ class TestLevels:
         bits = np.random.default_rng(1).integers(0, 256, 8 * 999, dtype=np.uint8)
         levels = bits.view(kind)
         assert_levels(levels_of(levels).finite, levels[np.isfinite(levels)])
+
+    @law(60)
+    @given(levels=grays(), cutting=cuttings(), every=st.integers(1, 40))
+    def test_some_beside_another_are_taken_in_even_steps(
+        self, levels: NDArray[Any], cutting: Cutting, every: int
+    ) -> None:
+        level = levels[0, 0, 0]
+        found = beside(level.item(), every, cutting.of(levels))
+        np.testing.assert_array_equal(found, levels[levels != level][::every])
 
     def test_longer_floats_and_truths_are_levels_too(self) -> None:
         assert levels_of(np.array([0.5, -1.5], np.longdouble)).ends == (-1.5, 0.5)

@@ -17,6 +17,7 @@ _HOMES = {
     "assess": "measure.report",
     "compare_with_study": "agreement.study",
     "fill_mesh": "measure.fill",
+    "memory_limit": "memory.limit",
     "phantom": "head_phantom",
     "read_mesh": "io",
     "read_points": "io",
@@ -40,6 +41,7 @@ __all__ = [
     "assess",
     "compare_with_study",
     "fill_mesh",
+    "memory_limit",
     "phantom",
     "read_mesh",
     "read_points",
@@ -60,6 +62,7 @@ if TYPE_CHECKING:
     from .label_surfaces import reconstruct_labels
     from .measure.fill import fill_mesh
     from .measure.report import assess
+    from .memory.limit import memory_limit
     from .model.mesh import TriMesh
     from .model.points import PointSet
     from .model.volume import Volume

@@ -20,7 +20,7 @@ GROUPS = ("network", "cubes", "fit")
 """Groups of parameters that a way must read for them to change anything."""
 BESIDE = ("seed",)
 """Parameters of other groups of which the same is true."""
-ALWAYS = ("filled", "way", "network", "space", "contours", "slices", "tolerance", "max_steps")
+ALWAYS = ("filled", "way", "network", "space", "contours", "slices", "tolerance", "max_steps", "shared_walls")
 """Parameters of those groups that choose the way or matter on each."""
 INSTEAD = {"largest": "--keep largest"}
 """Parameter to what does the same on the voxels of a study, whichever way it goes."""

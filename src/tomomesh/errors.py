@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import errno
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,6 +56,16 @@ class TomomeshError(Exception):
             f"Try: {hint}." if hint else "",
         ]
         super().__init__(" ".join(part for part in parts if part))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let other processes hand it on as it is, and not make another sentence of it."""
+        return _restored, (type(self), str(self), self.flags)
+
+
+def _restored(kind: type[TomomeshError], said: str, flags: tuple[str, ...]) -> TomomeshError:
+    error = kind("", flags=flags)
+    error.args = (said,)
+    return error
 
 
 def printable(text: str) -> str:

@@ -87,8 +87,9 @@ def _check(made: Surface) -> None:
 
 
 def _even(made: Surface, settings: Settings, progress: Progress) -> Stage[Surface]:
-    """Give the mesh even triangles, and no more faces than were asked for."""
-    return _remesh(made, settings, progress) if settings.run.even else Stage(made)
+    """Give the mesh even triangles, and no more faces than were asked for; not where neighbors share its faces."""
+    even = settings.run.even and not settings.cubes.shared_walls
+    return _remesh(made, settings, progress) if even else Stage(made)
 
 
 @timed("remesh")

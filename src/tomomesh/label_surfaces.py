@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from .errors import EmptyError, UsageError
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
     from .model.volume import Volume
     from .results import Surface
+    from .segmentation.study import LaidOut
     from .settings import Settings
 
 
@@ -55,6 +57,25 @@ class LabelSurfaces(Mapping[int, "Surface"]):
             )
         return numbers
 
+    def _with_walls(self, progress: Progress) -> LaidOut:
+        """Let the walls between all labels of the map come to rest, whichever of them are asked for."""
+        from .isosurface.walls.walls import walls_between
+
+        study, settings = self._study, self._settings
+        labels = study.labels
+        assert labels is not None
+        if labels.walls is not None:
+            return study
+        walls = walls_between(
+            labels,
+            settings.fit,
+            inside=study.inside,
+            divide=settings.cubes.divide,
+            threads=settings.run.threads,
+            progress=progress,
+        )
+        return replace(study, labels=replace(labels, walls=walls))
+
     def __iter__(self) -> Iterator[int]:
         return iter(dict.fromkeys(self._numbers))
 
@@ -71,6 +92,8 @@ class LabelSurfaces(Mapping[int, "Surface"]):
     def surface(self, number: int, progress: Progress) -> Surface:
         """Return the same, with a progress of its own."""
         settings = self._settings.replace(select=(number,))
+        if settings.cubes.shared_walls:
+            self._study = self._with_walls(progress)
         return reconstructed(lambda: self._study, settings, self._given, progress, kept=self._kept)
 
 
@@ -98,7 +121,8 @@ def reconstruct_labels(
     -------
     LabelSurfaces
         A mapping of labels to surfaces, to the byte those of `tomomesh.reconstruct` with this label alone. Each is
-        made when it is looked up, and raises then what `tomomesh.reconstruct` raises.
+        made when it is looked up, and raises then what `tomomesh.reconstruct` raises. With ``shared_walls`` they are
+        parts of one net over the walls between all labels of the map, whichever are looked up.
 
     Raises
     ------
@@ -115,5 +139,5 @@ def reconstruct_labels(
     >>> {label: surface.report["quality"]["closed"] for label, surface in found.items()}
     {2: True, 5: True}
     """
-    settings = settled(settings, changes)
+    settings = settled(settings, changes, every=True)
     return LabelSurfaces(lambda: (volume, labels), settings, progress, changes)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import ctypes
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from .effect import without_effect
+from .errors import UsageError
 from .finish import compare_with, finish
+from .memory.limit import memory_limit
 from .model.points import PointSet
 from .progress import Progress, silent
 from .segmentation.study import lay_out, select_in
@@ -26,7 +29,8 @@ if TYPE_CHECKING:
     from .model.mesh import TriMesh
     from .model.volume import Volume
     from .results import Segmentation, Surface
-    from .segmentation.study import LaidOut
+    from .segmentation.study import LaidOut, Selected
+    from .stage import Later
     from .ways.way import Way
 
 
@@ -123,13 +127,14 @@ def segment(
     settings = settled(settings, changes)
     progress("window", 0, 2)
     study = lay_out(volume, labels, settings, labelled=settings.window.select is not None)
-    return _segmented(study, settings, changes, progress)[0]
+    return _segmented(begun_on(study, settings, changes, progress), progress)
 
 
 def reconstruct_points(
     points: PointSet | NDArray[np.float64],
     settings: Settings | None = None,
     *,
+    memory: str | float | None = None,
     progress: Progress = silent,
     **changes: Any,
 ) -> Surface:
@@ -139,6 +144,9 @@ def reconstruct_points(
     ----------
     points : PointSet or (n, 3) array
         Positions; their order and repetitions change nothing.
+    memory : str or number, optional
+        Bytes, as ``"4GB"``, that the work is to take at most: see `tomomesh.memory_limit`, which may also be around
+        what comes before and after, as reading and writing.
     settings, progress, **changes
         As in `reconstruct`.
 
@@ -158,18 +166,35 @@ def reconstruct_points(
     >>> round(found.report["quality"]["volume_mm3"] / (4 / 3 * np.pi), 2)
     1.0
     """
+    settings = settled(settings, changes)
+    with memory_limit(memory):
+        made = _of_points(points, settings, changes, progress)
+    if memory is None:
+        return made
+    stages = (one if isinstance(one, Stage) else partial(_limited, memory, one) for one in made.stages)
+    return replace(made, stages=tuple(stages))
+
+
+def _of_points(
+    points: PointSet | NDArray[np.float64], settings: Settings, given: Collection[str], progress: Progress
+) -> Surface:
     from .printing.part import turned
     from .ways.clouds.points import take_points
 
-    settings = settled(settings, changes)
     cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)
     taken = take_points(cloud, settings)
     settings = replace(settings, printing=turned(settings.printing, cloud.frame))
-    begun = _begin(settings, changes, input=taken.value.input)
+    begun = _begin(settings, given, input=taken.value.input)
     made = begun.value.surface(taken.value, settings, progress)
     _give_back()
     done, later = finish(replace(made.value, place=taken.value.place), settings, progress)
     return replace(done.value, way=begun.value.name, settings=settings, stages=(taken, begun, made, done, *later))
+
+
+def _limited(memory: str | float, later: Later) -> Stage[Any]:
+    """Make a stage within a limit of memory."""
+    with memory_limit(memory):
+        return later()
 
 
 def reconstructed(
@@ -190,9 +215,14 @@ def reconstructed(
     kept : bool
         Whether all stages are kept.
     """
-    study = lay()
-    found, way, taken = _segmented(study, settings, given, progress)
-    del study
+    return finished(begun_on(lay(), settings, given, progress), progress, truth=truth, kept=kept)
+
+
+def finished(begun: Begun, progress: Progress, *, truth: TriMesh | None = None, kept: bool = True) -> Surface:
+    """Take a study whose way is known to a surface; see `reconstructed`."""
+    way, settings, taken = begun.way, begun.settings, begun.taken
+    found = _segmented(begun, progress)
+    del begun
     found = found if kept else found.without_voxels()
     _give_back()
     made = way.surface(found, taken, progress)
@@ -211,9 +241,13 @@ def _give_back() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
-def settled(settings: Settings | None, changes: dict[str, Any]) -> Settings:
-    """Return the settings of a run; refuse those whose packages are not installed."""
+def settled(settings: Settings | None, changes: dict[str, Any], *, every: bool = False) -> Settings:
+    """Return the settings of a run; refuse those whose packages are not installed, or that are for every label."""
     settings = (settings or Settings()).replace(**changes)
+    if settings.cubes.shared_walls and not every:
+        raise UsageError(
+            "walls are shared among all labels of a map", found="--shared-walls for one mesh", hint="--each-label"
+        )
     if settings.printing.asked:
         from .printing.part import require_printing
 
@@ -245,17 +279,41 @@ def laid_out(
     return lay_out(volume, labels, settings, labelled=labelled)
 
 
-def _segmented(
-    study: LaidOut, settings: Settings, given: Collection[str], progress: Progress
-) -> tuple[Segmentation[Any], Way, Settings]:
-    """Run stage one; return also the way that it takes, and the settings with nothing about that left open."""
+@dataclass(frozen=True)
+class Begun:
+    """A study of which it is known what is kept and which way it goes.
+
+    Attributes
+    ----------
+    kept : Selected
+    way : Way
+    settings, taken : Settings
+        As they were asked for, and with nothing about the way left open.
+    told : Stage
+        What there is to be told so far.
+    """
+
+    kept: Selected
+    way: Way
+    settings: Settings
+    taken: Settings
+    told: Stage[None]
+
+
+def begun_on(study: LaidOut, settings: Settings, given: Collection[str], progress: Progress) -> Begun:
+    """Choose the voxels of a study that was laid out, and the way to their surface; parameters as `reconstructed`."""
     kept = select_in(study, settings)
     progress("window", 1, 2)
     taken = take_way(kept.value, settings)
     progress("window", 2, 2)
     begun = _begin(taken.value, given, input=_input_of(study.volume))
-    way = begun.value
+    return Begun(kept.value, begun.value, settings, taken.value, folded(None, begun, taken, kept))
+
+
+def _segmented(begun: Begun, progress: Progress) -> Segmentation[Any]:
+    """Run stage one."""
+    way = begun.way
     assert way.segment is not None
-    found = way.segment(kept.value, taken.value, progress)
-    stages = (folded(None, begun, taken, kept, found), *found.value.stages)
-    return replace(found.value, way=way.name, settings=settings, stages=stages), way, taken.value
+    found = way.segment(begun.kept, begun.taken, progress)
+    stages = (folded(None, begun.told, found), *found.value.stages)
+    return replace(found.value, way=way.name, settings=begun.settings, stages=stages)

@@ -100,14 +100,15 @@ def refuse_for_one(chosen: Namespace) -> None:
     ------
     UsageError
     """
-    given = [name for name in ("force", "workers", "scheduler") if getattr(chosen, name) not in (None, False)]
-    if given:
-        raise UsageError("this option is for many studies", found=f"--{given[0]} without --each", hint="--each")
+    if chosen.force:
+        raise UsageError("this option is for many studies", found="--force without --each", hint="--each")
 
 
 def _checked(chosen: Namespace, settings: Settings) -> Path:
     """Return the folder of the results; refuse what does not go with many studies."""
     refuse_with("--each", SINGLE, chosen)
+    if settings.cubes.shared_walls:
+        raise UsageError("walls are shared among the labels of one map", found="--shared-walls", hint="--each-label")
     if not isinstance(chosen.study, str):
         raise UsageError("there is no folder of studies", expected="one STUDY, with --each")
     check_workers(chosen)

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from .. import io
 from ..errors import UsageError, printable
+from ..memory.limit import memory_limit
 from ..settings import Settings, option_of, parameters
 from . import summary
 from .against import compared, is_mesh
 from .bars import Bars, bars_of
 from .batch import reconstruct_each, refuse_for_one
 from .each_label import reconstruct_each_label
+from .large import is_large, reconstruct_in_slabs
 from .options.likely import require_kind
 from .outputs.checks import (
     OF_STUDIES,
@@ -99,7 +101,10 @@ def _reconstruct(chosen: Namespace) -> None:
         reconstruct_each_label(chosen, settings, given_of(chosen), _reconstruct_one)
         return
     refuse_for_one(chosen)
-    surface = _reconstruct_one(chosen, settings)
+    if is_large(chosen):
+        surface = reconstruct_in_slabs(chosen, settings, given_of(chosen))
+    else:
+        surface = _reconstruct_one(chosen, settings)
     _tell(chosen, surface.report, summary.of_surface(surface.report, _shown(chosen)))
 
 
@@ -148,13 +153,14 @@ def _surface(chosen: Namespace) -> None:
     check_outputs(chosen, io.MESH_WRITERS, chosen.cloud)
     from ..pipeline import reconstruct_points
 
-    with Bars(quiet=chosen.quiet) as progress:
+    with memory_limit(chosen.memory), Bars(quiet=chosen.quiet) as progress:
         progress("read", 0, 1)
         points = io.read_points(chosen.cloud, settings=settings.cloud)
         progress("read", 1, 1)
         surface = reconstruct_points(points, settings, progress=progress, **given_of(chosen))
         surface = write_surface(chosen, surface, settings, progress)
-    _tell(chosen, surface.report, summary.of_surface(surface.report, _shown(chosen)))
+        report = surface.report
+    _tell(chosen, report, summary.of_surface(report, _shown(chosen)))
 
 
 def _network(chosen: Namespace) -> None:

@@ -1,14 +1,19 @@
-"""Every label of a label map as a mesh of its own: the map is read once, and each label is a study of a batch."""
+"""Every label of a label map as a mesh of its own: the map is read once, and each label is a study of a batch.
+
+Where workers make them each reads the map once, and keeps it for the labels that it is given.
+"""
 
 from __future__ import annotations
 
 from argparse import Namespace
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 from .. import io
-from ..errors import GeometryError, TomomeshError
+from ..errors import GeometryError, TomomeshError, UsageError
 from ..io.studies.naming import safe_name
 from .bars import bars_of
 from .batch import check_results, do_all, done, refuse_with
@@ -16,21 +21,23 @@ from .outputs.checks import check_archive
 from .outputs.write import write_surface
 from .records import COLUMNS, row_of_fault
 from .sources import names_of, read_study, sources_of
-from .spread import Batch
+from .spread import Batch, check_workers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from ..label_surfaces import LabelSurfaces
     from ..model.volume import Volume
+    from ..progress import Progress
     from ..results import Surface
     from ..settings import Settings
     from .batch import Work
     from .records import Row
 
-    Made = tuple[Sequence[int], Callable[[int, Namespace, Settings], Surface]]
+    Make = Callable[[int, Namespace, Settings], Surface]
 
 OPTION = "--each-label"
-SINGLE = ("each", "workers", "scheduler", "points", "labels", "mask_out", "figures", "report")
+SINGLE = ("each", "points", "labels", "mask_out", "figures", "report")
 """Options that have no place beside labels that are each a mesh."""
 
 
@@ -55,17 +62,27 @@ def reconstruct_each_label(chosen: Namespace, settings: Settings, given: Mapping
     TomomeshError
         Where there is no label map, and for options that are for one mesh.
     """
-    refuse_with(OPTION, SINGLE, chosen)
-    settings.replace(select=(0,))  # refuses another window
-    sources = sources_of(chosen, settings)
-    folder = check_results(OPTION, chosen, settings)
+    folder, sources = _checked(chosen, settings), sources_of(chosen, settings)
     names = names_of(chosen.label_names, chosen.labels_in or chosen.study)
     numbers, make = _labels(chosen, settings, given, work)
     files = tuple(file for source in sources for file in io.files_of(Path(source)))
     studies = [io.Study(_file_name(number, names), Path(sources[0]), None, files) for number in numbers]
     labels = {study.name: number for study, number in zip(studies, numbers, strict=True)}
     columns = (COLUMNS[0], "label", "label_name", *COLUMNS[1:])
-    do_all(Batch(studies, chosen, settings, folder, _Done(labels, names, make), columns, "labels"))
+    try:
+        do_all(Batch(studies, chosen, settings, folder, _Done(labels, names, make), columns, "labels"))
+    finally:
+        _KEPT.clear()
+
+
+def _checked(chosen: Namespace, settings: Settings) -> Path:
+    """Return the folder of the results; refuse what no label could have, before anything is read."""
+    from ..ways import choose_way, way_of
+
+    refuse_with(OPTION, SINGLE, chosen)
+    check_workers(chosen)
+    way_of(choose_way(settings.replace(select=(0,)), "gray")).require(settings)  # no other window than labels
+    return check_results(OPTION, chosen, settings)
 
 
 def _file_name(number: int, names: Mapping[int, str]) -> str:
@@ -79,7 +96,7 @@ class _Done:
 
     labels: Mapping[str, int]
     names: Mapping[int, str]
-    make: Callable[[int, Namespace, Settings], Surface]
+    make: Make
 
     def __call__(self, study: io.Study, chosen: Namespace, settings: Settings, folder: Path) -> Row:
         number = self.labels[study.name]
@@ -91,30 +108,77 @@ class _Done:
         return done(study, chosen, settings, folder, lambda *asked: self.make(number, *asked)) | label
 
 
-def _labels(chosen: Namespace, settings: Settings, given: Mapping[str, Any], work: Work) -> Made:
+def _labels(chosen: Namespace, settings: Settings, given: Mapping[str, Any], work: Work) -> tuple[Sequence[int], Make]:
     """Return the labels, and what makes the surface of one."""
+    read = {name: _absolute(getattr(chosen, name)) for name in ("study", "labels_in")}
+    made = _InOnePass(chosen, settings, given, uuid4().hex)
     try:
-        return _in_one_pass(chosen, settings, given)
+        with bars_of(chosen) as progress:
+            numbers = tuple(made.found(progress))
+        if chosen.workers or chosen.scheduler:
+            _KEPT.clear()  # each of them reads it
+        return numbers, replace(made, chosen=Namespace(**vars(chosen) | read))
     except GeometryError as fault:
         if "--select" not in fault.flags:
             raise
+    if settings.cubes.shared_walls:
+        raise UsageError("labels that overlap share no walls", found="--shared-walls", hint="no --shared-walls")
     # segments overlap: no one label map holds them, and each is read alone
     numbers = settings.window.select or tuple(sorted(names_of(None, chosen.labels_in or chosen.study)))
-    return numbers, lambda _number, asked, own: work(Namespace(**vars(asked) | {"study": chosen.study}), own)
+    return numbers, _EachAlone(read, work)
 
 
-def _in_one_pass(chosen: Namespace, settings: Settings, given: Mapping[str, Any]) -> Made:
-    from ..label_surfaces import LabelSurfaces
+def _absolute(named: str | tuple[str, ...] | None) -> str | tuple[str, ...] | None:
+    """Name files as workers find them, wherever these were started."""
+    if isinstance(named, tuple):
+        return tuple(str(Path(one).absolute()) for one in named)
+    return named and str(Path(named).absolute())
 
-    def read() -> tuple[Volume, Volume | None]:
-        volume, labels = read_study(chosen, settings.replace(select=None), progress)
-        check_archive(chosen, volume)
-        return volume, labels
 
-    def make(number: int, asked: Namespace, own: Settings) -> Surface:
+@dataclass(frozen=True)
+class _EachAlone:
+    """Reads the map for each label anew."""
+
+    read: dict[str, Any]
+    work: Work
+
+    def __call__(self, number: int, asked: Namespace, own: Settings) -> Surface:
+        return self.work(Namespace(**vars(asked) | self.read), own)
+
+
+@dataclass(frozen=True)
+class _InOnePass:
+    """Makes the surface of any label of a map, which is read when the first one of a run is asked for."""
+
+    chosen: Namespace
+    settings: Settings
+    given: Mapping[str, Any]
+    run: str
+
+    def __call__(self, number: int, asked: Namespace, own: Settings) -> Surface:
         with bars_of(asked) as progress:
-            return write_surface(asked, found.surface(number, progress), own, progress)
+            return write_surface(asked, self.found(progress).surface(number, progress), own, progress)
 
-    with bars_of(chosen) as progress:
-        found = LabelSurfaces(read, settings, progress, given, kept=False)
-    return tuple(found), make
+    def found(self, progress: Progress) -> LabelSurfaces:
+        """Return the labels of this run, which its process keeps until it works for another one."""
+        with _READING:
+            if self.run not in _KEPT:
+                _KEPT.clear()
+                _KEPT[self.run] = self._found(progress)
+            return _KEPT[self.run]
+
+    def _found(self, progress: Progress) -> LabelSurfaces:
+        from ..label_surfaces import LabelSurfaces
+
+        def read() -> tuple[Volume, Volume | None]:
+            volume, labels = read_study(self.chosen, self.settings.replace(select=None), progress)
+            check_archive(self.chosen, volume)
+            return volume, labels
+
+        return LabelSurfaces(read, self.settings, progress, self.given, kept=False)
+
+
+_KEPT: dict[str, LabelSurfaces] = {}
+"""Run to its labels: of one run at most."""
+_READING = Lock()
+"""Held while a map is read: a worker may have threads."""

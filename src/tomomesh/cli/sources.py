@@ -13,12 +13,14 @@ from ..errors import UnreadableError, UsageError
 from ..io.names import shown
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
     from numpy.typing import NDArray
 
     from ..model.volume import Volume
+    from ..progress import Progress
     from ..settings import Settings
-    from .bars import Bars
 
 
 ALL = "all"
@@ -119,13 +121,24 @@ def sources_of(chosen: Namespace, settings: Settings) -> list[str]:
     return sources
 
 
-def read_study(chosen: Namespace, settings: Settings, progress: Bars) -> tuple[Volume, Volume | None]:
+def read_study(chosen: Namespace, settings: Settings, progress: Progress) -> tuple[Volume, Volume | None]:
     """Read the study, and the label map where there is one beside it."""
+    return _both(io.read_volume, chosen, settings, progress)
+
+
+def open_study(chosen: Namespace, settings: Settings, progress: Progress) -> tuple[Volume, Volume | None]:
+    """Open what `read_study` reads, to be read slab by slab."""
+    return _both(io.open_study, chosen, settings, progress)
+
+
+def _both(
+    read: Callable[..., Volume], chosen: Namespace, settings: Settings, progress: Progress
+) -> tuple[Volume, Volume | None]:
     total = 2 if chosen.study and chosen.labels_in else 1
     progress("read", 0, total)
     select = settings.window.select
-    volume = io.read_volume(chosen.study or chosen.labels_in, settings=settings.read, select=select)
-    labels = io.read_volume(chosen.labels_in, settings=settings.read, select=select) if total == 2 else None
+    volume = read(chosen.study or chosen.labels_in, settings=settings.read, select=select)
+    labels = read(chosen.labels_in, settings=settings.read, select=select) if total == 2 else None
     progress("read", total, total)
     return volume, labels
 

@@ -116,7 +116,8 @@ def _need(study: io.Study, settings: Settings) -> float:
 def _row(result: Any, name: str, chosen: Namespace) -> Row:
     """Return a study's row, where files are named as they were typed, not by the full paths that workers are given."""
     row: Row = row_of_fault(name, result) if isinstance(result, TomomeshError) else result
-    for path in map(Path, (chosen.study, chosen.output)):
+    named = (chosen.study, chosen.labels_in, chosen.output)
+    for path in (Path(one) for one in named if isinstance(one, str)):
         if not path.is_absolute():
             full, typed = (printable(str(one)) for one in (Path.cwd() / path, path))
             error = row["error"].replace(f"{full}/", "" if path == Path() else f"{typed}/")
@@ -163,7 +164,7 @@ class _Shown:
         size, self._sized = _need(study, self._batch.settings), self._sized + 1
         self._bars("headers", self._sized, len(self._batch.studies))
         if self._sized == len(self._batch.studies):
-            self._bars("studies", 0, self._sized)
+            self._bars(self._batch.of, 0, self._sized)
         return size
 
     def hear(self, number: int, stage: str, done: int, total: int) -> None:
@@ -181,7 +182,7 @@ class _Shown:
         """Count a study that is over."""
         self._over.add(number)
         self._tell()
-        self._bars("studies", len(self._over), len(self._batch.studies))
+        self._bars(self._batch.of, len(self._over), len(self._batch.studies))
 
     def _tell(self) -> None:
         words = [words for number, words in sorted(self._underway.copy().items()) if number not in self._over]

@@ -14,13 +14,15 @@ from .files.atomic import check_output, replacing
 from .frames import LENGTHS, RAS_ALONE, Frame, frame_in_file, frame_of_study, in_lps
 from .meshes.encapsulated import ARCHIVED, check_archived, is_archived, write_encapsulated
 from .meshes.frame import frame_of_file
+from .meshes.pieces.files import write_pieces
+from .meshes.pieces.neuroglancer import write_neuroglancer
 from .meshes.read import MESH_READERS, read_mesh
-from .meshes.write import MESH_WRITERS, keeps, write_mesh
+from .meshes.write import MESH_WRITERS, PART_WRITERS, keeps, write_mesh
 from .studies.folder import Study, files_of, find_studies
 from .studies.label_names import label_names
 from .studies.label_tables import read_label_names
 from .studies.listing import list_series
-from .studies.read import VOLUME_READERS, read_volume
+from .studies.read import VOLUME_READERS, open_study, read_volume
 from .studies.size import voxel_bytes
 from .volumes.images import read_picture
 from .volumes.labels import LABEL_WRITERS, write_labels
@@ -31,6 +33,7 @@ __all__ = [
     "LENGTHS",
     "MESH_READERS",
     "MESH_WRITERS",
+    "PART_WRITERS",
     "POINT_READERS",
     "POINT_WRITERS",
     "RAS_ALONE",
@@ -51,6 +54,7 @@ __all__ = [
     "keeps",
     "label_names",
     "list_series",
+    "open_study",
     "read_label_names",
     "read_mesh",
     "read_picture",
@@ -63,6 +67,8 @@ __all__ = [
     "write_encapsulated",
     "write_labels",
     "write_mesh",
+    "write_neuroglancer",
+    "write_pieces",
     "write_points",
     "write_settings",
     "write_table",

@@ -39,9 +39,13 @@ def write_document(data: Mapping[str, Any], path: str | Path) -> None:
     OutputError
         Where the file cannot be written.
     """
-    text = json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False)
     with replacing(path) as file:
-        file.write(f"{text}\n".encode())
+        file.write(json_of(data))
+
+
+def json_of(data: Mapping[str, Any]) -> bytes:
+    """Return a report as JSON, see `write_document`."""
+    return f"{json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False)}\n".encode()
 
 
 def write_table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], path: str | Path) -> None:

@@ -12,7 +12,7 @@ from ..dynamics.iterate import iterate
 from ..kernels.isosurface.surface_nets import draw_out, move_in_cells
 from ..model.trace import Motion
 from ..progress import Progress, silent
-from .means import BLOCK, means, over, whole
+from .means import BLOCK, over, whole
 from .rings import SOFTEST, Rings, resistance
 from .thin import GIVEN_BACK, given_back
 
@@ -76,7 +76,7 @@ def settle(
     -------
     NetFit
     """
-    start = means(crossings.positions, net.fans, threads)
+    start = net.goals(crossings.positions, threads)
     steps = _NetSteps(net, Rings.of(net, threads), crossings, start, settings, threads)
     state, trace = iterate(steps, settings.max_steps, progress)
     return NetFit(start, state.position, trace)

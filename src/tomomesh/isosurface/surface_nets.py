@@ -9,7 +9,7 @@ import numpy as np
 
 from ..cuberille.neighbors import DIRECTIONS
 from ..kernels.isosurface.voxels import link_cells, list_borders, list_faces, list_fans
-from .means import over
+from .means import means, over
 from .well_composed import CORNERS, surface_cells
 
 if TYPE_CHECKING:
@@ -70,6 +70,15 @@ class Net:
     def steps(self) -> NDArray[np.int32]:
         """Steps from the voxels inside to those outside, (q, 3)."""
         return steps_of(self.directions)
+
+    @property
+    def corners(self) -> NDArray[np.int32]:
+        """The corners of each square that no other surface goes through, (q, 4): all of them."""
+        return self.quads
+
+    def goals(self, places: NDArray[np.float64], threads: int) -> NDArray[np.float64]:
+        """Return where the vertices are drawn to whose squares are drawn to places (q, 3): to their mean."""
+        return means(places, self.fans, threads)
 
 
 def net_around(

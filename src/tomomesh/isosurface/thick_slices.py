@@ -150,7 +150,7 @@ def thinned(levels: Levels, mask: Mask, affine: NDArray[np.float64], threads: in
     parts = parts_within(content, mixed, index, columns, times, threads)
     thin = Levels(Columns(whole, index, parts, axis), bounds.lower, bounds.upper)
     kept = np.moveaxis(_kept(content, turned, columns, parts), 0, axis)
-    fine = _finer(affine, along, times)
+    fine = finer(affine, along, times)
     return Thinned(thin, np.ascontiguousarray(kept), fine, times, content.of_mask, content.bending)
 
 
@@ -193,7 +193,7 @@ def _kept(content: Content, mask: Mask, columns: Index, parts: Values) -> Mask:
     return thin.reshape(-1, *mask.shape[1:])
 
 
-def _finer(affine: NDArray[np.float64], along: int, times: int) -> NDArray[np.float64]:
+def finer(affine: NDArray[np.float64], along: int, times: int) -> NDArray[np.float64]:
     """Return where the parts of voxels are."""
     fine = affine.copy()
     fine[:3, along] /= times

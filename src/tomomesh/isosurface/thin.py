@@ -77,5 +77,5 @@ def given_back(
     )  # fmt: skip
     for left in range(ROUNDS, 0, -1):
         around = means(lost, net.fans, threads, vertices(left))
-        lost = means(around, net.quads, threads, squares(left - 1))
+        lost = means(around, net.corners, threads, squares(left - 1))
     return np.where(thin, lost, 0.0)

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .shape import MeshExtent, unfolded
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -27,13 +29,17 @@ class Components:
     def __init__(self, links: Links, areas: Floats, volumes: Floats, lengths: Floats) -> None:
         """Start with what the adjacency, areas (m,), volumes (m,) and edge lengths (e,) tell."""
         self._piece, self._count = links.face_pieces, links.pieces
-        total = self._sums(areas)
+        extent = MeshExtent.of(links)
+        total, enclosed = (
+            unfolded(sums(values, self._piece, self._count))
+            for sums, values in ((extent.areas, areas), (extent.volumes, volumes))
+        )
         self._largest = np.argsort(-total, kind="stable")[:LISTED]
         self._columns: dict[str, list[Any]] = {
-            "faces": self._sums()[self._largest].tolist(),
+            "faces": self._faces()[self._largest].tolist(),
             "area_mm2": total[self._largest].tolist(),
         }
-        self._add_topology(links, self._sums(volumes)[self._largest].tolist())
+        self._add_topology(links, enclosed[self._largest].tolist())
         self._add_edges(self._grouped(lengths, links.edge_pieces))
 
     def add_crossing(self, crossing: NDArray[np.bool_]) -> None:
@@ -58,7 +64,7 @@ class Components:
         borders = np.bincount(self._piece[links.borders // 3], minlength=self._count)[self._largest]
         loops = np.bincount(self._piece[links.fans_and_loops[1] // 3], minlength=self._count)
         vertices = np.bincount(links.vertex_pieces[links.used], minlength=self._count)
-        euler = vertices - np.bincount(links.edge_pieces, minlength=self._count) + self._sums()
+        euler = vertices - np.bincount(links.edge_pieces, minlength=self._count) + self._faces()
         self._columns["volume_mm3"] = [None if b else v for b, v in zip(borders, volumes, strict=True)]
         self._columns["genus"] = (1 - (euler + loops) // 2)[self._largest].tolist()
         self._columns["boundary_edges"] = borders.tolist()
@@ -69,9 +75,9 @@ class Components:
         self._columns["median_edge_mm"] = [float(np.median(own)) for own in lengths]
         self._columns["longest_edge_mm"] = [float(own.max()) for own in lengths]
 
-    def _sums(self, weights: Floats | None = None) -> NDArray[Any]:
-        """Count the faces of each component, or add up what they weigh."""
-        return np.bincount(self._piece, weights, self._count)
+    def _faces(self) -> NDArray[np.int64]:
+        """Count the faces of each component."""
+        return np.bincount(self._piece, minlength=self._count)
 
     def _grouped(self, values: Floats, piece: Ints) -> list[Floats]:
         """Return the values that belong to each of the largest components."""

@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from ..kernels.measure.edges import count_misoriented, join_borders, join_corners, join_vertices, order_half_edges
+from ..model.columns import for_kernels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..model.mesh import TriMesh
-
     Ints = NDArray[np.int32]
+
+
+class Triangles(Protocol):
+    """What has vertices (n, 3) and faces (m, 3): a mesh, or a part of one."""
+
+    @property
+    def vertices(self) -> NDArray[np.float64]:
+        """Positions."""
+
+    @property
+    def faces(self) -> NDArray[np.integer[Any]]:
+        """Vertex numbers."""
 
 
 class Links:
@@ -28,16 +39,16 @@ class Links:
     faces : (m, 3) int32 array
     """
 
-    def __init__(self, mesh: TriMesh) -> None:
-        self.vertices = np.ascontiguousarray(mesh.vertices, np.float64)
-        self.faces = np.ascontiguousarray(mesh.faces, np.int32)
+    def __init__(self, mesh: Triangles) -> None:
+        self.vertices = for_kernels(mesh.vertices, np.float64)
+        self.faces = for_kernels(mesh.faces, np.int32)
 
     @cached_property
     def edges(self) -> tuple[Ints, Ints]:
         """Half edges, those of one undirected edge beside each other, (3 m,); and where each edge begins, (e + 1,)."""
         order = np.empty(self.faces.size, np.int32)
         first = np.empty(self.faces.size + 1, np.int32)
-        count = order_half_edges(self.faces, len(self.vertices), order, first)
+        count = order_half_edges(self.faces, len(self.vertices), order, first, np.empty_like(order))
         return order, first[: count + 1].copy()
 
     @cached_property

@@ -12,7 +12,7 @@ from ..kernels.measure.positions import first_equal
 from ..model.columns import any_of
 from ..model.mesh import TriMesh
 from .links import Links
-from .shape import areas_and_volumes
+from .shape import MeshExtent, areas_and_volumes, unfolded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -92,7 +92,7 @@ def topology_of(links: Links, volumes: NDArray[np.float64], *, cavities: int = 0
     """Count what `topology` counts, from the adjacency of a mesh and the volumes (m,) under its faces."""
     vertices, (fans, loops) = int(links.used.sum()), links.fans_and_loops
     euler = vertices - len(links.uses) + len(links.faces)
-    inward = np.bincount(links.face_pieces, volumes, links.pieces) < 0
+    inward = unfolded(MeshExtent.of(links).volumes(volumes, links.face_pieces, links.pieces)) < 0
     inward[links.face_pieces[links.borders // 3]] = False
     return Topology(
         components=links.pieces,
@@ -144,12 +144,30 @@ def check_promise(mesh: TriMesh, *, cavities: int = 0, open_: bool = False) -> N
     InternalCheckError
         Naming what was found.
     """
-    if not np.isfinite(mesh.vertices).all():
+    require_finite(finite=bool(np.isfinite(mesh.vertices).all()))
+    coincident = len(mesh.vertices) - distinct_positions(mesh, np.float64)
+    require_promise(topology(mesh, cavities=cavities), coincident, open_=open_)
+
+
+def require_finite(*, finite: bool) -> None:
+    """Refuse a mesh whose vertices are not all finite."""
+    if not finite:
         raise InternalCheckError("the mesh has vertices that are not finite", expected="finite coordinates")
-    found = {name: count for name, count in topology(mesh, cavities=cavities).faults.items() if count}
+
+
+def require_promise(counts: Topology, coincident: int, *, open_: bool = False) -> None:
+    """Refuse what was counted on a mesh that does not hold its promise, see `check_promise`.
+
+    Parameters
+    ----------
+    counts : Topology
+    coincident : int
+        Vertices at the position of another.
+    open_ : bool
+    """
+    found = {name: count for name, count in counts.faults.items() if count}
     if open_:
         found.pop("boundary_edges", None)
-    coincident = len(mesh.vertices) - distinct_positions(mesh, np.float64)
     found |= {"vertices at the position of another": coincident} if coincident else {}
     if found:
         raise InternalCheckError(

@@ -161,13 +161,18 @@ def _along_curve(vertices: Floats, simplices: Ints, threads: int) -> Ints:
     span = max(float((high - low).max()), 1e-300)
     usual = max(float(np.median(np.ptp(some, axis=1).max(axis=1))), 1e-9 * span)
     low, side = low - span, 3 * span
-    keys = np.empty(len(simplices), np.int64)
+    keys = np.empty((2, len(simplices)), np.int64)
     in_blocks(
-        lambda start, stop: curve_keys(vertices, simplices, low, side, usual, keys, start, stop),
+        lambda start, stop: curve_keys(vertices, simplices, low, side, usual, keys[0], start, stop),
         len(simplices),
         block=BLOCK,
         threads=threads,
     )
-    order = np.empty(len(simplices), np.int32)
+    return sort_keys(keys)
+
+
+def sort_keys(keys: NDArray[np.int64]) -> Ints:
+    """Sort the first row of keys (2, m), where the second is room to work in, and return their order, (m,)."""
+    order = np.empty(keys.shape, np.int32)
     order_keys(keys, order)
-    return order
+    return np.array(order[0])  # without the room

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NoReturn, Protocol
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeVar
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
@@ -14,6 +15,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import DTypeLike, NDArray
+
+
+SLAB_BYTES = 2**26
+"""Bytes of voxels that are read together where all are gone through: as many as `io.files.numbers` maps together."""
 
 
 class Stored(Protocol):
@@ -29,6 +34,10 @@ class Stored(Protocol):
     @property
     def dtype(self) -> np.dtype[Any]:
         """Of the numbers that `read` returns."""
+
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Sizes along all axes of what is read together, however little of it is wanted."""
 
     def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Return the numbers of a part, a new array: a slice an axis, none of them empty, of steps above 0."""
@@ -56,6 +65,11 @@ class Mapped:
         """Sizes of all axes."""
         return self.inner.shape
 
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Sizes of what is read together."""
+        return self.inner.chunks
+
     def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Return the numbers of a part."""
         return self.function(self.inner.read(box)).astype(self.dtype, copy=False)
@@ -78,8 +92,8 @@ class LazyVoxels(NDArrayOperatorsMixin):
     Examples
     --------
     >>> import numpy as np
-    >>> from tomomesh.model.lazy import Held, LazyVoxels
-    >>> stored = LazyVoxels.of(Held(np.arange(24).reshape(4, 3, 2)))
+    >>> from tomomesh.model.lazy import ArraySource, LazyVoxels
+    >>> stored = LazyVoxels.of(ArraySource(np.arange(24).reshape(4, 3, 2)))
     >>> part = stored.transpose((2, 0, 1))[:, ::-1]
     >>> part.shape, part[1].tolist()
     ((2, 4, 3), [[19, 21, 23], [13, 15, 17], [7, 9, 11], [1, 3, 5]])
@@ -109,6 +123,11 @@ class LazyVoxels(NDArrayOperatorsMixin):
         """Of the numbers."""
         return self.source.dtype
 
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Sizes along the axes of what is read together."""
+        return tuple(self.source.chunks[axis] for axis in self.order)
+
     def __len__(self) -> int:
         return self.shape[0]
 
@@ -127,16 +146,18 @@ class LazyVoxels(NDArrayOperatorsMixin):
         return replace(self, source=Mapped(self.source, function, np.dtype(dtype)))
 
     def __getitem__(self, key: Any) -> Any:
-        """Return a view of a part for slices, the first axis first; for a number, that slice itself, read."""
-        if isinstance(key, (int, np.integer)):
-            count = len(self)
-            if not -count <= key < count:  # as a sequence it ends here
-                raise IndexError(key)
-            return self[key % count : key % count + 1].read()[0]
+        """Return a view of a part for slices, the first axis first; with a number among them, that part, read."""
+        parts = key if isinstance(key, tuple) else (key,)
+        if len(parts) > self.ndim or not all(isinstance(part, (int, np.integer, slice)) for part in parts):
+            self._refused()
         ranges = list(self.ranges)
-        for axis, part in zip(self.order, key if isinstance(key, tuple) else (key,), strict=False):
-            ranges[axis] = ranges[axis][part]
-        return replace(self, ranges=tuple(ranges))
+        for axis, part in zip(self.order, parts, strict=False):
+            side = ranges[axis]
+            ranges[axis] = side[part] if isinstance(part, slice) else range(side[part], side[part] + 1)
+        view = replace(self, ranges=tuple(ranges))
+        if all(isinstance(part, slice) for part in parts):
+            return view
+        return view.read()[tuple(slice(None) if isinstance(part, slice) else 0 for part in parts)]
 
     def read(self) -> NDArray[Any]:
         """Read all of the view."""
@@ -163,16 +184,23 @@ class LazyVoxels(NDArrayOperatorsMixin):
         raise AttributeError(name)
 
 
+Voxels = TypeVar("Voxels", "NDArray[Any]", LazyVoxels)
+"""Voxels of one kind in, and of the same kind out."""
+
+
 @dataclass(frozen=True)
-class Held:
+class ArraySource:
     """An array in memory, or whatever takes slices as one does, as what is stored.
 
     Attributes
     ----------
     array : array
+    chunks : tuple of int
+        Sizes of what is read together.
     """
 
     array: Any
+    chunks: tuple[int, ...] = ()
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -190,9 +218,23 @@ class Held:
         return np.array(self.array[box])
 
 
+def layer_of(voxels: Voxels, number: int) -> Voxels:
+    """Return a view of one layer (K, J, I) of voxels (K, J, I, L)."""
+    return voxels.layer(number) if isinstance(voxels, LazyVoxels) else voxels[..., number]
+
+
 def in_memory(voxels: NDArray[Any] | LazyVoxels) -> NDArray[Any]:
     """Return voxels as an array: read where they lie in a file, else as they are."""
     return voxels.read() if isinstance(voxels, LazyVoxels) else voxels
+
+
+def slabs(voxels: Voxels) -> list[Voxels]:
+    """Cut voxels along their first axis: an array not at all, others by `SLAB_BYTES`, in whole chunks if any fits."""
+    if not isinstance(voxels, LazyVoxels):
+        return [voxels]
+    depth = max(SLAB_BYTES // max(math.prod(voxels.shape[1:]) * voxels.dtype.itemsize, 1), 1)
+    depth -= depth % min(voxels.chunks[0], depth)
+    return [voxels[start : start + depth] for start in range(0, len(voxels), depth)]
 
 
 def _rising(side: range) -> slice:

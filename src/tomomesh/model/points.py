@@ -109,19 +109,20 @@ class PointSet:
     def __len__(self) -> int:
         return len(self.positions)
 
-    def joined(self, other: PointSet) -> PointSet:
-        """Append the points of another set; attributes that only one of them has are dropped."""
-        both = {
-            name: np.concatenate([values, other.attributes[name]])
+    def joined(self, *others: PointSet) -> PointSet:
+        """Append the points of other sets; attributes that not all of them have are dropped."""
+        sets = (self, *others)
+        shared = {
+            name: [one.attributes[name] for one in sets]
             for name, values in self.attributes.items()
-            if name in other.attributes and other.attributes[name].shape[1:] == values.shape[1:]
+            if all(name in one.attributes and one.attributes[name].shape[1:] == values.shape[1:] for one in others)
         }
         return PointSet(
-            np.concatenate([self.positions, other.positions]),
-            np.concatenate([self.slices, other.slices]),
-            np.concatenate([self.neurons, other.neurons]),
-            np.concatenate([self.kinds, other.kinds]),
-            both,
+            np.concatenate([one.positions for one in sets]),
+            np.concatenate([one.slices for one in sets]),
+            np.concatenate([one.neurons for one in sets]),
+            np.concatenate([one.kinds for one in sets]),
+            {name: np.concatenate(columns) for name, columns in shared.items()},
             self.frame,
             self.notes,
             self.unit,

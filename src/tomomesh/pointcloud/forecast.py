@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import ResourceError
+from ..memory.limit import free_disk
 
 if TYPE_CHECKING:
     import numpy as np
@@ -44,13 +45,13 @@ def require_room_for_points(count: int, *, each: int = SETTLED) -> None:
     ResourceError
         Naming what is needed and what is there.
     """
-    room = free_memory()
+    room, where, more = _room()
     if each * count >= room:
         raise ResourceError(
-            "the points would not fit into the memory",
+            f"the points would not fit {where}",
             found=f"{count} points need {bytes_in_words(each * count)}",
             expected=f"at most {bytes_in_words(room)}",
-            hint="fewer points, or a machine with more memory",
+            hint=f"fewer points, or {more}",
         )
 
 
@@ -72,7 +73,7 @@ def require_room(count: int, samples: Samples, cell: NDArray[np.float64]) -> Non
         Naming what is needed, what is there, and the smallest edge that would fit.
     """
     require_room_for_points(count, each=MEASURED)
-    edge, room = float(cell.min()), free_memory()
+    edge, (room, where, more) = float(cell.min()), _room()
     sides = cell / edge
     faces = SIDES * float((samples.spacing**2).sum() * sides.sum() / sides.prod())  # were the smallest edge 1
     least = math.sqrt(FACE * faces / (room - MEASURED * count))
@@ -80,11 +81,19 @@ def require_room(count: int, samples: Samples, cell: NDArray[np.float64]) -> Non
         return
     need = MEASURED * count + min(math.sqrt(FACE * faces) / edge, MOST) ** 2
     raise ResourceError(
-        "the surface would not fit into the memory",
+        f"the surface would not fit {where}",
         found=f"cell = {edge:.4g} needs {bytes_in_words(need)}",
         expected=f"at most {bytes_in_words(room)}, so a cell of at least {_rounded_up(least)}",
-        hint="a larger --cell, or a machine with more memory",
+        hint=f"a larger --cell, or {more}",
     )
+
+
+def _room() -> tuple[float, str, str]:
+    """Return how many bytes more there may be, where they lie, and what would give more."""
+    disk = free_disk()
+    if disk is not None:
+        return disk, "onto the disk beyond the limit of the memory", "TMPDIR=FOLDER, one on a disk with more room"
+    return free_memory(), "into the memory", "a machine with more memory, or --memory, which uses a disk"
 
 
 def free_memory(root: Path = Path("/")) -> float:

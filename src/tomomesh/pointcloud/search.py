@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ResourceError
-from ..kernels.measure.bvh import order_keys
 from ..kernels.pointcloud.samples import BITS
+from ..measure.tree import sort_keys
 from ..model.columns import box, cells_at, parts_of
 
 if TYPE_CHECKING:
@@ -71,14 +71,13 @@ class Index:
                 expected=f"at most {most * edge:g}",
                 hint="leaving far points out",
             )
-        keys = np.empty(len(positions), np.int64)
+        room = np.empty((2, len(positions)), np.int64)
         for part in parts_of(len(positions)):
-            keys[part] = _keys_of(cells_at(positions[part], origin, edge))
-        order = np.empty(len(keys), np.int32)
-        order_keys(keys, order)
-        keys = keys[order]
+            room[0, part] = _keys_of(cells_at(positions[part], origin, edge))
+        order, keys = sort_keys(room), room[0]
         groups = np.append(np.flatnonzero(np.append(True, keys[1:] != keys[:-1])), len(keys))
         cubes = keys[groups[:-1]]
+        del room, keys
         blocks, block = _numbered(cubes // EDGE**3)
         count = np.zeros(len(blocks) * EDGE**3 + 1, np.int32)
         count[block * EDGE**3 + cubes % EDGE**3 + 1] = np.diff(groups)

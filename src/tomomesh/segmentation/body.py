@@ -122,22 +122,24 @@ def components_of_body(mask: RunMask, volume: Volume, cut: Cut) -> Components:
     cut : Cut
         Its voxels.
     """
-    body = _body(volume, cut)
+    (every, spacing), (finer, _) = _coarse(volume), _coarse(volume, RIM)
+    levels, dense = cut.sampled(every, finer)
+    body = Coarse(_opened(levels > PRESETS_HU["skin"][0], spacing), every, cut)
     kept = _in_body(mask, body)
-    holders = zip(cut.over(kept.mask), _holders(volume, body), strict=True)
+    holders = zip(cut.over(kept.mask), _holders(volume, body, dense > PRESETS_HU["spongy-bone"][0]), strict=True)
     without = RunMask.of(part[:] & ~holder for part, holder in holders)
     if without.count == kept.mask.count:
         return kept
     return Components(_in_body(without, body).mask, kept.found, kept.dropped)
 
 
-def _holders(volume: Volume, body: Coarse) -> Coarse:
-    """Return what is denser than the least bone, lies in no body and is larger than its ball, with its rim.
+def _holders(volume: Volume, body: Coarse, dense: Mask) -> Coarse:
+    """Return what is as dense as the least bone, lies in no body and is larger than its ball, with its rim.
 
-    It is found in voxels as wide as the rim. What is smaller may be a bit of bone in a thin part of the patient.
+    It is found in voxels as wide as the rim, which tell how dense they are. What is smaller may be a bit of bone in a
+    thin part of the patient.
     """
     every, spacing = _coarse(volume, RIM)
-    dense = body.cut.sampled(every) > PRESETS_HU["spongy-bone"][0]
     runs = Runs.of(dense, corners=True)
     inside = runs.only(_lie_in(runs, [body.sampled(every)]))
     runs = Runs.of(dense & ~inside[:], corners=True)
@@ -263,12 +265,6 @@ def _denser(levels: NDArray[Any], box: Box) -> RunMask:
 def _kept(runs: Runs, kept: Mask) -> Components:
     found, left = len(kept), int(np.count_nonzero(kept))
     return Components(runs.mask if left == found else runs.only(kept), found, found - left)
-
-
-def _body(volume: Volume, cut: Cut) -> Coarse:
-    """Return the voxels of bodies; found in coarse voxels, so that it costs little."""
-    every, spacing = _coarse(volume)
-    return Coarse(_opened(cut.sampled(every) > PRESETS_HU["skin"][0], spacing), every, cut)
 
 
 def _coarse(volume: Volume, cell: float = CELL) -> tuple[list[int], NDArray[np.float64]]:

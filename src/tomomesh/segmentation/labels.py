@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ..isosurface.walls.walls import Walls
     from ..model.boxes import Box
     from ..model.volume import Volume
     from .slabwise.cut import Cut, Cutting
@@ -99,6 +100,8 @@ class Labelled:
         First slice, row and column of each, and those behind its last.
     cut : Cut
         The voxels in slabs.
+    walls : Walls or None
+        Between all of them, where neighbors share them.
 
     Examples
     --------
@@ -112,6 +115,7 @@ class Labelled:
     numbers: Ints
     boxes: Ints
     cut: Cut
+    walls: Walls | None = None
 
     @classmethod
     def of(cls, volume: Volume, cutting: Cutting = HERE) -> Labelled:
@@ -209,25 +213,23 @@ def labels_in(voxels: NDArray[Any]) -> dict[str, int]:
     return labels_counted(HERE.of(voxels))
 
 
-def labels_counted(cut: Cut, every: int = 1) -> dict[str, int]:
-    """Count the labels of a study in slabs, on every n-th of its slices: see `labels_in`."""
+def labels_counted(cut: Cut) -> dict[str, int]:
+    """Count the labels of a study in slabs: see `labels_in`."""
     if cut.voxels.ndim != 3:
         return {}
-    found = list(cut.each(partial(_neighbors, every=every)))
-    if None in found:
-        return {}
-    pairs, equal = np.sum(found, axis=0)
+    pairs, equal = np.zeros(2, np.int64)
+    for found in cut.each(_neighbors):
+        if found is None:  # as of most studies the first slab tells
+            return {}
+        pairs, equal = pairs + found[0], equal + found[1]
     if equal < EVEN * pairs:
         return {}
-    counts = cut.sum(partial(_number, every=every))
+    counts = cut.sum(_number)
     return {str(label): int(counts[label]) for label in np.flatnonzero(counts) if label > 0}
 
 
-def _neighbors(levels: NDArray[Any], box: Box, *, every: int) -> tuple[int, int] | None:
+def _neighbors(levels: NDArray[Any], box: Box) -> tuple[int, int] | None:
     """Count neighbors in rows that are both over 0, and equal ones of them; None where levels are no labels."""
-    levels = levels[-box[0].start % every :: every]
-    if not levels.size:
-        return 0, 0
     if not (levels.min() > -NEARLY and levels.max() < HIGHEST_LABEL):
         return None
     if levels.dtype.kind == "f":
@@ -240,6 +242,5 @@ def _neighbors(levels: NDArray[Any], box: Box, *, every: int) -> tuple[int, int]
     return int(np.count_nonzero(inside)), int(np.count_nonzero((left == right) & inside))
 
 
-def _number(levels: NDArray[Any], box: Box, *, every: int) -> Ints:
-    levels = np.rint(levels[-box[0].start % every :: every])
-    return np.bincount(levels.ravel().astype(np.int64), minlength=HIGHEST_LABEL)
+def _number(levels: NDArray[Any], box: Box) -> Ints:
+    return np.bincount(np.rint(levels).ravel().astype(np.int64), minlength=HIGHEST_LABEL)

@@ -11,7 +11,6 @@ import numpy as np
 
 from .otsu import two_classes
 from .slabwise.cut import HERE
-from .slabwise.levels import levels_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,10 +64,10 @@ class Padding:
     def within(self, levels: NDArray[Any], box: Box) -> Mask:
         """Return which levels (k, j, i[, L]) of a box of the study are padding."""
         named = None if self.named is None else (levels >= self.named[0]) & (levels <= self.named[1])
-        found = self._by_looks(levels, box)
+        found = self._guessed(levels, box)
         return np.asarray(found if named is None else named if found is None else named | found)
 
-    def _by_looks(self, levels: NDArray[Any], box: Box) -> Mask | None:
+    def _guessed(self, levels: NDArray[Any], box: Box) -> Mask | None:
         if self.lines is None:
             return None if self.level is None else np.asarray(levels == self.level)
         places = tuple(slice(None) if axis == self.axis else side for axis, side in enumerate(box))
@@ -126,7 +125,7 @@ def guessed_padding(cut: Cut) -> Padding | None:
     if cut.voxels.ndim != 3:
         return None
     corners = [cut.voxels[end][:: max(1, cut.shape[1] - 1), :: max(1, cut.shape[2] - 1)] for end in (0, -1)]
-    levels = levels_in(cut)
+    levels = cut.levels
     held = np.unique(corners).tolist()
     for level, count in zip(held, levels.count(held), strict=True):
         if LEAST <= count / levels.size <= MOST:
@@ -167,10 +166,14 @@ def _full(levels: NDArray[Any], box: Box, *, level: float) -> list[Mask]:
 
 def _drawn(level: float, size: int, cut: Cut) -> bool:
     """Tell whether the levels beside one, so many, have no noise; few of them are looked at, in even steps."""
-    every = max(1, size // LOOKED_AT)
-    before = accumulate(cut.each(partial(_others, level=level)), initial=0)
-    some = np.concatenate(list(cut.each(partial(_some, level=level, every=every), list(before)[:-1])))
+    some = beside(level, max(1, size // LOOKED_AT), cut)
     return bool(np.unique(some, return_counts=True)[1].max() > CONSTANT * len(some))
+
+
+def beside(level: float, every: int, cut: Cut) -> NDArray[Any]:
+    """Return every n-th of the levels of a study that are not a given one, in their order."""
+    before = accumulate(cut.each(partial(_others, level=level)), initial=0)
+    return np.concatenate(list(cut.each(partial(_some, level=level, every=every), list(before)[:-1])))
 
 
 def _others(levels: NDArray[Any], box: Box, *, level: float) -> int:

@@ -24,12 +24,13 @@ from .body import (
 from .contours.labelled import filled_slices, gaps_in
 from .padding import as_background, padding_in
 from .slabwise.cut import HERE
-from .slabwise.sources import Drawn
+from .slabwise.sources import MaskVoxels
 from .window import otsu_in, window_in, window_limits
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..isosurface.walls.walls import Walls
     from ..model.boxes import Box
     from ..model.volume import Volume
     from ..settings import Settings, WindowSettings
@@ -88,6 +89,8 @@ class Chosen:
         Specks and pores.
     told : str
         What is to be said of slices without labels.
+    walls : Walls or None
+        Of all labels, where neighbors share them.
     """
 
     volume: Volume
@@ -97,6 +100,7 @@ class Chosen:
     counts: Counts = field(default_factory=Counts)
     cleaned: Cleaned | None = None
     told: str = ""
+    walls: Walls | None = None
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -144,7 +148,7 @@ def choose(
     chosen = _of_levels(stack, asked, cutting) if labels is None else _of_labels(stack, labels, asked)
     chosen = chosen if inside is None else replace(chosen, runs=_within(chosen.runs, inside))
     chosen = _parts(chosen.counted(chosen.runs, window=chosen.kept), stack, asked, cutting.of(chosen.volume.voxels))
-    if asked.keep == "all":
+    if asked.keep == "all" or settings.cubes.shared_walls:  # a speck left out of one label would be a gap
         return chosen
     cleaned = without_specks(chosen.runs)
     return replace(chosen, runs=cleaned.mask, cleaned=cleaned)
@@ -156,8 +160,8 @@ def _of_labels(stack: Volume, labels: Labelled, asked: WindowSettings) -> Chosen
         return _interpolated(stack, runs, labels.volume)
     gaps = gaps_in(runs)
     told = f"{gaps.told}: --fill-slices interpolates them" if gaps else ""
-    voxels: Any = LazyVoxels.of(Drawn(runs)) if labels.volume.in_parts else runs.dense.view(np.uint8)
-    return Chosen(replace(stack, voxels=voxels), runs, 0.5, np.inf, told=told)
+    voxels: Any = LazyVoxels.of(MaskVoxels(runs)) if labels.volume.in_parts else runs.dense.view(np.uint8)
+    return Chosen(replace(stack, voxels=voxels), runs, 0.5, np.inf, told=told, walls=labels.walls)
 
 
 def _interpolated(stack: Volume, runs: RunMask, labels: Volume) -> Chosen:

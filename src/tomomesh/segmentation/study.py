@@ -283,7 +283,7 @@ def _doubts(chosen: Chosen, settings: Settings, cutting: Cutting) -> list[str]:
             f"most of the window ({counts.spared_voxels} of {counts.window} voxels) lies in nothing that is "
             "12 mm thick, and was kept for all that: --keep body leaves it out"
         )
-    if chosen_by(settings) == "otsu" and len(labels_counted(cutting.of(chosen.volume.voxels), APART)) > 1:
+    if chosen_by(settings) == "otsu" and len(labels_counted(cutting.of(chosen.volume.voxels[::APART]))) > 1:
         warnings.append("labels of a label map were taken for gray levels: --select chooses labels")
     if any(_edges(chosen)[2:]):
         warnings.append("the window touches the border of the slices: the surface is closed along it")

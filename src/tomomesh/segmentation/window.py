@@ -12,7 +12,7 @@ from ..isosurface.run_mask import RunMask
 from .labels import labels_counted
 from .otsu import otsu_threshold
 from .slabwise.cut import HERE
-from .slabwise.levels import gathered, levels_in
+from .slabwise.levels import gathered
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -207,8 +207,8 @@ def otsu_thresholds(volume: Volume, padded: NDArray[np.bool_] | None = None) -> 
 def otsu_in(cut: Cut, padded: Padding | None = None) -> Limit:
     """Return Otsu's threshold of a gray study in slabs, without its padding, or those of the layers of a color one."""
     if cut.voxels.ndim == 3:
-        return otsu_threshold(levels_in(cut) if padded is None else _beside(cut, padded))
-    layers = [levels_in(cut, n) for n in range(cut.voxels.shape[3])]
+        return otsu_threshold(cut.levels if padded is None else _beside(cut, padded))
+    layers = [cut.layer(n) for n in range(cut.voxels.shape[3])]
     return np.array([otsu_threshold(one) if one.ends[0] < one.ends[1] else -np.inf for one in layers])
 
 

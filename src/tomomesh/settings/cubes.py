@@ -64,4 +64,8 @@ class CubeSettings(Group):
         "divide the voxels of thick slices into such as are nearly cubes, and move what is in each to where its "
         "neighbors have theirs; without, levels are interpolated linearly from slice to slice",
     )
+    shared_walls: bool = param(
+        False, "with --each-label, let neighbors share the walls between them to the bit, so that there is neither a "
+        "gap nor an overlap"
+    )  # fmt: skip
     low_pass: int = param(3, "passes of the low-pass filter over the cuberille", unit="passes", low=0, high=1000)

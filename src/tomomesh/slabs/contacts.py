@@ -8,7 +8,7 @@ import numpy as np
 
 from ..isosurface.run_mask import RunMask
 from ..isosurface.runs import Runs
-from ..isosurface.well_composed import JOINING, cells_where, joining
+from ..isosurface.well_composed import joining
 from .parts import Part, gathered
 
 if TYPE_CHECKING:
@@ -31,13 +31,15 @@ ROUNDS = AROUND - SURE
 """Rounds after which they are: what is added in a round depends on layers within as many as there have been rounds."""
 
 
-def joined_in(mask: Marks, levels: Levels, low: Ints, own: Span, rounds: float, threads: int = 1) -> tuple[Marks, bool]:
+def joined_in(mask: Marks, cells: Ints, levels: Levels, low: Ints, own: Span, rounds: float) -> tuple[Marks, bool]:
     """Join voxels round after round.
 
     Parameters
     ----------
     mask : (k, J, I) bool array
         What a slab and its halo have.
+    cells : (n, 3) int32 array
+        Those of it whose voxels touch so.
     levels : Levels
     low : (3,) int32 array
         The voxel (x, y, z) of the volume that is its first.
@@ -49,10 +51,10 @@ def joined_in(mask: Marks, levels: Levels, low: Ints, own: Span, rounds: float, 
     Returns
     -------
     joined : (k, J, I) bool array
+        The mask itself where nothing is to be joined.
     unfinished : bool
         Whether one more round would add voxels of the slab's own.
     """
-    cells, _ = cells_where(mask, JOINING > 0, threads)
     joined = mask.copy() if len(cells) else mask
     for count, voxels in enumerate(joining(joined, cells, lambda voxels: levels.excess(voxels + low)), 1):
         if count > rounds:
@@ -74,12 +76,17 @@ def drawn_from(parts: Sequence[Part], first: int, last: int, shape: tuple[int, .
     return np.unpackbits(bits, axis=1, count=size).view(np.bool_).reshape(len(bits), *shape)
 
 
-def filled(slices: Sequence[RunMask]) -> RunMask:
-    """Fill what the outside of a frame does not reach, given as a mask a slab.
+def whole_of(slices: Sequence[RunMask]) -> RunMask:
+    """Return the mask of a frame from those of its slabs; what lies behind the last slice is empty."""
+    return RunMask.joined([*slices, RunMask.none((1, *slices[0].shape[1:]))])
 
-    What lies behind the last slice is empty; a mask without contacts stays without them.
-    """
-    empty = RunMask.none((1, *slices[0].shape[1:]))
-    mask = RunMask.joined([*slices, empty])
+
+def filled(mask: RunMask) -> RunMask:
+    """Fill what the outside of a frame does not reach; a mask without contacts stays without them."""
     holes = Runs.of(~mask)
     return mask | holes.mask.only(~holes.bordering[holes.parts])
+
+
+def cavities_in(mask: RunMask) -> int:
+    """Count what the outside of a frame does not reach."""
+    return int(np.count_nonzero(~Runs.of(~mask).bordering))

@@ -19,7 +19,7 @@ class Cuts:
     >>> cuts = Cuts.every(10, 4)
     >>> cuts.own
     [(0, 4), (4, 8), (8, 10)]
-    >>> cuts.around(1, 3), cuts.holding(1, 5)
+    >>> cuts.around(1, 3), cuts.beside(1, 5)
     ((1, 10), [0, 2])
     """
 
@@ -43,7 +43,7 @@ class Cuts:
         start, stop = self.own[slab]
         return max(start - halo, self.places[0]), min(stop + halo, self.places[-1])
 
-    def holding(self, slab: int, halo: int) -> list[int]:
+    def beside(self, slab: int, halo: int) -> list[int]:
         """Return the other slabs that hold layers of the halo of one, in their order."""
         start, stop = self.around(slab, halo)
         return [n for n, (a, b) in enumerate(self.own) if n != slab and max(a, start) < min(b, stop)]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Frame:
+class MaskFrame:
     """The box of a mask with one layer of background around it, within a volume.
 
     Attributes
@@ -41,17 +41,17 @@ class Frame:
         """Its first voxel as (x, y, z)."""
         return np.array(self.low[::-1], np.int32)
 
-    def held(self, start: int, stop: int) -> Span:
+    def mask_slices(self, start: int, stop: int) -> Span:
         """Return the slices of the volume that the mask can have something in, of some of its own."""
         return max(start, 1) + self.low[0], min(stop, self.shape[0] - 1) + self.low[0]
 
-    def looked_at(self, start: int, stop: int) -> Span:
+    def level_slices(self, start: int, stop: int) -> Span:
         """Return the slices of the volume around some of its layers: two behind the ends of the mask, to see beyond."""
         low, high = start - (start == 0), stop + 1 + (stop == self.shape[0] - 1)
         return max(low + self.low[0], 0), min(high + self.low[0], self.volume[0])
 
     def drawn(self, mask: Any, start: int, stop: int) -> Marks:
-        """Draw some of its slices of a mask of those slices of the volume that are `held`."""
+        """Draw some of its slices of a mask of those slices of the volume of `mask_slices`."""
         _, rows, columns = self.shape
         found, first = np.zeros((stop - start, rows, columns), np.bool_), max(start, 1) - start
         box = tuple(slice(low + 1, low + size - 1) for low, size in zip(self.low[1:], self.shape[1:], strict=True))
@@ -65,4 +65,4 @@ class Frame:
         if voxels is None:
             return Stretch(held, (z + halo[0], y, x), self.volume)
         dense = voxels.read() if hasattr(voxels, "read") else np.asarray(voxels)
-        return Stretch(dense, (self.looked_at(*halo)[0], 0, 0), (*self.volume, *dense.shape[3:]))
+        return Stretch(dense, (self.level_slices(*halo)[0], 0, 0), (*self.volume, *dense.shape[3:]))

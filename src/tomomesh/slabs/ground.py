@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ..isosurface.crossings import BARELY, IN_LINE, Levels
 from ..isosurface.run_mask import RunMask
 from ..isosurface.surface_nets import OWNED, borders_of, steps_of
 from ..isosurface.thin import thin_squares
-from ..isosurface.well_composed import surface_cells
+from ..isosurface.well_composed import JOINING, surface_cells
 from .contacts import drawn_from, joined_in, packed
 from .parts import Part
 
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..isosurface.means import Span
-    from .frame import Frame
+    from ..isosurface.well_composed import Cells
+    from .frame import MaskFrame
 
     Ints = NDArray[np.int32]
     Marks = NDArray[np.bool_]
@@ -32,7 +33,7 @@ PART = 200_000
 
 
 @dataclass(frozen=True)
-class Ground:
+class SlabMask:
     """What a slab has of a mask.
 
     Attributes
@@ -61,17 +62,17 @@ class Ground:
 
 
 def ground(
-    mask: Any, voxels: Any, own: Span, halo: Span, bits: Sequence[Part], solid: Any, *, frame: Frame, levels: Levels,
-    rounds: float, threads: int = 1,
-) -> Ground:  # fmt: skip
+    mask: Any, voxels: Any, own: Span, halo: Span, bits: Sequence[Part], solid: Any, *, frame: MaskFrame,
+    levels: Levels, rounds: float, threads: int = 1,
+) -> SlabMask:  # fmt: skip
     """Look at a slab and its halo.
 
     Parameters
     ----------
     mask : (k, J, I) bool array, or RunMask
-        The slices of the volume that are `Frame.held` between those of the halo.
+        The slices of the volume that are `MaskFrame.mask_slices` between those of the halo.
     voxels : (k, J, I[, L]) array, LazyVoxels or None
-        The slices of the volume that are `Frame.looked_at` around the halo; with None the levels are the mask's own.
+        The slices of the volume that are `MaskFrame.level_slices` around the halo; with None the mask is all there is.
     own, halo : (int, int)
         Layers of cells in the frame: those of the slab, and those and its halo. A layer's cells lie between the voxels
         of a slice with its number and those of the next.
@@ -79,7 +80,7 @@ def ground(
         What has been joined so far, of the slices of the halo; none at first.
     solid : (k, J, I) bool array, RunMask or None
         The slices of the frame whose boundary is wanted, where it is not that of what is joined.
-    frame : Frame
+    frame : MaskFrame
     levels : Levels
         The window; its voxels are not looked at.
     rounds : float
@@ -90,21 +91,37 @@ def ground(
     stretch, low = frame.stretch(held, voxels, halo), frame.lowest + np.array([0, 0, halo[0]], np.int32)
     known, inside = replace(levels, voxels=stretch), (own[0] - halo[0], own[1] - halo[0])
     begun = drawn_from(bits, halo[0], halo[1] + 1, tuple(rows)) if bits else held
-    joined, unfinished = joined_in(begun, known, low, inside, rounds, threads)
+    scanned = surface_cells(begun, threads)
+    joined, unfinished = joined_in(begun, scanned[0][JOINING[scanned[1]] > 0], known, low, inside, rounds)
     slices = slice(*inside)
-    found = Ground(packed(joined[slices], own[0]), unfinished)
+    found = SlabMask(packed(joined[slices], own[0]), unfinished)
     if unfinished:
         return found
     added = int(np.count_nonzero(joined[slices])) - int(np.count_nonzero(held[slices]))
-    whole = joined if solid is None else solid[:]
-    cells, cases = surface_cells(whole[inside[0] : inside[1] + 1], threads)
-    cells += np.array([0, 0, own[0]], np.int32)
+    cells, cases = (
+        _own(scanned, inside)
+        if solid is None and joined is begun
+        else _scanned(joined if solid is None else solid[:], inside, threads)
+    )
+    cells = cells + np.array([0, 0, halo[0]], np.int32)
     inner, directions = borders_of(cells + frame.lowest, cases, threads)
     steps, stored = steps_of(directions), np.promote_types(stretch.stored.dtype, np.float16)  # the latter holds NaN
     x, y, z = (inner - low).T
     squares = thin_squares(joined, inner - low, steps, threads), ~held[z, y, x], _lines(known, inner, steps, stored)
     layers = _counted(cells, cases, own)
     return replace(found, added=added, cells=Part(0, (cells, cases)), squares=Part(0, squares), layers=layers)
+
+
+def _own(found: Cells, layers: Span) -> Cells:
+    """Return the cells of some layers."""
+    rows = slice(*np.searchsorted(found[0][:, 2], layers))
+    return found[0][rows], found[1][rows].copy()
+
+
+def _scanned(mask: Marks, layers: Span, threads: int) -> Cells:
+    """Find the cells of some layers of a mask."""
+    cells, cases = surface_cells(mask[layers[0] : layers[1] + 1], threads)
+    return cells + np.array([0, 0, layers[0]], np.int32), cases
 
 
 def _lines(levels: Levels, inner: Ints, steps: Ints, stored: np.dtype[Any]) -> NDArray[Any]:
@@ -122,40 +139,49 @@ def _counted(cells: Ints, cases: NDArray[np.uint8], own: Span) -> NDArray[np.int
     return np.array([np.bincount(layer, minlength=count), np.bincount(layer, OWNED[cases], count)]).astype(np.int64)
 
 
-def told(found: Ground) -> tuple[bool, int, bool, NDArray[np.int64]]:
-    """Return what the driver asks: whether it is unfinished, voxels added, whether anything is thin, counts."""
-    return found.unfinished, found.added, bool(found.squares.arrays[0].any()), found.layers
+class MaskCounts(NamedTuple):
+    """What the driver asks of a slab; see `SlabMask`."""
+
+    unfinished: bool
+    added: int
+    thin: bool
+    layers: NDArray[np.int64]
 
 
-def bits_of(found: Ground) -> Part:
+def told_of(found: SlabMask) -> MaskCounts:
+    """Return it; whether the mask is thin anywhere with it."""
+    return MaskCounts(found.unfinished, found.added, bool(found.squares.arrays[0].any()), found.layers)
+
+
+def bits_of(found: SlabMask) -> Part:
     """Return a slab's slices, joined."""
     return found.bits
 
 
-def runs_of(found: Ground, *, shape: tuple[int, ...]) -> RunMask:
+def runs_of(found: SlabMask, *, shape: tuple[int, ...]) -> RunMask:
     """Return them as runs."""
     first = found.bits.first
     return RunMask.of([drawn_from([found.bits], first, first + len(found.bits), shape)])
 
 
-def sample(first: int, every: int, found: Ground) -> NDArray[np.float64]:
+def sample(first: int, every: int, found: SlabMask) -> NDArray[np.float64]:
     """Return the levels (m, 4, L) of the squares whose number in the whole is a multiple of some."""
     return found.squares.arrays[2][-first % every :: every].astype(np.float64)
 
 
-def cells_from(first: int, found: Ground) -> Part:
+def cells_from(first: int, found: SlabMask) -> Part:
     """Return a slab's cells, now that their numbers are known."""
     return replace(found.cells, first=first)
 
 
-def squares_from(first: int, found: Ground, *, levels: Levels, even: bool, threads: int = 1) -> Part:
+def squares_from(first: int, found: SlabMask, *, levels: Levels, even: bool, threads: int = 1) -> Part:
     """Return whether the mask is thin behind squares (q,), and how far to the next voxel each one's crossing is (q,).
 
     Parameters
     ----------
     first : int
         Number of the first in the whole.
-    found : Ground
+    found : SlabMask
     levels : Levels
     even : bool
         Whether the levels are those of a mask, so that all crossings are half way: then the second is left out.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mmap
 import tempfile
-import weakref
 from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -77,37 +76,50 @@ class OnDisk:
         OutputError
             Where the disk is full.
         """
-        file = _File(self.folder)
-        return [_changed(work(*map(_mapped, entries)), file.put) for entries in zip(*columns, strict=True)]
+        file = File(self.folder)
+        return [put_away(work(*map(mapped, entries)), file) for entries in zip(*columns, strict=True)]
 
     def fetch(self, kept: Sequence[Kept]) -> list[Any]:
         """Return the values; what is large is read from its file where it is looked at."""
-        return [_mapped(value) for value in kept]
+        return [mapped(value) for value in kept]
 
 
 @dataclass(frozen=True)
 class _Far:
     """An array in a file, from a byte on that a page begins with."""
 
-    file: _File
+    file: File
     offset: int
     dtype: np.dtype[Any]
     shape: tuple[int, ...]
 
+    @property
+    def nbytes(self) -> int:
+        """Its size."""
+        return self.dtype.itemsize * int(np.prod(self.shape))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let other processes have the array itself."""
+        return _itself, (self.mapped(),)
+
     def mapped(self) -> np.ndarray[Any, Any]:
         """Return it as memory that is its own: what is written there is never in the file."""
-        size = self.dtype.itemsize * int(np.prod(self.shape))
-        pages = mmap.mmap(self.file.handle.fileno(), size, access=mmap.ACCESS_COPY, offset=self.offset)
+        pages = mmap.mmap(self.file.handle.fileno(), self.nbytes, access=mmap.ACCESS_COPY, offset=self.offset)
         return np.frombuffer(pages, self.dtype).reshape(self.shape)
 
 
-class _File:
+class File:
     """A file without a name that arrays are put into one behind the other."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.end = 0
         self.handle: Any = None
+
+    def __del__(self) -> None:
+        """Close the file with the last value that is kept in it; maps of it stay."""
+        if self.handle is not None:
+            self.handle.close()
 
     def put(self, array: Any) -> Any:
         """Write an array; one that is small, and what is no array, stays as it is."""
@@ -124,8 +136,7 @@ class _File:
 
     def _written(self, array: np.ndarray[Any, Any]) -> _Far:
         if self.handle is None:
-            self.handle = tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115 - closed when no map of it is left
-            weakref.finalize(self, self.handle.close)
+            self.handle = tempfile.TemporaryFile(dir=self.folder, buffering=0)  # noqa: SIM115 - closed with its last user
         self.handle.seek(self.end)
         left = array.reshape(-1).view(np.uint8)
         while len(left):
@@ -135,8 +146,31 @@ class _File:
         return found
 
 
-def _mapped(value: Any) -> Any:
-    return _changed(value, lambda part: part.mapped() if isinstance(part, _Far) else part)
+def _itself(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    return array
+
+
+def put_away(value: Any, file: File) -> Any:
+    """Return a value whose large arrays are in a file."""
+    return _changed(value, file.put)
+
+
+def mapped(value: Any, *, own: bool = False) -> Any:
+    """Return a value whose arrays can all be worked on, if asked for those too that another process has sent."""
+
+    def looked_at(part: Any) -> Any:
+        if isinstance(part, _Far):
+            return part.mapped()
+        return part.copy() if own and isinstance(part, np.ndarray) and not part.flags.behaved else part
+
+    return _changed(value, looked_at)
+
+
+def bytes_of(value: Any) -> int:
+    """Return how many bytes the arrays of a value hold, wherever they are."""
+    sizes = [0]
+    _changed(value, lambda part: sizes.append(getattr(part, "nbytes", 0)))
+    return sum(sizes)
 
 
 def _changed(value: Any, change: Callable[[Any], Any]) -> Any:

@@ -103,7 +103,7 @@ def exchanged(slabs: Slabs, parts: Sequence[Kept], cuts: Cuts, before: Longs, ha
     low = [(numbers[start], numbers[min(start + halo, stop)]) for start, stop in cuts.own]
     high = [(numbers[max(stop - halo, start)], numbers[stop]) for start, stop in cuts.own]
     lower, upper = (slabs.each(_strip, spans, parts) for spans in (low, high))
-    others = [cuts.holding(slab, halo) for slab in range(len(cuts))]
+    others = [cuts.beside(slab, halo) for slab in range(len(cuts))]
     return [
         (*(upper[n] for n in near if n < slab), part, *(lower[n] for n in near if n > slab))
         for slab, (near, part) in enumerate(zip(others, parts, strict=True))

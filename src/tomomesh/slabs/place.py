@@ -21,7 +21,7 @@ many would halve the exchanges, and add a tenth to the cells of slabs of 64."""
 
 
 @dataclass(frozen=True)
-class Place:
+class Extent:
     """A slab's own layers of cells, and the numbers of its vertices and squares.
 
     Attributes
@@ -40,7 +40,7 @@ class Place:
     squares: Longs
 
     @classmethod
-    def of(cls, cuts: Cuts, slab: int, vertices: Longs, squares: Longs) -> Place:
+    def of(cls, cuts: Cuts, slab: int, vertices: Longs, squares: Longs) -> Extent:
         """Find the place of a slab, by how many vertices and squares lie before each layer and in all."""
         layers = cuts.around(slab, HALO)
         held = slice(layers[0], layers[1] + 1)

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .frame import Frame
+    from .frame import MaskFrame
     from .parts import Arrays
-    from .place import Place
+    from .place import Extent
 
     Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class Region:
     rings: Rings
 
 
-def region(place: Place, cells: Sequence[Part], *, frame: Frame, threads: int = 1) -> Region:
+def region(place: Extent, cells: Sequence[Part], *, frame: MaskFrame, threads: int = 1) -> Region:
     """Span the net of a slab and its halo."""
     held, cases = gathered(cells, place.of_vertices)
     net = net_of(held, cases, frame.shape[1:], frame.lowest, threads, place.exact)
@@ -57,7 +57,7 @@ def crossings_of(net: Net, shares: Sequence[NDArray[np.float64]], rows: Any = sl
     return np.asarray(net.inner[rows] + (shares[0][rows][:, None] if len(shares) else 0.5) * steps)
 
 
-def begun(place: Place, found: Region, squares: Sequence[Part], *, springs: Springs) -> Part:
+def begun(place: Extent, found: Region, squares: Sequence[Part], *, springs: Springs) -> Part:
     """Return what a slab's own vertices are drawn to, and where they are then, (n, 3) each."""
     net, (_, *shares) = found.net, gathered(squares, place.of_squares)
     rows = place.vertices_around
@@ -66,7 +66,7 @@ def begun(place: Place, found: Region, squares: Sequence[Part], *, springs: Spri
 
 
 def returned(
-    place: Place, found: Region, squares: Sequence[Part], own: Part, places: Sequence[Part], *, springs: Springs
+    place: Extent, found: Region, squares: Sequence[Part], own: Part, places: Sequence[Part], *, springs: Springs
 ) -> Part:
     """Return what a slab's own vertices are drawn to (n, 3), drawn out where the mask is thin.
 
@@ -79,25 +79,25 @@ def returned(
     return _own(place, (drawn_out(goals, lengths, net, found.rings, springs, rows(0)),))
 
 
-def put(place: Place, found: Region, goals: Sequence[Part], *, springs: Springs) -> Part:
+def put(place: Extent, found: Region, goals: Sequence[Part], *, springs: Springs) -> Part:
     """Return where a slab's own vertices would rest but for their cells, (n, 3)."""
     drawn, rows = goals_of(place, goals), place.vertices_around
     return _own(place, (evened(drawn, found.net.low, found.rings, springs, rows),))
 
 
-def goals_of(place: Place, parts: Sequence[Part]) -> Floats:
+def goals_of(place: Extent, parts: Sequence[Part]) -> Floats:
     """Return what vertices are drawn to (n, 3), those of the halo too: the first array of each part."""
     return gathered(parts, place.of_vertices, slice(1))[0]
 
 
 def stepped(
-    place: Place, rings: Rings, goals: Floats, parts: Sequence[Part], *, springs: Springs, steps: int, begins: bool
+    place: Extent, rings: Rings, goals: Floats, parts: Sequence[Part], *, springs: Springs, steps: int, begins: bool
 ) -> Part:
     """Take steps, of which no vertex that is looked at is too far from a slab's own.
 
     Parameters
     ----------
-    place : Place
+    place : Extent
     rings : Rings
     goals : (n, 3) float array
     parts : sequence of Part
@@ -120,6 +120,6 @@ def stepped(
     return replace(_own(place, (state.before, state.position)), told=np.array(motions))
 
 
-def _own(place: Place, arrays: Arrays) -> Part:
+def _own(place: Extent, arrays: Arrays) -> Part:
     start, stop = place.vertices_around(0)
     return Part(place.of_vertices[0] + start, tuple(array[start:stop] for array in arrays))

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from .place import Place
+    from .place import Extent
     from .region import Region
 
 
 def chosen(
-    place: Place, found: Region, squares: Sequence[Part], parts: Sequence[Part], *, rest: slice,
+    place: Extent, found: Region, squares: Sequence[Part], parts: Sequence[Part], *, rest: slice,
     affine: NDArray[np.float64],
 ) -> Part:  # fmt: skip
     """Choose the diagonals of a slab's own squares (q,); tells how many are split into four.
@@ -44,7 +44,7 @@ def chosen(
 
 
 def piece(
-    place: Place, found: Region, squares: Sequence[Part], part: Part, choice: Part, first: int, *, rest: slice,
+    place: Extent, found: Region, squares: Sequence[Part], part: Part, choice: Part, first: int, *, rest: slice,
     affine: NDArray[np.float64],
 ) -> Piece:  # fmt: skip
     """Return a slab's piece of the mesh, whose first center has a number in the whole; see `chosen`."""

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .way import Way
 
 WAYS = {
+    "walls": "a label map, --shared-walls: the walls between all labels as one net, of which each mesh is a part",
     "voxels": "a study, --way voxels: the window's own boundary, where gray levels cross its bounds",
     "space": "a study, --way sphere, --network torus or --space volume: one network in space, and its own faces",
     "contours": "a study, --way contours: several rings a slice, closed between the slices",

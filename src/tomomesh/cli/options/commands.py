@@ -20,7 +20,7 @@ from .formats import (
     STUDY_MESH,
     STUDY_MESH_FORMATS,
 )
-from .groups import add_each, add_outputs, add_settings, add_streams, add_study
+from .groups import add_each, add_outputs, add_scale, add_settings, add_streams, add_study
 
 STAGE_ONE = ("read", "crop", "window", "network")
 STAGE_TWO = ("cubes", "fit", "printing")
@@ -31,11 +31,11 @@ CUTS = ("scale", "flat_base", "one_piece", "fill_cavities", "thicken", "hollow",
 """Parameters that change a part."""
 MESH_ONLY = ("local_origin", "smooth", "allow_far", "remesh", "edge", "target_faces")
 """Parameters of the run that matter to meshes alone."""
-STUDY_ONLY = ("frame",)
-"""Parameters of the run that matter to studies alone."""
+STUDY_ONLY = ("frame", "shared_walls")
+"""Parameters that matter to studies of a user's own alone."""
 SURFACE_ONLY = (
     "cell_mm", "cell_factor", "closing", "fill_holes", "stacks", "largest", "allow_leaks", "surface", "low_pass",
-    *MESH_ONLY,
+    "shared_walls", *MESH_ONLY,
 )  # fmt: skip
 """Parameters that do not matter to the points."""
 
@@ -61,6 +61,7 @@ def _reconstruct(commands: Any) -> None:
     )  # fmt: skip
     add_streams(main, STUDY_FORMATS, STUDY_MESH_FORMATS)
     add_each(main)
+    add_scale(main)
     add_outputs(main, "points", "labels", "mask_out", "figures").add_argument(
         "--patient", action="store_true", help="copy the patient's fields of a DICOM study into MESH.dcm"
     )
@@ -82,6 +83,10 @@ def _surface(commands: Any) -> None:
     stage_two.add_argument("cloud", metavar="POINTS", help=f"{CLOUD}, or - with --input-format")
     stage_two.add_argument("-o", "--output", required=True, metavar="MESH", help=f"{MESH}, or - with --format")
     add_streams(stage_two, CLOUD_FORMATS, MESH_FORMATS, usual="xyz")
+    stage_two.add_argument(
+        "--memory", metavar="SIZE",
+        help="memory to take at most, as 4GB: arrays beyond it lie on the disk of TMPDIR (Linux; default: no limit)",
+    )  # fmt: skip
     add_outputs(stage_two, "figures")
     add_settings(stage_two, ("cloud", *STAGE_TWO, "run"), without=STUDY_ONLY)
 

@@ -17,6 +17,8 @@ CLOUD_FORMATS = (
     "ply", "xyz", "txt", "csv", "tsv", "npy", "npz", "pcd", "las", "laz", "e57", "obj", "off", "stl", "3mf", "glb",
     "gii", "vtp", "asc", "xyzn", "xyzrgb", "pts", "ptx",
 )  # fmt: skip
+TILE_FORMATS = ("las", "laz")
+"""Files of a folder that together are one cloud."""
 STUDY_FORMATS = ("nii", "nii.gz", "nrrd", "mha", "mgh", "mgz", "npy", "tif", "tiff", "dcm", "ima", "zip", "ozx")
 """Single files that hold a whole study."""
 HEADER_FORMATS = ("nhdr", "mhd", "hdr", "hdr.gz", "img", "img.gz")
@@ -39,5 +41,6 @@ STUDY = (
     "or a folder of PNG, TIFF or JPEG slices (with --spacing)"
 )
 CLOUD = (
-    f"an unoriented cloud ({either(CLOUD_FORMATS)}); of meshes the vertices, of a DICOM RT Structure Set the contours"
+    f"an unoriented cloud ({either(CLOUD_FORMATS)}); of meshes the vertices, of a DICOM RT Structure Set the contours; "
+    f"or a folder of tiles ({either(TILE_FORMATS)})"
 )

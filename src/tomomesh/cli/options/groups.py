@@ -67,14 +67,37 @@ def add_each(parser: argparse.ArgumentParser) -> None:
         "FreeSurfer, ITK-SNAP or 3D Slicer; where not given, those in the label map's own file",
     )
     group.add_argument("--force", action="store_true", help="reconstruct again what is finished")
+
+
+def add_scale(parser: argparse.ArgumentParser) -> None:
+    """Add the options of many processes, and of what is larger than the memory."""
+    group = parser.add_argument_group("Many processes, and studies larger than the memory")
     group.add_argument(
-        "--workers", type=int, metavar="N", help="work on N studies at once, each in a process of its own, with Dask"
+        "--workers",
+        type=int,
+        metavar="N",
+        help="work on N studies of --each, or slabs of one study, at once, each in a process of its own, with Dask",
     )
     group.add_argument(
         "--scheduler",
         metavar="ADDRESS|FILE",
-        help="work on as many studies at once as a Dask cluster has threads: its scheduler's address, or the file that "
+        help="work on as many of them at once as a Dask cluster has threads: its scheduler's address, or the file that "
         "the scheduler wrote; its machines see the same folders",
+    )
+    group.add_argument(
+        "--memory",
+        metavar="SIZE",
+        help="work on one study slab by slab, each process within so much memory, as 4GB or 500MiB; its voxels, and "
+        "the mesh around them, are never whole",
+    )
+    group.add_argument(
+        "--slab", type=int, metavar="N", help="slices of a slab, in place of as many as the memory holds"
+    )
+    group.add_argument(
+        "--pieces",
+        type=int,
+        metavar="N",
+        help="write a mesh that was made slab by slab as N files, NAME-001.ply and so on, that weld exactly",
     )
 
 

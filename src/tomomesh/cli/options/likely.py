@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...errors import FormatError
-from .formats import CHECKED_FORMATS, CLOUD_FORMATS, HEADER_FORMATS, STUDY_FORMATS
+from .formats import CHECKED_FORMATS, CLOUD_FORMATS, HEADER_FORMATS, STUDY_FORMATS, TILE_FORMATS
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -107,7 +107,7 @@ def require_kind(chosen: Namespace) -> None:
     if not isinstance(path, str) or not _is_there(path):
         return
     is_folder = Path(path).is_dir()
-    suffix = ".dcm" if chosen.command == "surface" and is_folder else _suffix_of(path)
+    suffix = _of_folder(path) if chosen.command == "surface" and is_folder else _suffix_of(path)
     if suffix == ".dcm" and not is_folder:
         return  # it may hold contours
     other = _reading(suffix) if suffix not in own else ""
@@ -117,6 +117,12 @@ def require_kind(chosen: Namespace) -> None:
             found="a folder" if is_folder else f"suffix = {suffix}",
             hint=f"tomomesh {other} {path}" + ("" if other == "check" else " -o mesh.stl"),
         )  # fmt: skip
+
+
+def _of_folder(path: str) -> str:
+    """Return the kind of the files in a folder: tiles of a cloud, else slices."""
+    kinds = {f".{name}" for name in TILE_FORMATS}
+    return next((kind for kind in map(_suffix_of, map(str, Path(path).iterdir())) if kind in kinds), ".dcm")
 
 
 def _is_there(path: str) -> bool:

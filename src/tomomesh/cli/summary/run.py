@@ -123,8 +123,17 @@ def _of_mesh(quality: dict[str, Any], unit: str) -> list[str]:
         f"{quality['self_intersections'] or 'no'} face(s) pass through others",
         f"          {pieces_in_words(quality)}, genus {quality['genus']}, "
         f"area {plain(quality['area_mm2'], 6)} {unit}^2{_of_volume(quality, unit)}{_of_rings(quality)}",
+        *_of_distance(quality, unit),
+    ]
+
+
+def _of_distance(quality: dict[str, Any], unit: str) -> list[str]:
+    """Say how far the points are from the mesh, which is not measured of one that is never whole."""
+    if "points_to_surface_mean_mm" not in quality:
+        return []
+    return [
         f"distance  points to surface: mean {quality['points_to_surface_mean_mm']:.3g}, "
-        f"95 % {quality['points_to_surface_p95_mm']:.3g}, largest {quality['points_to_surface_max_mm']:.3g} {unit}",
+        f"95 % {quality['points_to_surface_p95_mm']:.3g}, largest {quality['points_to_surface_max_mm']:.3g} {unit}"
     ]
 
 

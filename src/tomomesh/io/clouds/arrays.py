@@ -14,7 +14,7 @@ from ..fields import AXES, doubles, split_fields
 from ..files.atomic import replacing
 from ..files.limits import require_bytes, require_memory
 from ..files.npy_header import npy_header
-from ..files.source import third_party, whole
+from ..files.source import stored, third_party, whole
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,10 +28,13 @@ if TYPE_CHECKING:
 POSITIONS = ("points", "positions", "xyz", "vertices", "pos", "arr_0")
 """What the positions in an NPZ file are called; the first that is there."""
 
+HEADER = 1 << 17
+"""More bytes than NumPy takes for a header."""
+
 
 def read_npy(path: Path) -> Cloud:
     """Read an (n, 3) array, or one with named fields, x, y and z among them."""
-    array = _array(whole(path), str(path))
+    array = _array(stored(path), str(path))
     if array.dtype.names and set(AXES) <= set(array.dtype.names):
         return split_fields({name: array.ravel()[name] for name in array.dtype.names}, file=str(path))
     return _positions(array, str(path)), {}
@@ -74,9 +77,9 @@ def _members(path: Path) -> Fields:
         return {name: array for name, array in arrays.items() if array.dtype.kind in "biuf"}
 
 
-def _array(data: bytes, file: str) -> NDArray[Any]:
+def _array(data: bytes | memoryview, file: str) -> NDArray[Any]:
     """Return the array in the bytes of an NPY file, once they are as many as its header promises."""
-    shape, by_columns, kind, start = npy_header(data, file=file)
+    shape, by_columns, kind, start = npy_header(bytes(data[:HEADER]), file=file)
     require_bytes(start + math.prod(shape) * kind.itemsize, len(data), file=file)
     with third_party("numpy", file):
         return np.ndarray(shape, kind, data, start, order="F" if by_columns else "C")

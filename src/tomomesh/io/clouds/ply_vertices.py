@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import FormatError
 from ..fields import AXES, split_fields
 from ..files.limits import require_bytes, require_rows
-from ..files.source import whole
+from ..files.source import stored
 from ..meshes.ply import BYTE_ORDERS, parse_header
 from ..meshes.ply_rows import rows_of, start_of
 from ..text import parse_rows, typed
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from ..fields import Cloud, Fields
     from ..meshes.ply import PlyElement, PlyHeader
 
+HEADER = 1 << 20
+"""Bytes in which headers end, but for very long comments: then the whole file is searched."""
+
 
 def read_ply(path: Path) -> Cloud:
     """Read the vertices of a PLY file with all their properties but lists, as multi-view stereo adds to them.
@@ -29,25 +32,22 @@ def read_ply(path: Path) -> Cloud:
     FormatError
         For a broken header, rows that lie, and vertices without positions.
     """
-    data, file = whole(path), str(path)
-    return vertices_of(data, parse_header(data, file=file), file)
+    data, file = stored(path), str(path)
+    begin = bytes(data[:HEADER])
+    begin = begin if b"end_header" in begin[: HEADER - 2] else bytes(data)  # and the end of its line
+    return _vertices_of(data, parse_header(begin, file=file, size=len(data)), file)
 
 
-def vertices_of(data: bytes, header: PlyHeader, file: str) -> Cloud:
-    """Read the vertices behind a header.
-
-    Raises
-    ------
-    FormatError
-    """
+def _vertices_of(data: memoryview, header: PlyHeader, file: str) -> Cloud:
     before, vertex = header.before("vertex")
     if vertex.count == 0:
         return np.empty((0, 3)), {}
     single = [words[-1] for words in vertex.properties if words[0] != "list"]
     if not set(AXES) <= set(single) or len(set(vertex.names)) < len(vertex.names):
         raise FormatError("the vertices have no positions", file=file, expected="single properties x, y and z")
-    read = _text_rows if header.format == "ascii" else _binary_rows
-    return split_fields(read(data, header, before, vertex, file), file=file)
+    if header.format == "ascii":
+        return split_fields(_text_rows(bytes(data), header, before, vertex, file), file=file)
+    return split_fields(_binary_rows(data, header, before, vertex, file), file=file)
 
 
 def _text_rows(data: bytes, header: PlyHeader, before: tuple[PlyElement, ...], vertex: PlyElement, file: str) -> Fields:
@@ -86,7 +86,7 @@ def _without_lists(line: str, vertex: PlyElement) -> str:
 
 
 def _binary_rows(
-    data: bytes, header: PlyHeader, before: tuple[PlyElement, ...], vertex: PlyElement, file: str
+    data: memoryview, header: PlyHeader, before: tuple[PlyElement, ...], vertex: PlyElement, file: str
 ) -> Fields:
     order, start = BYTE_ORDERS[header.format], start_of(data, header, before, file)
     if vertex.has_lists:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...errors import EmptyError
+from ...errors import EmptyError, FormatError, GeometryError
 from ...settings import CloudSettings
 from ..dicom import is_dicom
 from ..fields import point_set
-from ..files.source import existing_file, reader_of, suffix_of, whole
+from ..files.source import existing, existing_file, reader_of, regular_files, suffix_of, whole
 from ..finite import check_finite
 from ..meshes.read import MESH_READERS
 from ..meshes.vtp import read_vtp
@@ -24,10 +25,12 @@ from .ply_vertices import read_ply
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from ...model.points import PointSet
     from ..fields import Cloud
+
+TILES = (".las", ".laz")
+"""Suffixes of the files of a folder that are read as one cloud; ``.copc.laz`` is one of them."""
 
 
 def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> PointSet:
@@ -41,7 +44,8 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
         ``.ptx``; ``.npy`` with an (n, 3) array or named fields; ``.npz`` with ``points`` or the like; ``.pcd``;
         ``.las``, ``.laz`` and ``.e57`` (with the extra ``clouds``, which compressed ``.pcd`` needs too); or the
         vertices of ``.obj``, ``.off``, ``.3mf``, ``.glb``, ``.gii`` and ``.stl`` (its equal positions become
-        one vertex); or a DICOM RT Structure Set, of which one structure's contours are taken.
+        one vertex); or a DICOM RT Structure Set, of which one structure's contours are taken; or a folder of ``.las``
+        and ``.laz`` tiles of one cloud.
     settings : CloudSettings, optional
         What to do where the file leaves a choice.
 
@@ -60,7 +64,7 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
         For text, NaN, ragged rows (it names the row), a count that lies, unknown suffixes, and a format whose
         package is not installed.
     GeometryError
-        Where a structure must be chosen, or its contours are no stack.
+        Where a structure must be chosen, or its contours are no stack; where tiles are in several units.
     EmptyError
         For a file without points.
     ResourceError
@@ -75,6 +79,8 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
     >>> cloud.positions.tolist(), cloud.attributes["intensity"].tolist()
     ([[0.0, 0.0, 0.0], [1.0, 0.0, 2.0]], [7, 8])
     """
+    if Path(path).is_dir():
+        return _read_tiles(existing(path))
     path = existing_file(path)
     if suffix_of(path) not in POINT_READERS and is_dicom(path):
         from ..dicom.objects.structures import read_structure  # its columns of contours load SciPy and the kernels
@@ -85,6 +91,34 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
         raise EmptyError("the cloud has no points", file=str(path))
     check_finite(positions, "row", file=str(path))
     return replace(point_set(positions, fields), **frame_of_cloud(path))
+
+
+def _read_tiles(folder: Path) -> PointSet:
+    """Read the tiles in a folder as one cloud; those without points are none."""
+    files, _ = regular_files(folder)
+    tiles = [path for path in files if suffix_of(path) in TILES]
+    if not tiles:
+        raise FormatError(
+            "the path is a folder", file=str(folder), expected="a file, or a folder of .las or .laz tiles"
+        )
+    clouds = [cloud for cloud in map(_tile, tiles) if cloud is not None]
+    if not clouds:
+        raise EmptyError("the tiles have no points", file=str(folder), found=f"{len(tiles)} file(s)")
+    units = {str(cloud.unit) for cloud in clouds}
+    if len(units) > 1:
+        raise GeometryError(
+            "the tiles are not of one cloud", file=str(folder), found=f"units = {', '.join(sorted(units))}",
+            expected="one coordinate system",
+        )  # fmt: skip
+    told = f"{len(clouds)} tiles of {len(files)} files in the folder were read as one cloud"
+    return replace(clouds[0].joined(*clouds[1:]), notes=(told,))
+
+
+def _tile(path: Path) -> PointSet | None:
+    try:
+        return read_points(path)
+    except EmptyError:
+        return None
 
 
 def _read_vertices(path: Path) -> Cloud:

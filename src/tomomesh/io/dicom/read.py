@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...errors import FormatError
 from ...model.volume import Volume
+from ..files.parts import read_later
 from ..files.source import counted
 from .bad import leave_out
 from .files import read_frames
@@ -17,6 +19,7 @@ from .headers.identity import identity_of
 from .headers.kinds import SEGMENTED, class_of
 from .headers.multiframe import placed_evenly
 from .headers.unit import gray_unit
+from .parts import opened
 from .pixels.decoder import Decoder
 from .series.choice import choose, stacks_among
 from .series.stack import Stack, stacked
@@ -130,7 +133,8 @@ def _decoded(
     notes: tuple[str, ...] = ()
     while True:
         stack = stacked(frames, settings, study=study)
-        levels = gray(stack, decode, study=study)
+        take = partial(opened, all_now=settings.skip_bad) if read_later() else gray
+        levels = take(stack, decode, study=study)
         if not levels.bad:
             return stack, levels, notes
         frames = [frame for frame in frames if frame.path not in levels.bad]

@@ -10,7 +10,7 @@ from ...errors import FormatError
 EXTRAS = {
     "tifffile": "tiff", "imagecodecs": "tiff", "zarr": "zarr",
     "laspy": "clouds", "lazrs": "clouds", "pye57": "clouds", "pypcd4": "clouds",
-    "pyproj": "clouds",
+    "pyproj": "clouds", "DracoPy": "neuroglancer", "pyfqmr": "neuroglancer",
 }  # fmt: skip
 """Package to the extra that brings it."""
 

@@ -7,6 +7,7 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
 from ...errors import FormatError, ResourceError, TomomeshError
+from ...memory.limit import free_disk
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,17 +48,18 @@ def require_memory(promised: int, *, file: str) -> None:
     Raises
     ------
     ResourceError
-        Where `promised` bytes are more than the physical memory.
+        Where `promised` bytes are more than the physical memory; where memory is limited, than the disk has room for.
     """
     if _asked.get():
         raise _Promise(promised)
-    memory = physical_memory()
-    if promised > memory:
+    disk = free_disk()
+    room = physical_memory() if disk is None else int(disk)
+    if promised > room:
         raise ResourceError(
-            "the data do not fit into the memory",
+            "the data do not fit into the memory" if disk is None else "the data do not fit onto the disk",
             file=file,
             found=f"size = {promised} bytes",
-            expected=f"at most {memory} bytes",
+            expected=f"at most {room} bytes",
             hint="a part of it, or a machine with more memory",
         )
 

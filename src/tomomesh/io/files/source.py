@@ -97,6 +97,23 @@ def whole(path: str | Path) -> bytes:
         raise UnreadableError("the file cannot be read", file=str(path), found=_reason(fault)) from None
 
 
+def stored(path: str | Path) -> memoryview:
+    """Return a regular file's bytes as those of an array, which lie where the memory's limit lets them (`memory`).
+
+    Raises
+    ------
+    UnreadableError, FormatError
+        As `existing_file`.
+    """
+    import numpy as np
+
+    path = existing_file(path)
+    try:
+        return np.fromfile(path, np.uint8).data
+    except OSError as fault:
+        raise UnreadableError("the file cannot be read", file=str(path), found=_reason(fault)) from None
+
+
 def first_bytes(path: Path, count: int) -> bytes:
     """Return a file's first bytes, fewer where it has fewer.
 

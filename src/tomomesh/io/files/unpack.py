@@ -10,11 +10,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ...errors import FormatError, ResourceError, UnreadableError
-from .limits import require_bytes, require_memory
+from .limits import require_bytes
 from .source import first_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -155,16 +155,13 @@ def _opened(plain: Any, packing: str) -> Any:
 
 
 def check_promise(promised: int, packed: int, packing: str, *, file: str) -> None:
-    """Compare the bytes that a header promises with the memory, and with what so many packed bytes can hold.
+    """Compare the bytes that a header promises with what so many packed bytes can hold.
 
     Raises
     ------
-    ResourceError
-        Where they do not fit into the memory.
     FormatError
         Where the file cannot hold them.
     """
-    require_memory(promised, file=file)
     require_bytes(promised, max(packed, 0) * RATIOS[packing], file=file)
 
 
@@ -187,7 +184,26 @@ def fill(data: NDArray[Any], stream: Any, *, file: str) -> None:
     done = 0
     while done < len(data) and (count := stream.readinto(data.data[done : done + BYTES_AT_ONCE])):
         done += count
-    require_bytes(len(data), done, file=file)
+    _end(len(data), done, stream, file)
+
+
+def copy(promised: int, stream: Any, write: Callable[[memoryview], object], *, file: str) -> None:
+    """Hand so many bytes of a stream on, some at once, and read the rest of a packed stream for its check sum.
+
+    Raises
+    ------
+    FormatError, ResourceError
+        As `fill`.
+    """
+    buffer, done = memoryview(bytearray(min(promised, BYTES_AT_ONCE))), 0
+    while done < promised and (count := stream.readinto(buffer[: promised - done])):
+        write(buffer[:count])
+        done += count
+    _end(promised, done, stream, file)
+
+
+def _end(promised: int, done: int, stream: Any, file: str) -> None:
+    require_bytes(promised, done, file=file)
     if isinstance(stream, (bz2.BZ2File, _Inflated)):
         _drain(stream, file)
 

@@ -10,7 +10,8 @@ from ...errors import FormatError, TomomeshError, UsageError
 from ..files.atomic import check_output, replacing
 from ..files.source import third_party, unheard
 from .attributes import MeshAttributes
-from .stl import read_stl, stl_bytes
+from .pieces.parts import InOnePiece
+from .stl import read_stl, stl_parts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -83,7 +84,7 @@ def write_encapsulated(mesh: TriMesh, path: str | Path, study: Mapping[str, Any]
     """
     check_output(path, ARCHIVED)
     check_archived(study, file=str(path))
-    document = stl_bytes(mesh, path, MeshAttributes("mm", "LPS", {}, {}))
+    document = b"".join(stl_parts(InOnePiece(mesh), path, MeshAttributes("mm", "LPS", {}, {})))
     with replacing(path) as file, unheard("pydicom"):  # which tells of a patient's fields that break its rules
         data = _described(document, study, "named" if patient else "not named")
         for keyword in PERSONAL:

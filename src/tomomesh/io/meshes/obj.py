@@ -10,18 +10,18 @@ import numpy as np
 
 from ...errors import FormatError
 from ..colors import named_colors
-from ..files.atomic import replacing
 from ..text import lists_of, numbers_of, written
 from .cells import fans, weld
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from ...model.mesh import TriMesh
     from .attributes import MeshAttributes
     from .cells import Arrays
+    from .pieces.parts import Parts
 
 VERTEX, FACE = re.compile(r"\s*[vV](?!\S)"), re.compile(r"\s*(f|F|fo)(?!\S)")
 """How the lines of vertices and of faces begin; old files name outlines of faces apart."""
@@ -30,18 +30,24 @@ BESIDE = re.compile(r"(?<=\d)/\S*")
 """The numbers of textures and normals behind that of a vertex."""
 
 
-def write_obj(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write 64-bit coordinates, and colors as fractions behind them."""
-    colors = named_colors(beside.vertex_fields)
-    behind = []
-    if colors:
-        # rounded up: VTK cuts off what it makes of them
-        fractions = [f" {math.ceil(value / 255 * 1e6) / 1e6:.6g}" for value in range(256)]
-        behind = [["".join(fractions[value] for value in color) for color in colors[1].tolist()]]
-    vertices = written(f"v %r %r %r{'%s' * len(behind)}\n", *mesh.vertices.T.tolist(), *behind)
-    faces = written("f %d %d %d\n", *(mesh.faces + 1).T.tolist())
-    with replacing(path) as file:
-        file.write(f"# {beside.head}\n{vertices}{faces}".encode("ascii"))
+def obj_parts(mesh: Parts, path: str | Path, beside: MeshAttributes) -> Iterator[bytes]:
+    """Yield a file part by part: 64-bit coordinates, and colors as fractions behind them."""
+    yield f"# {beside.head}\n".encode("ascii")
+    yield from (text.encode("ascii") for text in _vertices(mesh, beside))
+    yield from (written("f %d %d %d\n", *(some + 1).T.tolist()).encode("ascii") for some in mesh.faces())
+
+
+def _vertices(mesh: Parts, beside: MeshAttributes) -> Iterator[str]:
+    """Yield the lines of the vertices, some at a time."""
+    colors, start = named_colors(beside.vertex_fields), 0
+    # rounded up: VTK cuts off what it makes of them
+    fractions = [f" {math.ceil(value / 255 * 1e6) / 1e6:.6g}" for value in range(256)]
+    for some in mesh.vertices():
+        stop = start + len(some)
+        own = colors[1][start:stop].tolist() if colors else []
+        behind = [["".join(fractions[value] for value in color) for color in own]] if colors else []
+        yield written(f"v %r %r %r{'%s' * len(behind)}\n", *some.T.tolist(), *behind)
+        start = stop
 
 
 def read_obj_mesh(data: bytes, file: str) -> Arrays:

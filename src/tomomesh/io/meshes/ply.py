@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import FormatError
+from ...errors import FormatError, OutputError
 from ..fields import AXES
 from ..files.atomic import replacing
 from ..files.limits import require_bytes
-from .attributes import narrowed
+from .attributes import kind_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from ...model.mesh import TriMesh
     from ..fields import Fields
     from .attributes import MeshAttributes
+    from .pieces.parts import Parts
 
 TYPE_NAMES = {
     "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
@@ -40,6 +40,9 @@ TYPE_CODES = {
 
 WRITTEN = ("u1", "i4", "u4", "f4", "f8")
 """Codes of the types that are written: meshio's reader of binary files knows no other names of ours."""
+
+MOST_VERTICES = 2**31 - 1
+"""As many as ``int`` numbers, which every reader takes; ``uint``, the longest that PLY has, reaches twice as far."""
 
 LINE_END = re.compile(rb"[ \t]*(\r\n|\n|\r)")
 """The end of the header's last line: behind a lone carriage return the first row may begin with any byte but that of a
@@ -103,8 +106,8 @@ class PlyHeader:
         return self.elements[:at], (*self.elements, PlyElement(name, 0, ()))[at]
 
 
-def parse_header(data: bytes, *, file: str) -> PlyHeader:
-    """Read a PLY header and compare what it promises with what the file holds.
+def parse_header(data: bytes, *, file: str, size: int | None = None) -> PlyHeader:
+    """Read a PLY header and compare what it promises with what the file holds: `size` bytes, or those of `data`.
 
     Raises
     ------
@@ -124,7 +127,8 @@ def parse_header(data: bytes, *, file: str) -> PlyHeader:
     except (IndexError, KeyError, ValueError):
         raise FormatError("the PLY header cannot be understood", file=file) from None
     # the last row of a text needs no line end
-    require_bytes(promised - (1 if text else 0), len(data) - length, file=file)
+    held = len(data) if size is None else size
+    require_bytes(promised - (1 if text else 0), held - length, file=file)
     return header
 
 
@@ -147,20 +151,48 @@ def _elements(lines: list[list[str]]) -> list[PlyElement]:
     return [PlyElement(name, count, tuple(properties)) for name, count, properties in found]
 
 
-def write_ply_mesh(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write 64-bit coordinates, or 32-bit ones where asked for, with all fields, of vertices and of faces."""
-    positions = dict(zip(AXES, narrowed(mesh.vertices, single=beside.single).T, strict=True))
-    write_ply(path, beside.head, {**positions, **beside.vertex_fields}, mesh.faces, beside.face_fields)
+def ply_parts(mesh: Parts, path: str | Path, beside: MeshAttributes) -> Iterator[bytes]:
+    """Yield a file part by part: 64-bit coordinates, or 32-bit ones where asked for, with all fields.
+
+    Raises
+    ------
+    OutputError
+        For more vertices than the format's numbers reach.
+    """
+    if mesh.vertex_count > MOST_VERTICES:
+        raise OutputError(
+            "PLY numbers vertices in 32 bits", file=str(path), found=f"vertices = {mesh.vertex_count}",
+            expected=f"at most {MOST_VERTICES}", hint="an .obj file, or --pieces",
+        )  # fmt: skip
+    kind = kind_of(mesh, beside)
+    at, on = ({name: _storable(values) for name, values in one.items()} for one in _fields(beside))
+    vertices = _numbered((dict(zip(AXES, some.astype(kind).T, strict=True)) for some in mesh.vertices()), at)
+    faces = _numbered(({"count": _threes(some), "corners": some.astype(np.int32)} for some in mesh.faces()), on)
+    lines = _element("vertex", mesh.vertex_count, {**dict.fromkeys(AXES, np.empty(0, kind)), **at})
+    lines += [f"element face {mesh.face_count}", "property list uchar int vertex_indices", *_properties(on)]
+    yield _head(beside.head, lines)
+    yield from (_rows(some).tobytes() for rows in (vertices, faces) for some in rows)
 
 
-def write_ply(
-    path: str | Path,
-    comment: str,
-    vertices: Mapping[str, NDArray[Any]],
-    faces: NDArray[np.int64] | None = None,
-    face_fields: Mapping[str, NDArray[Any]] | None = None,
-) -> None:
-    """Write a binary PLY file, little-endian.
+def _fields(beside: MeshAttributes) -> tuple[Fields, Fields]:
+    return beside.vertex_fields, beside.face_fields
+
+
+def _threes(faces: NDArray[np.int64]) -> NDArray[np.uint8]:
+    return np.full(len(faces), 3, np.uint8)
+
+
+def _numbered(parts: Iterator[Fields], fields: Fields) -> Iterator[Fields]:
+    """Put the rows of the fields of the whole behind the columns of each part."""
+    start = 0
+    for columns in parts:
+        stop = start + len(next(iter(columns.values())))
+        yield columns | {name: values[start:stop] for name, values in fields.items()}
+        start = stop
+
+
+def write_ply(path: str | Path, comment: str, vertices: Mapping[str, NDArray[Any]]) -> None:
+    """Write points as a binary PLY file, little-endian.
 
     Parameters
     ----------
@@ -171,23 +203,21 @@ def write_ply(
     vertices : mapping of str to (n,) array
         One column a property; other small integers than bytes become ``int``, which every reader
         knows, and integers that PLY has no type for doubles.
-    faces : (m, 3) int array, optional
-        Vertex numbers.
-    face_fields : mapping of str to (m,) array, optional
-        Properties of the faces, behind their vertices.
     """
-    lines = ["ply", "format binary_little_endian 1.0", f"comment {comment}"]
     columns: Fields = {name: _storable(column) for name, column in vertices.items()}
-    body = [_rows(columns)]
-    lines += [f"element vertex {len(body[0])}", *_properties(columns)]
-    if faces is not None:
-        columns = {name: _storable(column) for name, column in (face_fields or {}).items()}
-        corners: Fields = {"count": np.full(len(faces), 3, np.uint8), "corners": faces.astype(np.int32)}
-        body.append(_rows({**corners, **columns}))
-        lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", *_properties(columns)]
+    rows = _rows(columns)
     with replacing(path) as file:
-        file.write(("\n".join([*lines, "end_header"]) + "\n").encode("ascii"))
-        file.writelines(rows.tobytes() for rows in body)
+        file.write(_head(comment, _element("vertex", len(rows), columns)))
+        file.write(rows.tobytes())
+
+
+def _head(comment: str, elements: list[str]) -> bytes:
+    lines = ["ply", "format binary_little_endian 1.0", f"comment {comment}", *elements, "end_header\n"]
+    return "\n".join(lines).encode("ascii")
+
+
+def _element(name: str, count: int, columns: Mapping[str, NDArray[Any]]) -> list[str]:
+    return [f"element {name} {count}", *_properties(columns)]
 
 
 def _storable(column: NDArray[Any]) -> NDArray[Any]:

@@ -54,7 +54,7 @@ def read_ply_mesh(data: bytes, file: str) -> Arrays:
     return vertices, np.concatenate(faces)
 
 
-def rows_of(data: bytes, header: PlyHeader, name: str, file: str) -> tuple[Fields, Lists]:
+def rows_of(data: bytes | memoryview, header: PlyHeader, name: str, file: str) -> tuple[Fields, Lists]:
     """Return the single properties of an element, and its lists; none where there is no such element.
 
     Raises
@@ -68,7 +68,7 @@ def rows_of(data: bytes, header: PlyHeader, name: str, file: str) -> tuple[Field
     if len(set(element.names)) < len(element.names):
         raise FormatError("two properties have one name", file=file, found=f"element = {name}")
     if header.format == "ascii":
-        return _of_text(data, header, sum(one.count for one in before), element, file)
+        return _of_text(bytes(data), header, sum(one.count for one in before), element, file)
     order, start = BYTE_ORDERS[header.format], start_of(data, header, before, file)
     block = _block(data, start, element, order)
     if block is not None:
@@ -78,7 +78,7 @@ def rows_of(data: bytes, header: PlyHeader, name: str, file: str) -> tuple[Field
     return gathered(np.frombuffer(data, np.uint8), starts, element.names, element.types(order), items)
 
 
-def start_of(data: bytes, header: PlyHeader, before: tuple[PlyElement, ...], file: str) -> int:
+def start_of(data: bytes | memoryview, header: PlyHeader, before: tuple[PlyElement, ...], file: str) -> int:
     """Return where the rows behind some elements of a binary file begin."""
     order, start = BYTE_ORDERS[header.format], header.length
     for element in before:
@@ -87,7 +87,9 @@ def start_of(data: bytes, header: PlyHeader, before: tuple[PlyElement, ...], fil
     return start
 
 
-def row_places(data: bytes, start: int, element: PlyElement, order: str, file: str) -> tuple[NDArray[np.int64], int]:
+def row_places(
+    data: bytes | memoryview, start: int, element: PlyElement, order: str, file: str
+) -> tuple[NDArray[np.int64], int]:
     """Return where the rows of an element begin, the first at `start`, and where they end.
 
     Raises
@@ -119,7 +121,7 @@ def _stepped(
     return starts, end
 
 
-def _block(data: bytes, start: int, element: PlyElement, order: str) -> NDArray[Any] | None:
+def _block(data: bytes | memoryview, start: int, element: PlyElement, order: str) -> NDArray[Any] | None:
     """Return the rows as one array where each list is as long in all of them; None where they differ."""
     kinds: list[tuple[Any, ...]] = []
     for words, kind in zip(element.properties, element.types(order), strict=True):

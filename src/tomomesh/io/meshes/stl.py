@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...errors import FormatError
-from ...model.columns import parts_of
-from ...model.mesh import TriMesh
+from ...errors import FormatError, OutputError
 from ..fields import doubles
-from ..files.atomic import replacing
 from ..files.limits import require_bytes
-from .attributes import single_precision
+from .attributes import require_single
 from .cells import weld
 
 if TYPE_CHECKING:
@@ -24,6 +21,7 @@ if TYPE_CHECKING:
 
     from .attributes import MeshAttributes
     from .cells import Arrays
+    from .pieces.parts import Parts
 
 FACE = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")]
 """One face of a binary STL file."""
@@ -33,6 +31,9 @@ LONGEST_NAME = 2**16
 
 STL_HEADER_BYTES = 80
 """Bytes of text at the start of a binary STL file."""
+
+MOST_FACES = 2**32 - 2
+"""As many as the count holds; one more says that the count was not known."""
 
 BEFORE_FACES = STL_HEADER_BYTES + 4
 """Bytes before the first face: the text, and the count of faces."""
@@ -106,42 +107,26 @@ def _text_corners(data: bytes, file: str) -> NDArray[np.float64]:
     return corners
 
 
-def write_stl(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> None:
-    """Write a binary file.
+def stl_parts(mesh: Parts, path: str | Path, beside: MeshAttributes) -> Iterator[bytes]:
+    """Yield a binary file part by part: 32-bit coordinates, each face with its normal, behind a header with the frame.
 
     Raises
     ------
     OutputError
-        Where 32 bits cannot keep the vertices apart.
+        Where 32 bits cannot keep the vertices apart, or cannot count the faces; `path` is named.
     """
-    parts = _stl_parts(mesh, path, beside)
-    head = next(parts)  # refused before a file is begun
-    with replacing(path) as file:
-        file.write(head)
-        file.writelines(parts)
-
-
-def stl_bytes(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> bytes:
-    """Return a binary file: 32-bit coordinates, each face with its normal, behind a header that names the frame.
-
-    Raises
-    ------
-    OutputError
-        Where 32 bits cannot keep the vertices apart; `path` is named.
-    """
-    return b"".join(_stl_parts(mesh, path, beside))
-
-
-def _stl_parts(mesh: TriMesh, path: str | Path, beside: MeshAttributes) -> Iterator[bytes]:
-    """Yield the bytes of a file part by part, first those before the faces."""
-    places = single_precision(mesh.vertices, path, kind="STL")
+    if mesh.face_count > MOST_FACES:
+        raise OutputError(
+            "STL counts faces in 32 bits", file=str(path), found=f"faces = {mesh.face_count}",
+            expected=f"at most {MOST_FACES}", hint="a .ply file, or --pieces",
+        )  # fmt: skip
+    require_single(mesh, path, kind="STL", known=beside.fits)
     head = _shortened(beside.head).encode("ascii").ljust(STL_HEADER_BYTES)
-    yield head + np.array(len(mesh.faces), "<u4").tobytes()
-    for part in parts_of(len(mesh.faces)):
-        some = TriMesh(mesh.vertices, mesh.faces[part])
-        rows = np.zeros(len(some.faces), FACE)
-        rows["corners"] = places[some.faces]
-        normals = some.face_vectors
+    yield head + np.array(mesh.face_count, "<u4").tobytes()
+    for corners in mesh.corners():
+        rows = np.zeros(len(corners), FACE)
+        rows["corners"] = corners
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         rows["normal"] = normals / np.where(length > 0, length, 1.0)
         yield rows.tobytes()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ...errors import UsageError
+from ...model.mesh import TriMesh
 from ...model.points import COLORS
 from ..fields import AXES, flat_columns
 from ..files.atomic import check_output
@@ -11,24 +13,25 @@ from ..files.source import suffix_of
 from .attributes import MeshAttributes
 from .gifti import is_bare, write_gifti
 from .glb import write_glb
-from .obj import write_obj
+from .obj import obj_parts
 from .off import write_off
-from .ply import write_ply_mesh
-from .stl import write_stl
+from .pieces.parts import InOnePiece, write_parts
+from .ply import ply_parts
+from .stl import stl_parts
 from .threemf import write_3mf
 from .vtp import write_vtp_mesh
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from ...model.mesh import TriMesh
+    from .pieces.parts import Parts
 
 
 def write_mesh(
-    mesh: TriMesh,
+    mesh: TriMesh | Parts,
     path: str | Path,
     *,
     unit: str = "mm",
@@ -42,8 +45,9 @@ def write_mesh(
 
     Parameters
     ----------
-    mesh : TriMesh
-        Its coordinates are written as they are.
+    mesh : TriMesh or Parts
+        Its coordinates are written as they are. One that is never whole, `tomomesh.slabs.patches.patch.Patches`, is
+        written part by part: as ``.ply``, ``.stl`` or ``.obj``.
     path : path
         ``.ply`` and ``.vtp`` (binary), ``.obj``, ``.off`` and ``.3mf`` (text) keep 64-bit coordinates; ``.stl``,
         ``.glb`` and ``.gii`` (binary; Connectome Workbench wants ``.surf.gii``) 32-bit ones, as do 3MF's readers.
@@ -76,11 +80,20 @@ def write_mesh(
     >>> Path("corner.stl").stat().st_size == 84 + 50 * len(corner.faces)
     True
     """
+    parts = InOnePiece(mesh) if isinstance(mesh, TriMesh) else mesh
     check_output(path, MESH_WRITERS)
-    at_vertices = flat_columns(vertex_fields or {}, len(mesh.vertices), AXES)
-    on_faces = flat_columns(face_fields or {}, len(mesh.faces), ["count", "corners", "vertex_indices"])
+    at_vertices = flat_columns(vertex_fields or {}, parts.vertex_count, AXES)
+    on_faces = flat_columns(face_fields or {}, parts.face_count, ["count", "corners", "vertex_indices"])
     beside = MeshAttributes(unit, frame, at_vertices, on_faces, z_up=z_up, single=precision == 32)
-    MESH_WRITERS[suffix_of(path)](mesh, path, beside)
+    if suffix_of(path) in PART_WRITERS:
+        write_parts(PART_WRITERS[suffix_of(path)](parts, path, beside), path)
+    elif isinstance(mesh, TriMesh):
+        WHOLE_WRITERS[suffix_of(path)](mesh, path, beside)
+    else:
+        raise UsageError(
+            "the format is not written part by part, as a mesh larger than memory is", file=str(path),
+            expected=" | ".join(sorted(PART_WRITERS)),
+        )  # fmt: skip
 
 
 KEEP_ALL = (".ply", ".vtp")
@@ -99,10 +112,13 @@ def keeps(path: str | Path, field: str, *, on_faces: bool = False) -> bool:
     return suffix in KEEP_AT_VERTICES or (suffix in KEEP_COLORS and field in COLORS)
 
 
-MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, MeshAttributes], None]] = {
-    ".stl": write_stl,
-    ".ply": write_ply_mesh,
-    ".obj": write_obj,
+PART_WRITERS: dict[str, Callable[[Parts, str | Path, MeshAttributes], Iterator[bytes]]] = {
+    ".stl": stl_parts,
+    ".ply": ply_parts,
+    ".obj": obj_parts,
+}
+"""Suffix to what yields a file of a mesh that need not be whole, part by part."""
+WHOLE_WRITERS: dict[str, Callable[[TriMesh, str | Path, MeshAttributes], None]] = {
     ".off": write_off,
     ".glb": write_glb,
     ".vtp": write_vtp_mesh,
@@ -111,3 +127,5 @@ MESH_WRITERS: dict[str, Callable[[TriMesh, str | Path, MeshAttributes], None]] =
     ".surf.gii": write_gifti,
 }
 """Suffix to writer; that of a surface for Connectome Workbench is both, of which the last decides."""
+MESH_WRITERS = (*PART_WRITERS, *WHOLE_WRITERS)
+"""Suffixes of meshes that are written."""

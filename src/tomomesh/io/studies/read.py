@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from ..dicom import index_in, is_dicom, is_index, is_segmentation, lone_object, 
 from ..dicom.headers.kinds import STRUCTURES, storage_class
 from ..dicom.objects.segmentation import read_segmentation
 from ..files.archive import unpacked_zip
+from ..files.parts import Each, reading_later
 from ..files.source import counted, existing, existing_file, regular_files, suffix_of
 from ..volumes.images import FAMILIES, read_images
 from ..volumes.metaimage import read_metaimage
@@ -47,7 +49,7 @@ def _read_one_dicom(
 
 def _read_zip(path: Path, settings: ReadSettings, select: Sequence[int] | None = None) -> Volume:
     """Read the slices in an archive, or the only volume; archives inside it are not opened."""
-    with unpacked_zip(path) as folder:
+    with unpacked_zip(path) as folder, reading_later(None):  # the folder is gone afterwards
         files, _ = regular_files(folder, deep=True)
         stores = [folder] if is_zarr(folder) else [path for path in folder.iterdir() if path.is_dir() and is_zarr(path)]
         whole = stores + [file for file in volumes_among(files) if suffix_of(file) not in ARCHIVES]
@@ -82,6 +84,9 @@ READABLE = "a folder of DICOM, PNG, TIFF or JPEG slices, of OME-Zarr, a DICOM fi
     suffix for suffix in VOLUME_READERS if suffix not in (".dcm", ".ima")
 )
 
+
+WHOLE = "read whole into the memory: files of this kind cannot be read in parts"
+"""The note on a study that was to be read in parts."""
 
 VOXELS = (".img", ".img.gz")
 """Suffixes of files that belong to a header beside them."""
@@ -168,6 +173,40 @@ def read_volume(
             hint="the folder of the slices" if suffix_of(path) in FAMILIES else "",
         )
     return reader(path, settings)
+
+
+def open_study(
+    path: str | Path | Sequence[str | Path],
+    settings: ReadSettings | None = None,
+    *,
+    select: Sequence[int] | None = None,
+    each: Each = map,
+) -> Volume:
+    """Open a study whose voxels are read later, part by part: it may be larger than the memory.
+
+    Parameters
+    ----------
+    path, settings, select
+        As `read_volume`.
+    each : callable
+        Who goes through all voxels where that cannot wait, those of real numbers, in search of NaN: ``each(work,
+        parts)`` returns what the work finds in every part, as `map` does, one after another. Both can be pickled.
+
+    Returns
+    -------
+    Volume
+        As `read_volume` returns it, but its `voxels` are a `LazyVoxels`. What gzip, zlib or bzip2 pack is unpacked into
+        a private file first. Of archives, DICOM segmentations, segments in several layers, and voxels written as text,
+        no part can be read alone: they are read whole, and a note says so.
+
+    Raises
+    ------
+    UnreadableError, FormatError, GeometryError, UsageError, ResourceError
+        As `read_volume`; what lies in a damaged part is told when that is read.
+    """
+    with reading_later(each):
+        opened = read_volume(path, settings=settings, select=select)
+    return opened if opened.in_parts is not None else replace(opened, notes=(*opened.notes, WHOLE))
 
 
 def _read_folder(folder: Path, settings: ReadSettings, select: Sequence[int] | None) -> Volume:

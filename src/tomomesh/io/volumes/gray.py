@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...errors import FormatError, GeometryError
+from ...model.lazy import LazyVoxels, Voxels, in_memory, slabs
+from ..files.parts import each_part
 
 if TYPE_CHECKING:
     from numpy.typing import DTypeLike, NDArray
@@ -19,7 +23,7 @@ ONE_BIT = "pixels of one bit: a mask of 0 and 1"
 """The note on them."""
 
 
-def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
+def native(voxels: Voxels, *, file: str) -> Voxels:
     """Return real numbers in the machine's own byte order, turned in place; truth values are 0 and 1.
 
     Raises
@@ -27,6 +31,9 @@ def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
     FormatError
         For complex and other kinds of voxels.
     """
+    if isinstance(voxels, LazyVoxels):
+        kind = native(np.empty(0, voxels.dtype), file=file).dtype
+        return voxels.map(partial(native, file=file), kind)
     if voxels.dtype == np.bool_:
         return np.minimum(voxels.view(np.uint8), 1)
     if voxels.dtype.kind not in "iuf" or voxels.dtype.itemsize > 8:
@@ -41,7 +48,7 @@ def native(voxels: NDArray[Any], *, file: str) -> NDArray[Any]:
     return voxels.byteswap(inplace=True).view(kind) if turned else voxels.astype(kind, copy=False)
 
 
-def bright_is_high(voxels: NDArray[Any], bits: int) -> tuple[NDArray[Any], tuple[str, ...]]:
+def bright_is_high(voxels: Voxels, bits: int) -> tuple[Voxels, tuple[str, ...]]:
     """Turn over, in place, the gray levels of TIFF pages that are WhiteIsZero, as `io.dicom` does MONOCHROME1's.
 
     Parameters
@@ -60,6 +67,8 @@ def bright_is_high(voxels: NDArray[Any], bits: int) -> tuple[NDArray[Any], tuple
     """
     if not bits:
         return voxels, ()
+    if isinstance(voxels, LazyVoxels):
+        return voxels.map(partial(_bright, bits=bits), voxels.dtype), bright_is_high(np.empty(0, voxels.dtype), bits)[1]
     if bits == 1:
         return voxels, (ONE_BIT,)
     if voxels.dtype.kind != "u":
@@ -68,6 +77,10 @@ def bright_is_high(voxels: NDArray[Any], bits: int) -> tuple[NDArray[Any], tuple
     return np.subtract(black, voxels, out=voxels), (
         "low gray levels are bright in the file (WhiteIsZero): they were turned over",
     )
+
+
+def _bright(voxels: NDArray[Any], bits: int) -> NDArray[Any]:
+    return bright_is_high(voxels, bits)[0]
 
 
 def check_scale(slope: float, intercept: float, *, file: str) -> None:
@@ -87,8 +100,10 @@ def check_scale(slope: float, intercept: float, *, file: str) -> None:
         )
 
 
-def scaled(stored: NDArray[Any], slope: float, intercept: float, dtype: DTypeLike) -> NDArray[Any]:
+def scaled(stored: Voxels, slope: float, intercept: float, dtype: DTypeLike) -> Voxels:
     """Return ``slope * stored + intercept``, computed and kept in `dtype`."""
+    if isinstance(stored, LazyVoxels):
+        return stored.map(partial(scaled, slope=slope, intercept=intercept, dtype=dtype), dtype)
     if slope == 1 and intercept == 0:
         return stored.astype(dtype, copy=False)
     levels = stored.astype(dtype)
@@ -122,7 +137,15 @@ def scaled_dtype(dtype: DTypeLike, scales: list[tuple[float, float]], bits: int 
     return np.dtype(np.float32 if stored.itemsize <= 2 or stored == np.float32 else np.float64)
 
 
-def without_holes(voxels: NDArray[Any], *, file: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+def stays_finite(stored: np.dtype[Any], scale: tuple[float, float], dtype: np.dtype[Any]) -> bool:
+    """Tell whether whatever is stored becomes a finite number: whole numbers do, but for a scale beyond `dtype`."""
+    if dtype.kind != "f" or stored.kind == "f":
+        return dtype.kind != "f"
+    with np.errstate(over="ignore"):
+        return bool(np.isfinite(scaled(np.array([np.iinfo(stored).min, np.iinfo(stored).max]), *scale, dtype)).all())
+
+
+def without_holes(voxels: Voxels, *, file: str) -> tuple[Voxels, tuple[str, ...]]:
     """Set NaN and infinite voxels to the lowest finite gray level, and count them.
 
     Raises
@@ -132,16 +155,33 @@ def without_holes(voxels: NDArray[Any], *, file: str) -> tuple[NDArray[Any], tup
     """
     if voxels.dtype.kind != "f":
         return voxels, ()
-    count = voxels.size - sum(np.count_nonzero(np.isfinite(part)) for part in voxels)  # by slices: no mask of all
-    if 2 * count > voxels.size:
+    total = math.prod(voxels.shape)
+    counts, lowest = zip(*each_part(_finite, slabs(voxels)), strict=True)
+    count = total - sum(counts)
+    if 2 * count > total:
         raise GeometryError(
             "more than half of the voxels are no numbers",
             file=file,
-            found=f"NaN or infinite = {count} of {voxels.size}",
+            found=f"NaN or infinite = {count} of {total}",
         )
     if count == 0:
         return voxels, ()
-    holes = ~np.isfinite(voxels)
-    return np.where(holes, voxels.min(where=~holes, initial=np.inf), voxels), (
-        f"NaN or infinite voxels set to the background: {count}",
-    )
+    note, low = f"NaN or infinite voxels set to the background: {count}", min(lowest)
+    if isinstance(voxels, LazyVoxels):
+        return voxels.map(partial(_filled, low=low), voxels.dtype), (note,)
+    return _filled(voxels, low), (note,)
+
+
+def _finite(voxels: NDArray[Any] | LazyVoxels) -> tuple[int, np.floating[Any]]:
+    """Count the finite voxels, and find the lowest of them."""
+    count, low = 0, np.inf
+    for part in in_memory(voxels):  # slice by slice: no mask of all
+        finite = np.isfinite(part)
+        within = int(np.count_nonzero(finite))
+        count += within
+        low = min(low, part.min() if within == part.size else part.min(where=finite, initial=np.inf))
+    return count, voxels.dtype.type(low)
+
+
+def _filled(voxels: NDArray[Any], low: np.floating[Any]) -> NDArray[Any]:
+    return np.where(np.isfinite(voxels), voxels, low)

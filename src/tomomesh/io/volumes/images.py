@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...errors import FormatError, GeometryError, ResourceError
+from ...model.lazy import LazyVoxels
 from ...model.volume import Volume
 from ...settings import ReadSettings
 from ..files.limits import require_memory
+from ..files.parts import Seen, read_later
 from ..files.source import existing_file, first_bytes, suffix_of, third_party
 from .affine import required_spacing, upright
 from .gray import WHITE_IS_ZERO, bright_is_high, native, without_holes
@@ -78,15 +81,56 @@ def read_images(files: list[Path], settings: ReadSettings, *, folder: str) -> Vo
     spacing = required_spacing(settings.spacing, file=folder, what=f"{kinds[0]} slices hold no spacing")
     ordered, told = in_order(files)
     first, turned = _pixels(ordered[0])
-    require_memory(first.nbytes * len(ordered), file=folder)
-    stack = np.empty((len(ordered), *first.shape), first.dtype)
-    for k, path in enumerate(ordered):
-        pixels, more = _pixels(path)
-        _check_same_kind(pixels, first, path.name, ordered[0].name)
-        stack[k], turned = pixels, turned or more
+    if read_later():
+        seen = tuple(map(Seen.of, ordered))
+        stack: Any = LazyVoxels.of(Pictures((len(seen), *first.shape), first.dtype, seen))
+    else:
+        require_memory(first.nbytes * len(ordered), file=folder)
+        stack = np.empty((len(ordered), *first.shape), first.dtype)
+        for k, path in enumerate(ordered):
+            pixels, more = _pixels(path)
+            _check_same_kind(pixels, first, path.name, ordered[0].name)
+            stack[k], turned = pixels, turned or more
     voxels, notes = without_holes(native(stack, file=folder), file=folder)
     note = f"{len(ordered)} {kinds[0]} slices in the order of their names: columns left, rows back, slices up"
     return Volume.from_stored(voxels, upright(spacing), notes=(note, *told, *turned, *notes))
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """Slices, each in a file of its own.
+
+    Attributes
+    ----------
+    shape : tuple of int
+    dtype : data type
+    files : tuple of Seen
+    """
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    files: tuple[Seen, ...]
+
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Sizes of what is read together: a slice."""
+        return (1, *self.shape[1:])
+
+    def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
+        """Return a part.
+
+        Raises
+        ------
+        FormatError, UnreadableError, GeometryError
+            For slices that are damaged, of another kind than the first, or were written since they were opened.
+        """
+        return np.stack([self._slice(one)[box[1:]] for one in self.files[box[0]]])
+
+    def _slice(self, seen: Seen) -> NDArray[Any]:
+        pixels, _ = _pixels(seen.unchanged())
+        first = np.broadcast_to(np.zeros((), self.dtype), self.shape[1:])
+        _check_same_kind(pixels, first, seen.path.name, self.files[0].path.name)
+        return pixels
 
 
 def read_picture(path: str | Path) -> Volume:

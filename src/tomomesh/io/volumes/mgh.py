@@ -10,10 +10,11 @@ from ...errors import FormatError
 from ...model.volume import Volume
 from ..files.limits import require_bytes
 from ..files.source import existing_file, third_party
-from ..files.unpack import check_promise, fill, packing_of, unpacked
+from ..files.unpack import packing_of, unpacked
 from .affine import check_affine, check_spacing, passed_over
-from .gray import native, without_holes
+from .gray import without_holes
 from .nifti_frame import FLIP
+from .raster import Raster, read_raster
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,14 +62,11 @@ def read_mgh(path: Path, settings: ReadSettings) -> Volume:
     packing = packing_of(path)
     with unpacked(path, packing, file=name) as stream:
         start = stream.read(MGH_HEADER_BYTES)
-        header = _header(start, name)
-        shape, dtype = _layout(header, name)
-        affine, notes = _frame(header, start[HAS_FRAME] == b"\0\1", name)
-        promised = shape[0] * shape[1] * shape[2] * dtype.itemsize
-        check_promise(MGH_HEADER_BYTES + promised, path.stat().st_size, packing, file=name)
-        data = np.empty(promised, np.uint8)
-        fill(data, stream, file=name)
-    voxels, more = without_holes(native(data.view(dtype).reshape(shape[::-1]), file=name), file=name)
+    header = _header(start, name)
+    shape, dtype = _layout(header, name)
+    affine, notes = _frame(header, start[HAS_FRAME] == b"\0\1", name)
+    raster = Raster(shape[::-1], dtype, packing, (path,), skip=MGH_HEADER_BYTES)
+    voxels, more = without_holes(read_raster(raster, file=name), file=name)
     return Volume.from_stored(voxels, affine, notes=notes + passed_over(settings.spacing) + more)
 
 

@@ -11,15 +11,14 @@ from ...errors import FormatError
 from ...model.volume import Volume
 from ..files.detached import beside
 from ..files.source import existing_file, suffix_of
-from ..files.unpack import check_promise, fill, packing_of, pass_over, unpacked
-from .gray import native, scaled, scaled_dtype, without_holes
+from ..files.unpack import packing_of, unpacked
+from .gray import scaled, scaled_dtype, stays_finite, without_holes
 from .nifti_frame import frame_of
 from .nifti_header import NIFTI_HEADERS, NiftiLayout, layout_of, unpack_header
+from .raster import Raster, read_raster
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from numpy.typing import NDArray
 
     from ...settings import ReadSettings
 
@@ -56,12 +55,7 @@ def read_nifti(path: Path, settings: ReadSettings) -> Volume:
         header = unpack_header(stream.read(max(NIFTI_HEADERS)), settings, paired=front != back, file=name)
     layout = layout_of(header, paired=front != back, file=name)
     affine, notes, other = frame_of(header, settings, layout.shape, name)
-    check_promise(layout.offset + layout.promised, back.stat().st_size, packing_of(back), file=name)
-    data = np.empty(layout.promised, np.uint8)
-    with unpacked(back, packing_of(back), file=name) as stream:
-        pass_over(stream, layout.offset)
-        fill(data, stream, file=name)
-    stored, more = _gray(data, layout, name)
+    stored, more = _gray(back, layout, name)
     return replace(Volume.from_stored(stored, affine, notes=notes + layout.notes + more), other_frame=other)
 
 
@@ -85,11 +79,15 @@ def _files(path: Path) -> tuple[Path, Path]:
     return (path, partner) if suffix == ".hdr" else (partner, path)
 
 
-def _gray(data: NDArray[np.uint8], layout: NiftiLayout, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+def _gray(path: Path, layout: NiftiLayout, name: str) -> tuple[Any, tuple[str, ...]]:
     """Return voxels (K, J, I[, 3]); they are stored fastest axis first."""
-    shape = layout.shape[::-1]
-    if layout.dtype.names:
-        return data.reshape(*shape, len(layout.dtype.names))[..., :3], ()
-    stored = native(data.view(layout.dtype).reshape(shape), file=name)
-    dtype = scaled_dtype(stored.dtype, [(layout.slope, layout.intercept)])
-    return without_holes(scaled(stored, layout.slope, layout.intercept, dtype), file=name)
+    colors = len(layout.dtype.names or ())
+    shape, kind = (*layout.shape[::-1], *([colors] if colors else [])), layout.dtype
+    raster = Raster(shape, np.dtype(np.uint8) if colors else kind, packing_of(path), (path,), skip=layout.offset)
+    stored = read_raster(raster, file=name)
+    if colors:
+        return stored[:, :, :, :3], ()
+    scale = layout.slope, layout.intercept
+    dtype = scaled_dtype(stored.dtype, [scale])
+    levels = scaled(stored, *scale, dtype)
+    return (levels, ()) if stays_finite(stored.dtype, scale, dtype) else without_holes(levels, file=name)

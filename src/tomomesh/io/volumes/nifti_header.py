@@ -74,11 +74,6 @@ class NiftiLayout:
     intercept: float
     notes: tuple[str, ...] = ()
 
-    @property
-    def promised(self) -> int:
-        """Bytes of all voxels."""
-        return self.shape[0] * self.shape[1] * self.shape[2] * self.dtype.itemsize
-
 
 def unpack_header(start: bytes, settings: ReadSettings, *, paired: bool, file: str) -> Any:
     """Return the header among a file's first bytes, with the fields as they stand.

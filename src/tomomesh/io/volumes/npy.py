@@ -52,8 +52,9 @@ def read_npy_volume(path: Path, settings: ReadSettings) -> Volume:
             expected="(slices, rows, columns), or colors behind",
         )
     spacing = required_spacing(settings.spacing, file=name, what="NPY arrays hold no spacing")
-    numbers = read_raster(Raster(shape[::-1] if by_columns else shape, dtype, PLAIN, (path,), start), file=name)
-    stored = (numbers.T if by_columns else numbers).reshape(*plain[:3], -1)
+    order = slice(None, None, -1 if by_columns else 1)
+    raster = Raster((*plain, 1)[:4][order], dtype, PLAIN, (path,), start)
+    stored = read_raster(raster, file=name).transpose((0, 1, 2, 3)[order])
     voxels, notes = gray_or_color(stored, stored.shape[3], file=name, named=False)
     return Volume.from_stored(voxels, upright(spacing), notes=(GIVEN, *notes))
 

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import FormatError
+from ...model.lazy import LazyVoxels, Voxels, in_memory, layer_of, slabs
 from ..files.limits import require_bytes, require_memory, require_rows
+from ..files.numbers import FileNumbers, Plain, Unpacked
+from ..files.parts import Seen, read_later
 from ..files.source import existing_file, first_bytes, third_party, whole
-from ..files.unpack import check_promise, fill, pass_over, unpacked
+from ..files.unpack import PLAIN, check_promise, fill, pass_over, unpacked
 from .gray import native, without_holes
 
 if TYPE_CHECKING:
@@ -113,8 +116,13 @@ def floats_of(words: Sequence[str], field: str, *, file: str) -> NDArray[np.floa
         raise FormatError("a field of the header is no number", file=file, found=found, expected="numbers") from None
 
 
-def read_raster(raster: Raster, *, file: str) -> NDArray[Any]:
-    """Read the promised numbers, in the machine's byte order.
+def read_raster(raster: Raster, *, file: str) -> Any:
+    """Read the promised numbers, in the machine's byte order; or leave them where they are, where that is wanted.
+
+    Returns
+    -------
+    array or LazyVoxels
+        Of the shape that the header promises.
 
     Raises
     ------
@@ -126,6 +134,8 @@ def read_raster(raster: Raster, *, file: str) -> NDArray[Any]:
     if math.prod(raster.shape) % len(raster.parts):
         found = f"files = {len(raster.parts)}, shape = {raster.shape[::-1]}"
         raise FormatError("the data files cannot hold as many voxels each", file=file, found=found)
+    if read_later() and raster.packing not in (TEXT, HEX) and raster.shape[0] % len(raster.parts) == 0:
+        return native(LazyVoxels.of(_opened(raster, file)), file=file)
     require_memory(len(raster.parts) * raster.part_bytes, file=file)
     if raster.packing == TEXT:
         return native(np.concatenate([_words(raster, part, file) for part in raster.parts]), file=file).reshape(
@@ -141,6 +151,46 @@ def read_raster(raster: Raster, *, file: str) -> NDArray[Any]:
             pass_over(stream, raster.skip)
             fill(row, stream, file=file)
     return native(data.reshape(-1).view(raster.dtype).reshape(raster.shape), file=file)
+
+
+def at_once(voxels: NDArray[Any] | LazyVoxels, *, file: str) -> NDArray[Any]:
+    """Return voxels as an array, read where they are not.
+
+    Raises
+    ------
+    ResourceError
+        Where they do not fit into the memory.
+    """
+    if isinstance(voxels, LazyVoxels):
+        require_memory(math.prod(voxels.shape) * voxels.dtype.itemsize, file=file)
+    return in_memory(voxels)
+
+
+def layers_last(stored: Any, space: Sequence[int], *, file: str) -> Any:
+    """Return voxels (K, J, I, layers) of an array whose last axis is one of 1.
+
+    Parameters
+    ----------
+    stored : array or LazyVoxels
+    space : sequence of int
+        The axes of slices, rows and columns; all others become one, behind them.
+    file : str
+    """
+    others = sorted({*range(stored.ndim)} - {*space}, key=lambda axis: stored.shape[axis] == 1)
+    turned = stored.transpose((*space, *others))
+    while isinstance(turned, LazyVoxels) and turned.ndim > 4 and turned.shape[-1] == 1:
+        turned = turned.layer(0)
+    return turned if turned.ndim == 4 else at_once(turned, file=file).reshape(*turned.shape[:3], -1)
+
+
+def _opened(raster: Raster, file: str) -> FileNumbers:
+    """Return the numbers where they are, unpacked where they have to be."""
+    starts, seen = [_start(raster, part, file) for part in raster.parts], tuple(map(Seen.of, raster.parts))
+    if raster.packing == PLAIN:
+        plain = (Plain(one, start + raster.skip) for one, start in zip(seen, starts, strict=True))
+        return FileNumbers(raster.shape, raster.dtype, tuple(plain))
+    packed = Unpacked(seen, tuple(starts), raster.packing, raster.skip, raster.part_bytes, file)
+    return FileNumbers(raster.shape, raster.dtype, (packed.now(),))
 
 
 def _start(raster: Raster, part: Path, file: str) -> int:
@@ -169,15 +219,20 @@ def _from_digits(raster: Raster, part: Path, file: str) -> bytes:
     return found
 
 
-def many_levels(stored: NDArray[Any]) -> bool:
+def many_levels(stored: Voxels) -> bool:
     """Tell whether a layer of bytes (K, J, I, channels) has more levels than a mask."""
-    layers = np.moveaxis(stored, 3, 0) if stored.dtype == np.uint8 else ()
-    return any(np.count_nonzero(np.bincount(layer.ravel(), minlength=256)) > 2 for layer in layers)
+    if stored.dtype != np.uint8:
+        return False
+    seen = np.zeros((stored.shape[3], 256), np.bool_)
+    for slab in slabs(stored):
+        for layer, levels in zip(np.moveaxis(in_memory(slab), 3, 0), seen, strict=True):
+            levels |= np.bincount(layer.ravel(), minlength=256) > 0
+        if (seen.sum(axis=1) > 2).any():
+            return True
+    return False
 
 
-def gray_or_color(
-    stored: NDArray[Any], channels: int, *, file: str, named: bool = True
-) -> tuple[NDArray[Any], tuple[str, ...]]:
+def gray_or_color(stored: Voxels, channels: int, *, file: str, named: bool = True) -> tuple[Voxels, tuple[str, ...]]:
     """Return voxels (K, J, I), or (K, J, I, 3) of bytes, from an array whose last axis is that of the channels.
 
     Parameters
@@ -197,9 +252,9 @@ def gray_or_color(
         Where more than half of the voxels are no numbers.
     """
     if channels == 1:
-        return without_holes(stored[..., 0], file=file)
+        return without_holes(layer_of(stored, 0), file=file)
     if channels in (3, 4) and stored.dtype == np.uint8 and (named or many_levels(stored)):
-        return stored[..., :3], ()
+        return stored[:, :, :, :3], ()
     raise FormatError(
         "the file holds several values a voxel",
         file=file,

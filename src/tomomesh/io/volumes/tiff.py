@@ -6,35 +6,32 @@ NumPy; files packed by LZW, JPEG and others need imagecodecs too, 20 MB of compi
 
 from __future__ import annotations
 
-import logging
 import math
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
 
 from ...errors import FormatError
+from ...model.lazy import LazyVoxels
 from ...model.units import millimeters
 from ...model.volume import Volume
 from ..files.extras import required
 from ..files.limits import require_bytes, require_memory
+from ..files.numbers import FileNumbers, Plain
+from ..files.parts import Seen, read_later
 from ..files.source import existing_file, third_party
 from .affine import GIVEN, UNTURNED, check_spacing, passed_over, required_spacing, upright
 from .gray import WHITE_IS_ZERO, bright_is_high, native
-from .raster import gray_or_color
-from .tiff_pages import check_chain
+from .raster import gray_or_color, layers_last
+from .tiff_pages import Pages, opened, page_axes, pages_of, stack_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
 
     from ...settings import ReadSettings
-
-SLICES = "ZIQ"
-"""tifffile's letters for the axis of a stack: Z, or pages of an unknown kind."""
 
 UNPACKED_WITHOUT = (1, 8, 32946)
 """Compressions, none and deflate, that need no further package."""
@@ -68,8 +65,8 @@ def read_tiff(path: Path, settings: ReadSettings) -> Volume:
         As the pages demand; `FormatError` too where the package is not installed.
     """
     name = str(existing_file(path))
-    with _opened(path, name) as pages:
-        found = _stack(pages.series, name)
+    with opened(path, name) as pages:
+        found = stack_of(pages.series, name)
         spacing, notes = _spacing(pages, settings, name)
         stored, more = _stored(found, path, name)
     return Volume.from_stored(stored, upright(spacing), notes=notes + more)
@@ -83,110 +80,43 @@ def read_page(path: Path) -> tuple[NDArray[Any], tuple[str, ...]]:
     FormatError, ResourceError
         As the page demands; `FormatError` too where the package is not installed.
     """
-    with _opened(path, path.name) as pages:
+    with opened(path, path.name) as pages:
         if len(pages.pages) > 1:
             raise FormatError("the file holds several pages", file=path.name, expected="one slice a file")
         stored, notes = _stored(pages.series[:1], path, path.name)
     return stored[0], notes
 
 
-@contextmanager
-def _opened(path: Path, name: str) -> Iterator[Any]:
-    tifffile = required("tifffile", file=name)
-    check_chain(path, file=name)
-    with _complaints_refused(name), third_party("tifffile", name), tifffile.TiffFile(path, _multifile=False) as pages:
-        yield pages
-
-
-def _stored(found: list[Any], path: Path, name: str) -> tuple[NDArray[Any], tuple[str, ...]]:
+def _stored(found: list[Any], path: Path, name: str) -> tuple[Any, tuple[str, ...]]:
     """Return the voxels (K, J, I), or (K, J, I, 3), of a stack, and notes."""
-    require_memory(sum(one.nbytes for one in found), file=name)
+    if not read_later():
+        require_memory(sum(one.nbytes for one in found), file=name)
     for one in found:
         _check_promise(one, path.stat().st_size, name)
-    parts = [one.asarray() for one in found]
-    if any(part.shape != one.shape for part, one in zip(parts, found, strict=True)):
-        raise ValueError(parts[0].shape)
-    keyframe, page = found[0].keyframe, found[0].shape[found[0].ndim - len(_page_axes(found[0])) :]
-    stored = (parts[0] if len(parts) == 1 else np.stack(parts)).reshape(-1, *page)
-    stored = native(stored, file=name)
+    keyframe, planar = found[0].keyframe, page_axes(found[0]) == "SYX"
+    stored = native(_numbers(found, path, name), file=name)
     bits = keyframe.bitspersample if keyframe.photometric == WHITE_IS_ZERO or keyframe.bitspersample == 1 else 0
     stored, turned = bright_is_high(stored, bits)
-    stored = np.moveaxis(stored, 1, -1) if _page_axes(found[0]) == "SYX" else stored.reshape(*stored.shape[:3], -1)
+    stored = layers_last(stored, (0, 2, 3) if planar else (0, 1, 2), file=name)
     voxels, more = gray_or_color(stored, stored.shape[3], file=name)
     return voxels, turned + more
 
 
-class _Complaints(logging.Handler):
-    """Keep what is logged as an error."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.ERROR)
-        self.found: list[logging.LogRecord] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.found.append(record)
-
-
-@contextmanager
-def _complaints_refused(name: str) -> Iterator[None]:
-    """Refuse what tifffile only logs: pages behind a broken link would be missing in silence."""
-    complaints, logger = _Complaints(), logging.getLogger("tifffile")
-    propagate, logger.propagate = logger.propagate, False
-    logger.addHandler(complaints)
-    try:
-        yield
-    except FormatError:
-        if not complaints.found:  # else they tell why
-            raise
-    finally:
-        logger.removeHandler(complaints)
-        logger.propagate = propagate
-    if complaints.found:
-        raise FormatError(
-            "the pages of the file are damaged",
-            file=name,
-            found=f"tifffile = {len(complaints.found)} complaints",
-            expected="a whole and valid file",
-            hint="a fresh copy of the file",
-        )
-
-
-def _stack(series: list[Any], name: str) -> list[Any]:
-    """Return the one stack of a file, or the pages of one size that were written one by one; none that is a preview."""
-    found = [one for one in series if not one.keyframe.is_reduced] or series
-    kinds = {(one.kind, one.axes, one.shape, one.dtype) for one in found}
-    alone = found[0].kind == "shaped" and not _before_page(found[0])  # as tifffile writes pages one by one
-    if len(found) > 1 and (len(kinds) > 1 or not alone):
-        raise FormatError(
-            "the file holds several images",
-            file=name,
-            found=f"images = {len(found)}",
-            expected="one stack of pages of one size",
-            hint="one stack, written to a file of its own",
-        )
-    before = "".join(_before_page(found[0]))
-    if len(found) == 1 and not before:
-        raise FormatError("the file holds one slice", file=name, hint="the folder of the slices")
-    if len(before) > 1 or before.strip(SLICES):
-        raise FormatError(
-            f"the file holds several {'channels' if before.strip(SLICES) == 'C' else 'frames'}",
-            file=name,
-            found=f"axes = {found[0].axes}, shape = {found[0].shape}",
-            expected="slices, rows and columns",
-            hint="one of them, written to a file of its own",
-        )
-    return found
-
-
-def _page_axes(series: Any) -> str:
-    """Return the letters of the axes within a page; S is a color, which may be planar."""
-    return next(axes for axes in ("SYX", "YXS", "YX", series.axes) if series.axes.endswith(axes))
-
-
-def _before_page(series: Any) -> list[str]:
-    """Return the letters of the axes before those of a page along which there is more than one."""
-    before = len(series.axes) - len(_page_axes(series))
-    return [axis for axis, size in zip(series.axes[:before], series.shape[:before], strict=True) if size > 1]
+def _numbers(found: list[Any], path: Path, name: str) -> Any:
+    """Return the numbers of a stack, slices first, with an axis of 1 behind; or leave them where they are."""
+    page = found[0].shape[found[0].ndim - len(page_axes(found[0])) :]
+    count = sum(math.prod(one.shape) for one in found) // math.prod(page)
+    shape, start = (count, *page, 1), found[0].dataoffset
+    if read_later() and len(found) == 1 and start is not None:
+        kind = found[0].dtype.newbyteorder(found[0].keyframe.parent.byteorder)
+        return LazyVoxels.of(FileNumbers(shape, kind, (Plain(Seen.of(path), start),)))
+    if read_later() and len(pages_of(found)) == count:
+        return LazyVoxels.of(Pages(shape, found[0].dtype, Seen.of(path), name))
+    require_memory(sum(one.nbytes for one in found), file=name)
+    parts = [one.asarray() for one in found]
+    if any(part.shape != one.shape for part, one in zip(parts, found, strict=True)):
+        raise ValueError(parts[0].shape)
+    return (parts[0] if len(parts) == 1 else np.stack(parts)).reshape(shape)
 
 
 def _check_promise(series: Any, size: int, name: str) -> None:

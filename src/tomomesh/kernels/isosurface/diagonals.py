@@ -132,7 +132,7 @@ def choose_diagonals(
     normals : (q, 4, 3) float32 array
         Of `list_normals`.
     twins : (q, 4) int32 array
-        What is beyond each side, see `tomomesh.kernels.isosurface.voxels.list_fans`.
+        What is beyond each side, see `tomomesh.kernels.isosurface.voxels.list_fans`; -1 where more than one square is.
     allowed : (q,) uint8 array
         See `allow_diagonals`.
     choice : (q,) uint8 array
@@ -155,7 +155,7 @@ def choose_diagonals(
         second = bend(normals, f, 2, f, 3) if allowed[f] & 2 else np.inf
         for side in range(0 if alone else 4):
             beyond, there = twins[f, side] >> 2, twins[f, side] & 3
-            turned = int(choice[beyond])
+            turned = int(choice[beyond]) if beyond >= 0 else NEITHER
             if turned < NEITHER:
                 other = 2 * turned + ((there - turned & 3) >> 1)
                 first += bend(normals, f, side >> 1, beyond, other)

@@ -28,9 +28,9 @@ def mean_of(
     ----------
     values : (n, 3) float array
     members : (m, s) int32 array
-        Rows of `values`, one at least; -1 stands for none.
+        Rows of `values`; -1 stands for none.
     means : (m, 3) float array
-        Result.
+        Result; 0 where there are none.
     start, stop : int
         Lists to work on.
 
@@ -48,7 +48,7 @@ def mean_of(
                 y += values[n, 1]
                 z += values[n, 2]
                 count += 1
-        share = 1.0 / count
+        share = 1.0 / max(count, 1)
         means[m, 0], means[m, 1], means[m, 2] = x * share, y * share, z * share
 
 
@@ -61,7 +61,7 @@ def mean_of_numbers(values: Numbers, members: Ints, means: Numbers, start: int, 
             n = members[m, s]
             if n >= 0:
                 total, count = total + values[n], count + 1
-        means[m] = total / count
+        means[m] = total / max(count, 1)
 
 
 @kernel("void(f8[:,::1], i4[:,::1], f8[:,::1], u1[::1], f8[::1], i8, i8)")

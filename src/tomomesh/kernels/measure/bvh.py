@@ -74,41 +74,41 @@ def curve_keys(
         keys[m] = key
 
 
-@kernel("void(i8[::1], i4[::1])")
+@kernel("void(i8[:,::1], i4[:,::1])")
 def order_keys(keys: NDArray[np.int64], order: NDArray[np.int32]) -> None:
-    """Find the order of keys, equal ones in their order.
+    """Sort keys, and find their order, equal ones in theirs.
 
     Parameters
     ----------
-    keys : (m,) int64 array
-        Not negative.
-    order : (m,) int32 array
-        Result: numbers of the keys from the lowest to the highest.
+    keys : (2, m) int64 array
+        Not negative, in the first row. Result: there too, rising; the second is room to work in.
+    order : (2, m) int32 array
+        Result, in the first row: numbers of the keys from the lowest to the highest; the second is room to work in.
 
     Notes
     -----
     Sorts by counting, one digit after the other from the lowest; digits that are the same in all keys are left out.
     """
-    mask = (1 << DIGIT) - 1
+    mask, here, count = (1 << DIGIT) - 1, 0, keys.shape[1]
     begin = np.zeros((DIGITS, mask + 2), np.int32)
-    here, there, before = keys.copy(), np.empty_like(keys), np.empty_like(order)
-    for m in range(len(keys)):
-        order[m] = m
+    for m in range(count):
+        order[0, m] = m
         for digit in range(DIGITS):
-            begin[digit, (keys[m] >> DIGIT * digit & mask) + 1] += 1
+            begin[digit, (keys[0, m] >> DIGIT * digit & mask) + 1] += 1
     for digit in range(DIGITS):
-        if begin[digit].max() == len(keys):
+        if begin[digit].max() == count:
             continue
         for value in range(mask):
             begin[digit, value + 1] += begin[digit, value]
-        for m in range(len(keys)):
-            before[m] = order[m]
-        for m in range(len(keys)):
-            value = here[m] >> DIGIT * digit & mask
+        there = 1 - here
+        for m in range(count):
+            value = keys[here, m] >> DIGIT * digit & mask
             place = begin[digit, value]
-            order[place], there[place] = before[m], here[m]
+            order[there, place], keys[there, place] = order[here, m], keys[here, m]
             begin[digit, value] += 1
-        here, there = there, here
+        here = there
+    if here:
+        keys[0], order[0] = keys[1], order[1]
 
 
 @kernel("i8(f8[:,::1])")

@@ -46,8 +46,8 @@ def sort_few(keys: Ints, numbers: Ints, start: int, stop: int) -> None:
     keys[start:stop], numbers[start:stop] = keys[start:stop][ranked], numbers[start:stop][ranked]
 
 
-@kernel("i8(i4[:,::1], i8, i4[::1], i4[::1])")
-def order_half_edges(faces: Ints, count: int, order: Ints, first: Ints) -> int:
+@kernel("i8(i4[:,::1], i8, i4[::1], i4[::1], i4[::1])")
+def order_half_edges(faces: Ints, count: int, order: Ints, first: Ints, highs: Ints) -> int:
     """Put the half edges of one undirected edge beside each other.
 
     Parameters
@@ -60,6 +60,8 @@ def order_half_edges(faces: Ints, count: int, order: Ints, first: Ints) -> int:
         Result: half edges by their lower, then by their higher end, then by their number.
     first : (3 m + 1,) int32 array
         Result: the half edges of edge e are ``order[first[e]:first[e + 1]]``.
+    highs : (3 m,) int32 array
+        Room to work in.
 
     Returns
     -------
@@ -71,7 +73,6 @@ def order_half_edges(faces: Ints, count: int, order: Ints, first: Ints) -> int:
     Sorts by counting by the lower ends, and then the few of each by insertion, so the cost is linear.
     """
     begin = np.zeros(count + 1, np.int32)
-    highs = np.empty(len(order), np.int32)
     for face in range(len(faces)):
         a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
         begin[min(a, b) + 1] += 1

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...isosurface.run_mask import RunMask
 from ...model.lazy import LazyVoxels, in_memory
+from .levels import LevelCounts, gathered
 from .sources import Made
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from ...model.boxes import Box
     from ...slabs.keep import Slabs
+    from .levels import Levels, Looked
     from .sources import Making, Voxels
 
 TOGETHER = 2**21
@@ -144,24 +146,38 @@ class Cut:
             found[box[0]] = work(self.voxels[box[0]], box)
         return replace(self, voxels=found)
 
-    def sampled(self, every: Sequence[int]) -> NDArray[Any]:
-        """Return every n-th voxel along each axis (K, J, I), brought here."""
-        return np.concatenate(list(self.each(partial(_every, every=tuple(every)))))
+    def sampled(self, *every: Sequence[int]) -> list[NDArray[Any]]:
+        """Return every n-th voxel along each axis (K, J, I), brought here, for one or several choices of n."""
+        return [np.concatenate(parts) for parts in zip(*self.each(partial(_every, every=every)), strict=True)]
 
     @cached_property
-    def ends(self) -> tuple[Any, Any]:
+    def levels(self) -> Levels:
+        """What percentiles and histograms of all gray levels follow from."""
+        return self.layer(None)
+
+    def layer(self, number: int | None) -> Levels:
+        """Return the same of one layer of a study in color."""
+        return gathered(lambda work: self.sum(partial(_alone, work, number)), self.voxels.dtype)
+
+    @cached_property
+    def ends(self) -> tuple[float, float]:
         """The lowest and the highest level, NaN where any is NaN."""
+        if isinstance(self.levels, LevelCounts):
+            return self.levels.ends
         lows, highs = zip(*self.each(_ends), strict=True)
-        return np.minimum.reduce(lows), np.maximum.reduce(highs)
+        return float(np.minimum.reduce(lows)), float(np.maximum.reduce(highs))
 
 
 def _read_first(work: Callable[..., Any], part: Voxels, *rest: Any) -> Any:
     return work(in_memory(part), *rest)
 
 
-def _every(levels: NDArray[Any], box: Box, *, every: tuple[int, ...]) -> NDArray[Any]:
-    first = -box[0].start % every[0]
-    return np.array(levels[first :: every[0], :: every[1], :: every[2]])
+def _every(levels: NDArray[Any], box: Box, *, every: Sequence[Sequence[int]]) -> list[NDArray[Any]]:
+    return [np.array(levels[-box[0].start % k :: k, ::j, ::i]) for k, j, i in every]
+
+
+def _alone(work: Looked, layer: int | None, levels: NDArray[Any], box: Box) -> Any:
+    return work(levels if layer is None else levels[..., layer])
 
 
 def _ends(levels: NDArray[Any], box: Box) -> tuple[Any, Any]:

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from ....errors import TomomeshError
 from ...files.limits import require_memory
+from ...files.parts import read_later
 from ...files.source import third_party
 from ..headers.dataset import inflated
 from ..headers.deflated import DEFLATED
 from ..headers.element import PixelElement, pixel_element
 from .child import Child
 from .encapsulated import LARGEST_FRAME_BYTES, SYNTAXES, read_encapsulated
-from .layout import PixelLayout, layout_of
+from .layout import PixelLayout, layout_of, syntax_of
 from .levels import levels
 from .native import NATIVE, check_native, read_native
 from .rle import is_gray_rle, read_rle
@@ -80,13 +81,30 @@ class Decoder:
             if not alone and layout.frame_bytes <= LARGEST_FRAME_BYTES:
                 self._child.ready(layout.frame_bytes)
 
+    def check(self, frame: ImageFrame) -> None:
+        """Compare what the file of a frame promises with what it holds; of compressed pixels that is not known yet.
+
+        Raises
+        ------
+        FormatError, ResourceError
+            As reading the frame does.
+        """
+        if syntax_of(frame.header) in NATIVE - {DEFLATED}:
+            self._open(frame)
+
     def _read(self, frame: ImageFrame) -> NDArray[Any]:
+        opened = self._open(frame)
         with third_party("pydicom", frame.path.name):
-            if self._opened is None or self._opened.path != frame.path:
-                self._files.close()
+            pixels, photometric = self._pixels(opened, frame.number)
+            return levels(pixels, photometric, opened.layout, frame.header)
+
+    def _open(self, frame: ImageFrame) -> _Opened:
+        if self._opened is None or self._opened.path != frame.path:
+            self._files.close()
+            self._opened = None
+            with third_party("pydicom", frame.path.name):
                 self._opened = _opened(frame, self._files)
-            pixels, photometric = self._pixels(self._opened, frame.number)
-            return levels(pixels, photometric, self._opened.layout, frame.header)
+        return self._opened
 
     def _pixels(self, opened: _Opened, number: int) -> tuple[NDArray[Any], str]:
         if opened.codes and is_gray_rle(opened.layout):
@@ -106,7 +124,7 @@ def _opened(frame: ImageFrame, files: ExitStack) -> _Opened:
     else:
         element = pixel_element(file, frame.header, name=frame.path.name)
     layout = layout_of(frame, element.keyword)
-    require_memory(layout.frames * layout.frame_bytes, file=layout.name)
+    require_memory((1 if read_later() else layout.frames) * layout.frame_bytes, file=layout.name)
     if layout.syntax not in NATIVE:
         return _Opened(frame.path, file, element, layout, read_encapsulated(file, element, layout))
     check_native(element, layout)

@@ -16,15 +16,24 @@ from ....model.volume import Volume
 from ...files.detached import beside, check_count, numbered
 from ...files.source import first_bytes
 from ...files.unpack import BZIP2, GZIP, PLAIN
-from ..raster import HEX, LONGEST_HEADER, TEXT, Raster, gray_or_color, header_bytes, many_levels, read_raster, sizes_of
+from ..raster import (
+    HEX,
+    LONGEST_HEADER,
+    TEXT,
+    Raster,
+    gray_or_color,
+    header_bytes,
+    layers_last,
+    many_levels,
+    read_raster,
+    sizes_of,
+)
 from .nrrd_frame import frame_of, is_spatial
 from .segments import Segment, label_map, segments_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
-
-    from numpy.typing import NDArray
 
     from ....settings import ReadSettings
     from ..raster import HeaderFields
@@ -94,7 +103,8 @@ def read_nrrd(path: Path, settings: ReadSettings, select: Sequence[int] | None =
     spatial = is_spatial(fields, sizes, file=name)
     affine, notes = frame_of(fields, spatial, settings, file=name)
     segments = segments_in(fields, file=name)
-    stored = _channels_last(read_raster(_raster(fields, sizes, path, length, name), file=name), spatial)
+    numbers = read_raster(_raster(fields, sizes, path, length, name), file=name)
+    stored = layers_last(numbers, [axis for axis, space in enumerate(spatial[::-1]) if space], file=name)
     if segments:
         voxels, more = label_map(stored, segments, select, file=name)
     else:
@@ -162,8 +172,8 @@ def _raster(fields: HeaderFields, sizes: tuple[int, ...], path: Path, length: in
     start = max([length, 0][bool(fields.get("datafile"))], 0)
     start = _after_lines(parts[0], start, lines, name) if lines > 0 else start
     if packing != PLAIN:
-        return Raster(sizes[::-1], dtype, packing, parts, start, max(skip, 0))
-    return Raster(sizes[::-1], dtype, packing, parts, -1 if skip < 0 else start + skip)
+        return Raster((*sizes[::-1], 1), dtype, packing, parts, start, max(skip, 0))
+    return Raster((*sizes[::-1], 1), dtype, packing, parts, -1 if skip < 0 else start + skip)
 
 
 def _dtype(fields: HeaderFields, name: str) -> np.dtype[Any]:
@@ -210,9 +220,7 @@ def _after_lines(part: Path, start: int, lines: int, name: str) -> int:
     return start + ends[lines - 1]
 
 
-def _check_kinds(
-    fields: HeaderFields, sizes: tuple[int, ...], spatial: list[bool], stored: NDArray[Any], name: str
-) -> None:
+def _check_kinds(fields: HeaderFields, sizes: tuple[int, ...], spatial: list[bool], stored: Any, name: str) -> None:
     """Refuse vectors and lists of three bytes, which are no colors, but for those that ITK calls vectors."""
     kinds = fields.get("kinds", "").lower().split()
     if len(kinds) != len(sizes):
@@ -228,11 +236,3 @@ def _check_kinds(
             expected="one gray level, a color, or segments with names",
             hint="one of them, written to a file of its own; or the kind RGB-color in the header, where it is a color",
         )
-
-
-def _channels_last(stored: NDArray[Any], spatial: list[bool]) -> NDArray[Any]:
-    """Return (K, J, I, channels): the other axes behind the three of space."""
-    order = [axis for axis, space in enumerate(spatial[::-1]) if space]
-    others = [axis for axis, space in enumerate(spatial[::-1]) if not space]
-    turned = np.transpose(stored, (*order, *others))
-    return turned.reshape(*turned.shape[:3], -1)

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....errors import EmptyError, FormatError, GeometryError
+from ....model.lazy import layer_of
 from ...names import shown
+from ..raster import at_once
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -74,13 +76,13 @@ def _segment(place: int, told: Mapping[str, str], file: str) -> Segment:
 
 
 def label_map(
-    layers: NDArray[Any], segments: Mapping[int, Segment], select: Sequence[int] | None, *, file: str
-) -> tuple[NDArray[Any], tuple[str, ...]]:
+    layers: Any, segments: Mapping[int, Segment], select: Sequence[int] | None, *, file: str
+) -> tuple[Any, tuple[str, ...]]:
     """Return the numbers of segments as voxels, (K, J, I).
 
     Parameters
     ----------
-    layers : (K, J, I, layers) int array
+    layers : (K, J, I, layers) int array or LazyVoxels
     segments : mapping of int to Segment
     select : sequence of int or None
         Those that are wanted, which may overlap: the smaller wins. Others are not looked at.
@@ -96,7 +98,7 @@ def label_map(
     """
     notes = (f"segments: {_named(segments)}",)
     if layers.shape[3] == 1:
-        return layers[..., 0], notes
+        return layer_of(layers, 0), notes
     beyond = [number for number, one in segments.items() if one.layer >= layers.shape[3]]
     if beyond:
         found = f"segment {beyond[0]} = layer {segments[beyond[0]].layer}, layers = {layers.shape[3]}"
@@ -105,6 +107,7 @@ def label_map(
     if missing:
         found, expected = f"--select {missing[0]}", f"segments among {_named(segments)}"
         raise EmptyError("the segmentation has no such segment", file=file, found=found, expected=expected)
+    layers = at_once(layers, file=file)
     wanted = [number for number in segments if select is None or number in select]
     voxels = np.zeros(layers.shape[:3], np.min_scalar_type(max(segments)))
     sizes = {number: int(np.count_nonzero(_mask(layers, segments[number]))) for number in wanted}

@@ -9,22 +9,27 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import stat
-from pathlib import Path
+from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ....errors import FormatError, ResourceError
+from ....errors import FormatError, ResourceError, UnreadableError
+from ....model.lazy import LazyVoxels
 from ...files.detached import beside
 from ...files.extras import required
 from ...files.limits import require_memory
+from ...files.parts import Seen, read_later
 from ...files.source import third_party, whole
 from ..gray import native
+from .missing import are_fill, grid_of, missing_chunks, unit_of
 from .packed_chunk import promised_bytes
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
 DOCUMENTS = ("zarr.json", ".zarray")
@@ -39,10 +44,6 @@ CODECS = {
 
 MOST_CHUNKS = 2**22
 """Most chunks that an array may have; of 64 cubed voxels, a usual size, they are a million million voxels."""
-
-TORN = 0.25
-"""A missing chunk was lost where more than this part of the voxels beside it differ from the fill value: what writers
-leave out is background, which an object touches in part at most; around a lost part of it, it is on all sides."""
 
 
 def document_of(folder: Path, name: str, *, file: str) -> dict[str, Any]:
@@ -75,11 +76,11 @@ def open_array(folder: Path, *, file: str) -> Any:
     described = document_of(folder, DOCUMENTS[3 - version], file=file)
     _check_codecs(described, file)
     with third_party("zarr", file):
-        store = zarr.storage.LocalStore(folder, read_only=True)
+        store = zarr.storage.LocalStore(folder.absolute(), read_only=True)
         array = zarr.open_array(store, mode="r", zarr_format=version)
-        unit = math.prod(array.shards or array.chunks)
-    require_memory(max(math.prod(array.shape), unit) * array.dtype.itemsize, file=file)
-    if 0 in array.shape or math.prod(_grid(array)) > MOST_CHUNKS:
+        least = array.chunks if read_later() else tuple(map(max, array.shape, unit_of(array)))
+    require_memory(math.prod(least) * array.dtype.itemsize, file=file)
+    if 0 in array.shape or math.prod(grid_of(array)) > MOST_CHUNKS:
         found = f"shape = {array.shape}, chunks = {array.chunks}"
         raise FormatError("the sizes of the array are invalid", file=file, found=found)
     return array
@@ -106,13 +107,86 @@ def _codecs(described: Any) -> list[str]:
     return names + [name for codec in codecs for name in _codecs(codec.get("configuration") or {})]
 
 
-def _grid(array: Any) -> tuple[int, ...]:
-    """Return how many chunks, or shards, lie along each axis."""
-    return tuple(-(-size // chunk) for size, chunk in zip(array.shape, array.shards or array.chunks, strict=True))
+@dataclass(frozen=True, eq=False)
+class Chunks:
+    """An array in chunks, each of which is checked before it is read.
+
+    Attributes
+    ----------
+    array : zarr.Array
+        It holds the path of its folder, and no file open.
+    folder : Path
+    document : Seen
+        What describes it.
+    missing : bool array
+        The chunks, or shards, that were not there when it was opened.
+    file : str
+        The path as the user typed it.
+    """
+
+    array: Any
+    folder: Path
+    document: Seen
+    missing: NDArray[np.bool_]
+    file: str
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Sizes of all axes, and one of 1 behind them."""
+        return (*self.array.shape, 1)
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the numbers."""
+        dtype: np.dtype[Any] = self.array.dtype
+        return dtype
+
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Sizes of the chunks; in shards, of those inside."""
+        return (*self.array.chunks, 1)
+
+    def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
+        """Return a part.
+
+        Raises
+        ------
+        FormatError, UnreadableError, ResourceError
+            For chunks that are damaged, or gone since the array was opened.
+        """
+        self.document.unchanged()
+        for key in self._keys(box):
+            self._check_length(key)
+        with third_party("zarr", self.file):
+            return np.asarray(self.array[box[:-1]])[..., None]
+
+    def _keys(self, box: tuple[slice, ...]) -> Iterator[str]:
+        """Return the keys of the chunks in a box, but for those that were not there."""
+        sides = zip(box, self.array.shape, unit_of(self.array), strict=False)
+        touched = [np.unique(np.arange(size)[side] // unit).tolist() for side, size, unit in sides]
+        for place in product(*touched):
+            if not self.missing[place]:
+                yield self.array.metadata.encode_chunk_key(place)
+
+    def _check_length(self, key: str) -> None:
+        """Compare what a chunk holds with its voxels; shards, and zstd's that do not say it, are passed over."""
+        if not (self.folder / key).is_file():
+            found, hint = f"chunk = {key}", "the same command again, once nothing writes to the folder"
+            raise UnreadableError("a chunk is gone since the array was opened", file=self.file, found=found, hint=hint)
+        codecs = self.array.compressors[-1:] if not self.array.shards else ()
+        packing = next((str(getattr(codec, "codec_id", type(codec).__name__)) for codec in codecs), "")
+        most = 2 * math.prod(self.array.chunks) * self.array.dtype.itemsize + 2**16
+        packing = packing.removesuffix("Codec").lower()
+        promised = promised_bytes(self.folder / key, packing, most, file=self.file)
+        if promised > most:
+            found = f"chunk = {promised} bytes and more"
+            raise ResourceError(
+                "a chunk holds far more than its voxels", file=self.file, found=found, expected=f"{most} bytes"
+            )
 
 
-def read_array(array: Any, folder: Path, *, fill_chunks: bool, file: str) -> tuple[NDArray[Any], tuple[str, ...]]:
-    """Read all voxels, and say how many chunks there are not.
+def read_array(array: Any, folder: Path, *, fill_chunks: bool, file: str) -> tuple[Any, tuple[str, ...]]:
+    """Read all voxels, or leave them where they are, and say how many chunks there are not.
 
     Parameters
     ----------
@@ -123,21 +197,25 @@ def read_array(array: Any, folder: Path, *, fill_chunks: bool, file: str) -> tup
     fill_chunks : bool
         Whether missing chunks are taken for the fill value whatever lies beside them.
 
+    Returns
+    -------
+    voxels : array or LazyVoxels
+        With an axis of 1 behind those of the array.
+    notes : tuple of str
+
     Raises
     ------
     FormatError
         For damaged chunks, and for missing ones that were not left out because they hold the fill value.
     """
-    files = _files(folder, file)
-    missing = _missing(array, files)
-    _check_lengths(array, files, file)
-    with third_party("zarr", file):
-        voxels = array[...]
-    voxels = native(voxels, file=file)
+    missing = missing_chunks(array, folder, file)
+    document = next(folder / name for name in DOCUMENTS if (folder / name).exists())
+    lazy = LazyVoxels.of(Chunks(array, folder.absolute(), Seen.of(document), missing, file))
+    voxels = native(lazy, file=file) if read_later() else native(lazy.read(), file=file)
     if not missing.any():
         return voxels, ()
     fill, told = array.fill_value, f"{int(missing.sum())} of {missing.size}"
-    if missing.all() or not (fill_chunks or _are_fill(voxels, missing, array.shards or array.chunks, fill)):
+    if missing.all() or not (fill_chunks or are_fill(voxels, missing, unit_of(array), fill)):
         raise FormatError(
             "chunks of the array are missing",
             file=file,
@@ -146,71 +224,3 @@ def read_array(array: Any, folder: Path, *, fill_chunks: bool, file: str) -> tup
             hint="" if missing.all() else f"a fresh copy of the folder, or --fill-chunks, which takes them for {fill}",
         )
     return voxels, (f"chunks that are not in the file, taken for the fill value {fill}: {told}",)
-
-
-def _files(folder: Path, file: str) -> dict[str, Path]:
-    """Return the files of an array by their keys; nothing is opened where one of them is a link."""
-    found = {}
-    for parent, folders, names in os.walk(folder):
-        for path in (Path(parent, name) for name in (*folders, *names)):
-            kind = path.lstat().st_mode
-            if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):
-                expected = "the chunks themselves, no links"
-                raise FormatError(
-                    "a chunk is no regular file", file=file, found=f"chunk = {path.name}", expected=expected
-                )
-            if stat.S_ISREG(kind):
-                found[path.relative_to(folder).as_posix()] = path
-    return found
-
-
-def _missing(array: Any, files: dict[str, Path]) -> NDArray[np.bool_]:
-    """Tell which chunks, or shards, there are not."""
-    grid = _grid(array)
-    absent = [array.metadata.encode_chunk_key(place) not in files for place in np.ndindex(grid)]
-    return np.array(absent).reshape(grid)
-
-
-def _check_lengths(array: Any, files: dict[str, Path], file: str) -> None:
-    """Compare what chunks hold with their voxels; those in shards, and zstd's that do not say it, are passed over."""
-    codecs = array.compressors[-1:] if not array.shards else ()
-    packing = next((str(getattr(codec, "codec_id", type(codec).__name__)) for codec in codecs), "")
-    most = 2 * math.prod(array.chunks) * array.dtype.itemsize + 2**16
-    for key in (key for key in files if Path(key).name not in (*DOCUMENTS, ".zattrs")):
-        promised = promised_bytes(files[key], packing.removesuffix("Codec").lower(), most, file=file)
-        if promised > most:
-            found = f"chunk = {promised} bytes and more"
-            raise ResourceError(
-                "a chunk holds far more than its voxels", file=file, found=found, expected=f"{most} bytes"
-            )
-
-
-def _are_fill(voxels: NDArray[Any], missing: NDArray[np.bool_], chunks: tuple[int, ...], fill: Any) -> bool:
-    """Tell whether the voxels beside the missing chunks are mostly of the fill value, as theirs were then."""
-    other = np.zeros(missing.shape, np.int64)
-    area = np.zeros(missing.shape, np.int64)
-    for axis in range(voxels.ndim):
-        cuts = np.arange(chunks[axis], voxels.shape[axis], chunks[axis])
-        lower, upper = _ends(axis, slice(None, -1)), _ends(axis, slice(1, None))
-        for own, neighbor, planes in ((upper, lower, cuts - 1), (lower, upper, cuts)):
-            counted = missing[own] & ~missing[neighbor]
-            differ = _differs(np.take(voxels, planes, axis), fill)
-            other[own] += np.where(counted, _by_chunk(differ, chunks, axis), 0)
-            area[own] += np.where(counted, _by_chunk(np.ones_like(differ), chunks, axis), 0)
-    return bool((other <= TORN * area).all())
-
-
-def _ends(axis: int, part: slice) -> tuple[slice, ...]:
-    return (*(slice(None),) * axis, part)
-
-
-def _differs(values: NDArray[Any], fill: Any) -> NDArray[np.bool_]:
-    return np.asarray(values != fill if fill == fill else ~np.isnan(values))
-
-
-def _by_chunk(flags: NDArray[np.bool_], chunks: tuple[int, ...], across: int) -> NDArray[np.int64]:
-    """Count flags in each chunk, along all axes but one."""
-    counts = flags.astype(np.int64)
-    for axis in (axis for axis in range(flags.ndim) if axis != across):
-        counts = np.add.reduceat(counts, np.arange(0, flags.shape[axis], chunks[axis]), axis=axis)
-    return counts

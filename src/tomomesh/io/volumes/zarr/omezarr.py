@@ -11,7 +11,7 @@ from ....model.volume import Volume
 from ...files.detached import beside
 from ...files.source import third_party
 from ..affine import GIVEN, required_spacing, upright
-from ..raster import gray_or_color
+from ..raster import gray_or_color, layers_last
 from .array import DOCUMENTS, document_of, open_array, read_array
 from .omezarr_frame import Axes, axes_of, frame_of
 from .origins import writer_of
@@ -68,7 +68,7 @@ def read_omezarr(folder: Path, settings: ReadSettings) -> Volume:
     array = open_array(place, file=name)
     _check_shape(array, axes, name)
     stored, more = read_array(array, place, fill_chunks=settings.fill_chunks, file=name)
-    return _volume(axes.zyx(stored), affine, notes + more, name)
+    return _volume(layers_last(stored, axes.zyx, file=name), affine, notes + more, name)
 
 
 def _is_array(folder: Path, name: str) -> bool:
@@ -83,10 +83,10 @@ def _read_plain(folder: Path, settings: ReadSettings, name: str) -> Volume:
         raise FormatError("the array is no volume", file=name, found=f"shape = {array.shape}", expected=expected)
     spacing = required_spacing(settings.spacing, file=name, what="Zarr arrays without OME metadata hold no spacing")
     stored, notes = read_array(array, folder, fill_chunks=settings.fill_chunks, file=name)
-    return _volume(stored.reshape(*stored.shape[:3], -1), upright(spacing), (GIVEN, *notes), name)
+    return _volume(layers_last(stored, (0, 1, 2), file=name), upright(spacing), (GIVEN, *notes), name)
 
 
-def _volume(stored: NDArray[Any], affine: NDArray[np.float64], notes: tuple[str, ...], name: str) -> Volume:
+def _volume(stored: Any, affine: NDArray[np.float64], notes: tuple[str, ...], name: str) -> Volume:
     voxels, more = gray_or_color(stored, stored.shape[3], file=name)
     return Volume.from_stored(voxels, affine, notes=notes + more)
 

@@ -55,12 +55,10 @@ class Axes:
         """Return the values, one an axis, of x, y and z."""
         return np.array([float(values[self.names.index(name)]) for name in SPACE])
 
-    def zyx(self, stored: NDArray[Any]) -> NDArray[Any]:
-        """Return an array as (slices, rows, columns, channels)."""
-        order = [self.names.index(name) for name in reversed(SPACE)]
-        rest = [axis for axis in range(stored.ndim) if axis not in order]
-        turned = np.transpose(stored, (*order, *rest))
-        return turned.reshape(*turned.shape[:3], -1)
+    @property
+    def zyx(self) -> list[int]:
+        """The places of z, y and x."""
+        return [self.names.index(name) for name in reversed(SPACE)]
 
 
 def axes_of(image: Any, system: str = "", *, file: str) -> Axes:

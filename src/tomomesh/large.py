@@ -1,0 +1,170 @@
+"""Studies larger than the memory: read, chosen, meshed, checked and written slab by slab."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import ResourceError
+from .model.mesh import TriMesh
+from .pipeline import begun_on, finished, settled
+from .pointcloud.forecast import bytes_in_words, free_memory
+from .progress import Progress, silent
+from .report import Reported
+from .segmentation.slabwise.cut import Cutting
+from .segmentation.study import lay_out
+from .slabs.cuts import Cuts
+from .slabs.keep import OnDisk
+from .slabs.on_client import OnClient
+from .slabs.place import HALO
+from .ways.voxels_in_slabs import checked_in_slabs, measured_in_slabs, mesh_in_slabs, require_slabs
+
+if TYPE_CHECKING:
+    from .isosurface.run_mask import RunMask
+    from .model.volume import Volume
+    from .pipeline import Begun
+    from .results import Surface
+    from .settings import Settings
+    from .slabs.keep import Slabs
+    from .slabs.patches.patch import Patches
+
+BASE = 180e6
+"""Bytes of Python, its packages, the kernels and Dask."""
+A_VOXEL = 6.0
+"""Bytes for each voxel of a slab and its halo, beside those of the file: read, masked, joined."""
+A_CELL = 400.0
+"""Bytes for each vertex of a slab and its halo."""
+CELLS_A_RUN = 6.0
+"""Vertices for each run of a mask: a run has two sides across its row, and faces are as many along other axes."""
+
+
+@dataclass(frozen=True)
+class LargeSurface(Reported):
+    """A surface that is never whole.
+
+    Attributes
+    ----------
+    mesh : Patches
+        What `tomomesh.write_mesh` and `tomomesh.io.write_pieces` take as they take a mesh, in patient millimeters.
+    volume : Volume
+        The study, whose voxels stay in its file.
+    """
+
+    mesh: Patches
+    volume: Volume
+
+    def joined(self) -> TriMesh:
+        """Return the whole mesh, where the memory holds it."""
+        vertices, faces = ([*parts] for parts in (self.mesh.vertices(), self.mesh.faces()))
+        return TriMesh(np.concatenate(vertices), np.concatenate(faces))
+
+
+def reconstruct_large(
+    volume: Volume,
+    settings: Settings | None = None,
+    *,
+    labels: Volume | None = None,
+    client: Any = None,
+    memory: float | None = None,
+    slab: int | None = None,
+    progress: Progress = silent,
+    **changes: Any,
+) -> LargeSurface | Surface:
+    """Turn a study that need not fit into the memory into a closed surface, slab by slab.
+
+    No byte of the mesh depends on slabs or workers; it is that of `reconstruct` without even triangles and divided
+    voxels (``remesh=False, divide=False``), which need the whole mesh.
+
+    Parameters
+    ----------
+    volume : Volume
+        As `tomomesh.io.open_study` opens it, or with voxels in memory.
+    settings : Settings, optional
+    labels : Volume, optional
+        A label map on the study's grid, for ``select``.
+    client : distributed.Client, optional
+        Whose workers work on slabs side by side; without one, one slab follows the other here.
+    memory : float, optional
+        Bytes that each process may take, by default what is free over the processes; slabs are as thick as it holds.
+    slab : int, optional
+        Slices of a slab, in place of that.
+    progress : callable
+    **changes
+        Parameters by their bare names, as in `reconstruct`.
+
+    Returns
+    -------
+    LargeSurface, or Surface
+        The latter where networks are taken, whose neurons and mesh fit into the memory where the study does not.
+
+    Raises
+    ------
+    TomomeshError
+        Of the kind that fits; see `tomomesh.errors`.
+    """
+    settings = settled(settings, changes)
+    slabs, most = _workers(client, memory)
+    cutting = Cutting(partial(_cuts, slab=slab, most=most, itemsize=volume.voxels.dtype.itemsize), slabs)
+    progress("window", 0, 2)
+    study = lay_out(volume, labels, settings, labelled=settings.window.select is not None, cutting=cutting)
+    begun = begun_on(study, settings, changes, progress)
+    if begun.way.name != "voxels":
+        return finished(begun, progress)
+    return _by_voxels(begun, slabs, slab, most, progress)
+
+
+def _by_voxels(begun: Begun, slabs: Slabs, slab: int | None, most: float, progress: Progress) -> LargeSurface:
+    require_slabs(begun.taken)
+    kept, study = begun.kept, begun.kept.study
+    each = study.layers * study.voxels.dtype.itemsize
+    cuts = Cuts(_cuts(study.shape, slab=slab, most=most, itemsize=each, runs=kept.chosen.runs))
+    made = mesh_in_slabs(kept, begun.taken, slabs, cuts, progress)
+    checked = checked_in_slabs(made.value, kept, progress)
+    patches = checked.value[0]
+    later = partial(measured_in_slabs, *checked.value)
+    stages = (begun.told, made, checked, later)
+    return LargeSurface(patches, study, way=begun.way.name, settings=begun.settings, stages=stages)
+
+
+def _workers(client: Any, memory: float | None) -> tuple[Slabs, float]:
+    """Return who works on slabs, and what memory each may take."""
+    if client is None:
+        return OnDisk(Path(tempfile.gettempdir())), memory or free_memory()
+    limits = [one["memory_limit"] or math.inf for one in client.scheduler_info(n_workers=-1)["workers"].values()]
+    return OnClient(client), memory or min(min(limits, default=math.inf), free_memory() / max(len(limits), 1))
+
+
+def _cuts(
+    shape: tuple[int, ...], *, slab: int | None, most: float, itemsize: int, runs: RunMask | None = None
+) -> tuple[int, ...]:
+    """Cut a study into slabs of so many slices, or of as many as fit.
+
+    Raises
+    ------
+    ResourceError
+        Where not even one slice does.
+    """
+    if slab is not None:
+        return Cuts.every(shape[0], slab).places
+    layer = math.prod(shape[1:3]) * (itemsize + A_VOXEL)
+    layer += 0.0 if runs is None else A_CELL * CELLS_A_RUN * _most_runs(runs)
+    halo = 0 if runs is None else 2 * HALO
+    fitting = int((most - BASE) / max(layer, 1.0)) - halo
+    if fitting < 1:
+        raise ResourceError(
+            "the memory does not hold a slab of one slice", found=bytes_in_words(most),
+            expected=f"at least {bytes_in_words(BASE + (1 + halo) * layer)}",
+        )  # fmt: skip
+    return Cuts.every(shape[0], min(fitting, shape[0])).places
+
+
+def _most_runs(runs: RunMask) -> float:
+    """Return how many runs a slice has, on the mean over as many slices as have most of them and are a slab's least."""
+    slices = runs.begin[:: runs.shape[1]]
+    return max(float(np.diff(slices[:: 2 * HALO]).max(initial=0)) / (2 * HALO), len(runs.starts) / runs.shape[0])

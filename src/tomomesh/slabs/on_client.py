@@ -1,0 +1,111 @@
+"""Slabs among the workers of a Dask client: a result stays with a worker, and its arrays on that worker's disk."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import BatchError, ResourceError, TomomeshError
+from ..kernels.threads import share_cores
+from .keep import File, bytes_of, mapped, put_away
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from .keep import Kept
+
+DIED = "KilledWorker"
+"""Dask's name for what becomes of a task that has lost as many workers as it may."""
+
+
+@dataclass(frozen=True)
+class OnClient:
+    """Gives each slab's work to a worker; what a worker kept that died is made again, from the beginning if need be.
+
+    Attributes
+    ----------
+    client : distributed.Client
+        Or whatever submits and gathers as it does.
+    """
+
+    client: Any
+
+    def each(self, work: Callable[..., Any], *columns: Sequence[Any]) -> list[Kept]:
+        """Give out some work once a slab, see `tomomesh.slabs.keep.Slabs`, and do not wait for it.
+
+        Raises
+        ------
+        BatchError
+            Where the scheduler is gone.
+        """
+        rows = [list(entries) for entries in zip(*columns, strict=True)]
+        try:
+            return [self.client.submit(_done, work, row, self._beside, pure=False) for row in rows]
+        except Exception as fault:
+            raise _explained(fault) from None
+
+    def fetch(self, kept: Sequence[Kept]) -> list[Any]:
+        """Wait for values and bring them here.
+
+        Raises
+        ------
+        TomomeshError
+            What the work has raised.
+        ResourceError
+            Where every worker that took it died, or could not take it.
+        BatchError
+            Where the scheduler is gone.
+        """
+        try:
+            return _values(self.client.gather(list(kept)))
+        except TomomeshError:
+            raise
+        except Exception as fault:
+            raise _explained(fault) from None
+
+    @cached_property
+    def _beside(self) -> int:
+        """How many tasks a machine works on at once, at most."""
+        at_once = Counter[str]()
+        for one in self.client.scheduler_info(n_workers=-1)["workers"].values():
+            at_once[one["host"]] += one["nthreads"]
+        return max(at_once.values(), default=1)
+
+
+@dataclass(frozen=True)
+class _Held:
+    """What a worker keeps of a slab."""
+
+    value: Any
+
+    def __sizeof__(self) -> int:
+        """Tell Dask how much there would be to send."""
+        return bytes_of(self.value)
+
+
+def _values(kept: Any) -> Any:
+    """Return what is kept, in lists and tuples too."""
+    if isinstance(kept, list | tuple):
+        return type(kept)(map(_values, kept))
+    return mapped(kept.value, own=True) if isinstance(kept, _Held) else kept
+
+
+def _done(work: Callable[..., Any], row: list[Any], beside: int) -> _Held:
+    """Do a slab's work on a worker, with the cores that others on its machine leave to it."""
+    share_cores(max((os.cpu_count() or 1) // beside, 1))
+    return _Held(put_away(work(*_values(row)), File(Path(tempfile.gettempdir()))))
+
+
+def _explained(fault: Exception) -> TomomeshError:
+    """Say in one line what became of a task."""
+    name = type(fault).__name__
+    if name == DIED:
+        return ResourceError("every worker that took a slab died", hint="a smaller --slab, or workers with more memory")
+    if isinstance(fault, OSError | RuntimeError) or "Cancelled" in name:
+        return BatchError("the scheduler is gone", hint="the same command again")
+    return ResourceError("a worker could not take a slab", found=name, expected="the same tomomesh on every worker")
