@@ -88,7 +88,6 @@ def some_at_once(patch: pytest.MonkeyPatch, most: int) -> None:
         return drawn
 
     patch.setattr("tomomesh.model.sliced.SOME", most)
-    patch.setattr("tomomesh.segmentation.contours.between.SOME", most)
     patch.setattr("tomomesh.isosurface.sides.LAYERS", blocks)
     patch.setattr(RunMask, "__getitem__", watched)
     patch.setattr(RunMask, "dense", property(lambda mask: pytest.fail("the whole mask was drawn")))

@@ -19,7 +19,7 @@ from .measure.report import area_samples
 from .measure.shape import areas_and_volumes
 from .measure.tree import Tree
 from .model.boxes import box_of
-from .model.sliced import areas_of, ranges, some_of
+from .model.sliced import areas_of, ranges_of, some_of
 from .segmentation.signal import SOLID, closed
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def outline_followed(mask: Sliced, volume: Volume, *, outlined: bool = False, th
     """
     areas = areas_of(mask)
     bearing, box = np.pad(areas > 0, 1), box_of(mask)[1:]
-    filled = RunMask.of(_filled(mask, bearing, box, start, stop, threads) for start, stop in ranges(0, len(areas)))
+    filled = RunMask.of(_filled(mask, bearing, box, start, stop, threads) for start, stop in ranges_of(mask))
     own, enclosed = int(areas.sum()), filled.count
     if outlined or own > SHELL * enclosed:
         return Followed("outline", volume.affine, WindowSides.of(filled), float(enclosed), unit=unit_of(mask))
@@ -210,7 +210,7 @@ def _in(mask: Sliced, places: Floats) -> Mask:
     nearest = np.rint(places).astype(np.int64)
     x, y, z = np.clip(nearest, 0, np.array(mask.shape[::-1]) - 1).T
     found = np.zeros(len(places), np.bool_)
-    for start, stop in ranges(0, mask.shape[0]):
+    for start, stop in ranges_of(mask):
         own = np.flatnonzero((z >= start) & (z < stop))
         if len(own):
             found[own] = some_of(mask, start, stop)[z[own] - start, y[own], x[own]]

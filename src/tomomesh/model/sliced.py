@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -11,41 +12,53 @@ from .lazy import in_memory
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-SOME = 32
-"""Slices that are drawn or read together. Only memory and time depend on it: half of it reads chunks of 64 slices
-twice as often, twice of it takes 16 MB more of a study of 512 x 512 pixels of a byte."""
+SOME, TOGETHER = 64, 2**24
+"""Slices that are drawn or read together at most, and voxels: 64 MiB of 32-bit depths. Only memory and time depend on
+them: a file's chunks are often 64 slices thick, and half as many together have each of them read twice."""
 
 
-class Sliced(Protocol):
-    """What has slices (J, I) or (J, I, L): an array, a `RunMask` that draws them, or voxels that are read.
-
-    A number gives the slice as an array; a range gives an array, or what ``read()`` makes one.
-    """
+class Sized(Protocol):
+    """What tells the sizes of slices."""
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Sizes, that across the slices first."""
 
+
+class Sliced(Sized, Protocol):
+    """What has slices (J, I) or (J, I, L): an array, a `RunMask` that draws them, or voxels that are read.
+
+    A number gives the slice as an array; a range gives an array, or what ``read()`` makes one.
+    """
+
     def __getitem__(self, slices: Any, /) -> Any:
         """Return a slice, or those of a range."""
 
 
-def ranges(start: int, stop: int, step: int | None = None) -> list[tuple[int, int]]:
-    """Part slices into ranges that are worked on together: `SOME` slices, or `step`.
+def together(sliced: Sized) -> int:
+    """Return how many slices are drawn or read together."""
+    return max(min(SOME, TOGETHER // max(math.prod(sliced.shape[1:3]), 1)), 1)
+
+
+def ranges(start: int, stop: int, step: int) -> list[tuple[int, int]]:
+    """Part slices into ranges.
 
     Examples
     --------
-    >>> ranges(5, 70)
+    >>> ranges(5, 70, 32)
     [(5, 37), (37, 69), (69, 70)]
     """
-    step = max(SOME if step is None else step, 1)
     return [(first, min(first + step, stop)) for first in range(start, stop, step)]
 
 
+def ranges_of(sliced: Sized) -> list[tuple[int, int]]:
+    """Return the ranges of all slices that are drawn or read `together`."""
+    return ranges(0, sliced.shape[0], together(sliced))
+
+
 def parts_of(sliced: Sliced) -> list[tuple[int, int]]:
-    """Return the ranges of slices that threads share: all of an array, which is there; else `SOME`."""
-    count = sliced.shape[0]
-    return [(0, count)] if isinstance(sliced, np.ndarray) else ranges(0, count)
+    """Return the ranges of slices that threads share: all of an array, which is there; else as `ranges_of`."""
+    return [(0, len(sliced))] if isinstance(sliced, np.ndarray) else ranges_of(sliced)
 
 
 def some_of(sliced: Sliced, start: int, stop: int) -> NDArray[Any]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..isosurface.run_mask import RunMask
 from ..kernels.measure.edges import join_pairs
-from ..model.sliced import ranges
+from ..model.sliced import ranges_of
 from .signal import SOLID
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ def outlines_of(mask: NDArray[np.bool_] | RunMask, pixel_mm: tuple[float, float]
     boxed = _boxed(mask if isinstance(mask, RunMask) else RunMask.of([mask]))
     count = boxed.shape[0]
     parts = [
-        _Part.of(boxed.part(start, min(stop + 1, count)), stop - start, pixel_mm) for start, stop in ranges(0, count)
+        _Part.of(boxed.part(start, min(stop + 1, count)), stop - start, pixel_mm) for start, stop in ranges_of(boxed)
     ]
     each = zip(fields(Outlines), zip(*(part.columns for part in parts), strict=True), strict=False)
     columns: dict[str, Any] = {entry.name: np.concatenate(found) for entry, found in each}

@@ -13,7 +13,7 @@ from ..isosurface.crossings import Levels
 from ..isosurface.run_mask import RunMask
 from ..isosurface.voxels import Boundary, boundary, voxel_surface
 from ..measure.rings import assess_contours
-from ..model.sliced import SOME, ranges, some_of
+from ..model.sliced import ranges, some_of, together
 from ..progress import Progress, silent
 from ..results import Enclosed, Segmentation, Surface
 from ..segmentation.contours.between import Between, filled_between
@@ -95,7 +95,7 @@ def levels_of_rings(found: Segmentation[Contours], threads: int = 0) -> tuple[Vo
     _refuse_one_slice(found.source)
     between = Between.of(found.source, found.runs, found.volume, found.levels, threads)
     volume = between.over(found.volume)
-    parts = ranges(0, between.shape[0], SOME * between.times)
+    parts = ranges(0, between.shape[0], together(between.frame) * between.times)
     inside = RunMask.of((some_of(volume.voxels, *part) > 0 for part in parts), threads)
     _refuse_none(found.source, inside.count)
     return volume, inside

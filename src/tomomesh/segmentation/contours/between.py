@@ -10,7 +10,7 @@ import numpy as np
 
 from ...kernels.threads import in_blocks
 from ...model.lazy import LazyVoxels
-from ...model.sliced import SOME, ranges, some_of
+from ...model.sliced import ranges, ranges_of, some_of, together
 from ...progress import Progress, silent
 from .gray import FullLevels
 from .insides import RingFrame, insides_of
@@ -71,7 +71,7 @@ class Between:
         The gray levels and the window on them tell of loops how near the surface is above and below.
         """
         frame = RingFrame.of(contours, study.spacing_mm[:2])
-        parts = (insides_of(contours, mask, frame, threads, *some) for some in ranges(0, frame.shape[0]))
+        parts = (insides_of(contours, mask, frame, threads, *some) for some in ranges_of(frame))
         gray = FullLevels.of(levels if contours.kind == "loops" else None, mask, parts, threads)
         step = study.slice_distance_mm
         most = MOST_VOXELS // int(np.prod(frame.shape))
@@ -148,7 +148,7 @@ def filled_between(
     """
     between = Between.of(contours, mask, study, levels, threads)
     volume, count, found = between.over(study), between.shape[0], np.empty(between.shape, between.dtype)
-    for start, stop in ranges(0, count, SOME * between.times):
+    for start, stop in ranges(0, count, together(between.frame) * between.times):
         found[start:stop] = some_of(volume.voxels, start, stop)
         progress("slices", stop, count)
     return replace(volume, voxels=found)

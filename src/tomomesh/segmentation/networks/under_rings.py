@@ -10,7 +10,7 @@ import numpy as np
 
 from ...model.columns import any_of
 from ...model.points import CAP
-from ...model.sliced import ranges
+from ...model.sliced import ranges_of
 from ...pointcloud.samples import Samples
 from ...som.fit import match
 from ..sample import REACH
@@ -63,7 +63,7 @@ def surface_under(networks: Networks, sampling: Sampling, volume: Volume) -> Sam
     places = volume.to_mm(np.column_stack([lines.reshape(-1, 2), slices])).reshape(count, size, 3)
     del lines, slices
     found = [
-        _under(places, broken, networks.slices, sampling.spacing_mm, start, stop) for start, stop in ranges(0, count)
+        _under(places, broken, networks.slices, sampling.spacing_mm, start, stop) for start, stop in ranges_of(places)
     ]
     caps = sampling.points.positions[sampling.points.kinds == CAP]
     facing = np.broadcast_to(np.cross(volume.affine[:3, 0], volume.affine[:3, 1]), caps.shape)
