@@ -56,12 +56,24 @@ def _lent(patch: MeshPatch, low: float, high: float, along: Sequence[float]) -> 
 
 def _crossing(patch: MeshPatch, lent: Sequence[Lent]) -> NDArray[np.int64]:
     """Count the faces of each connected piece of a patch that pass through its own or those that were lent to it."""
-    own, links = len(patch.faces), Links(patch)
+    own = len(patch.faces)
     if not own:
         return np.empty(0, np.int64)
-    numbers = np.concatenate([patch.numbers[patch.faces], *(faces for faces, _ in lent)])
-    corners = np.concatenate([patch.vertices[patch.faces], *(places for _, places in lent)])
-    _, first, faces = np.unique(numbers, return_index=True, return_inverse=True)
-    mesh = TriMesh(corners.reshape(-1, 3)[first], faces.reshape(-1, 3))
+    mesh = _with(patch, lent)
     crossing = marked_in(Tree.of_faces(mesh), np.arange(len(mesh.faces)) < own)[:own]
+    del mesh
+    links = Links(patch)
     return np.bincount(links.face_pieces[crossing], minlength=links.pieces).astype(np.int64)
+
+
+def _with(patch: MeshPatch, lent: Sequence[Lent]) -> TriMesh:
+    """Return the faces of a patch, and behind them those that were lent to it, over the same vertices."""
+    numbers = np.concatenate([np.empty((0, 3), np.int64), *(faces for faces, _ in lent)]).reshape(-1)
+    places = np.concatenate([np.empty((0, 3, 3)), *(corners for _, corners in lent)]).reshape(-1, 3)
+    order = np.argsort(patch.numbers)
+    faces = order[np.searchsorted(patch.numbers, numbers, sorter=order).clip(max=len(order) - 1)]
+    beyond = patch.numbers[faces] != numbers
+    _, first, which = np.unique(numbers[beyond], return_index=True, return_inverse=True)
+    faces[beyond] = len(order) + which
+    vertices = np.concatenate([patch.vertices, places[beyond][first]])
+    return TriMesh(vertices, np.concatenate([patch.faces, faces.reshape(-1, 3).astype(np.int32)]))

@@ -109,15 +109,16 @@ def shapes_in(patches: Patches, whole: Gathered) -> tuple[dict[str, float], Floa
 
 def _shaped(patch: MeshPatch, edges: int, faces: int) -> Shaped:
     links = Links(patch)
+    smallest, largest, aspects = angles_and_aspects(links)
+    of_faces = folded(smallest, MOST_ANGLE, faces), folded(aspects, MOST_ASPECT, faces), float(largest.max(initial=0))
+    del largest, aspects
     lengths, turns = lengths_and_turns(links)
     inner = inner_edges(patch, links)
+    of_edges = Edges.of(turns[inner], links.uses[inner], edges)
+    del turns
     lengths = lengths[inner]
-    smallest, largest, aspects = angles_and_aspects(links)
-    return Shaped(
-        lengths, smallest, Edges.of(turns[inner], links.uses[inner], edges),
-        folded(smallest, MOST_ANGLE, faces), folded(aspects, MOST_ASPECT, faces), float(largest.max(initial=0)),
-        _ends([np.stack([lengths] * 2)], [links.edge_pieces[inner]], links.pieces),
-    )  # fmt: skip
+    ends = _ends([np.broadcast_to(lengths, (2, len(lengths)))], [links.edge_pieces[inner]], links.pieces)
+    return Shaped(lengths, smallest, of_edges, *of_faces, ends)
 
 
 def _ends(found: Sequence[Floats], pieces: Sequence[NDArray[np.integer[Any]]], count: int) -> Floats:
