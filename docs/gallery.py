@@ -8,9 +8,12 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from tomomesh import SOM, phantom, window
+from tomomesh import SOM, Volume, phantom, reconstruct_labels, window
 from tomomesh.cli import main
+from tomomesh.measure.section import section
 from tomomesh.model.lattice import lattice
+from tomomesh.show.drawing.marks import lines
+from tomomesh.show.drawing.page import Page, canvas
 from tomomesh.show.film import film_slice
 from tomomesh.show.plane import Plane
 
@@ -18,6 +21,8 @@ IMAGES = Path(__file__).parent / "images"
 BOX, PAGE = (900, 660), (1000, 1300)
 PAGED = ("06-slices", "12-outlines")
 """Pictures of several pages, of which the first is kept."""
+PAINT = ("#c8553d", "#2f7f86", "#8a6fb0", "#c99a2e")
+"""Color of each label."""
 FILMED = 10
 """Slice of the head on which a network is filmed."""
 
@@ -38,6 +43,23 @@ def draw() -> None:
             keep(picture, name, box=PAGE if name == "06-slices-1" else BOX)
     (IMAGES / "06-film.gif").write_bytes(filmed())
     keep(overview(pictures), "phantom")
+    keep(cut_labels().image().convert("RGB"), "shared-walls")
+
+
+def cut_labels() -> Page:
+    """Cut a ball in four labels where three of them meet: each mesh by itself, and with shared walls."""
+    z, y, x = np.indices((32, 32, 32)) - 15.3
+    parts = np.where(z**2 + y**2 + x**2 < 24, 4, np.where(x + 0.3 * y < -2, 1, np.where(y - 0.2 * x < 1, 2, 3)))
+    volume = Volume.from_stored(parts * (z**2 + y**2 + x**2 < 170), np.eye(4))
+    page, axes = canvas(9.0, 4.8, 1, 2)
+    for ax, shared in zip(axes, (False, True), strict=True):
+        ax.limit(8.0, 9.0, 23.0, 24.0)
+        found = reconstruct_labels(volume, shared_walls=shared)
+        for (number, surface), color in zip(found.items(), PAINT, strict=True):
+            lines(ax, section(surface.mesh, 15.8), color=color, width=6.0 - 1.3 * number)
+        told = "both have the same line" if shared else "between neighbors are gaps and overlaps"
+        ax.heading("With --shared-walls" if shared else "Each label by itself", f"three around a fourth, cut: {told}")
+    return page
 
 
 def filmed() -> bytes:

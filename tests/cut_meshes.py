@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import pickle
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -11,10 +12,10 @@ from tomomesh.slabs.keep import InMemory
 from tomomesh.slabs.mesh import Piece, SlabMesh
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from tomomesh import TriMesh
-    from tomomesh.slabs.keep import Slabs
+    from tomomesh.slabs.keep import Kept, Slabs
 
 
 def cut(
@@ -44,6 +45,27 @@ def cut(
         for n in range(len(ends) - 1)
     ]  # fmt: skip
     return SlabMesh.of(pieces, InMemory() if slabs is None else slabs)
+
+
+class Sent(InMemory):
+    """Works in any order, on values that were sent to it, whose arrays nobody may write to."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+
+    def each(self, work: Callable[..., Any], *columns: Sequence[Any]) -> list[Kept]:
+        rows = list(zip(*columns, strict=True))
+        found: list[Kept] = [None] * len(rows)
+        for n in self.rng.permutation(len(rows)).tolist():
+            called, *entries = self._sent((work, *rows[n]))
+            found[n] = self._sent(called(*entries))
+        return found
+
+    @staticmethod
+    def _sent(value: Any) -> Any:
+        buffers: list[pickle.PickleBuffer] = []
+        text = pickle.dumps(value, protocol=5, buffer_callback=buffers.append)
+        return pickle.loads(text, buffers=[bytes(one) for one in buffers])  # what was just written here
 
 
 cuts = st.lists(st.integers(0, 400), max_size=5)

@@ -19,7 +19,7 @@ from tomomesh.kernels.contours.rings import draw_rings
 from tomomesh.measure.polygon import distance, inside
 from tomomesh.segmentation.contours.between import filled_between
 from tomomesh.segmentation.contours.inputs import OFF
-from tomomesh.segmentation.contours.insides import Frame, insides_of
+from tomomesh.segmentation.contours.insides import RingFrame, insides_of
 from tomomesh.segmentation.contours.train import train_contours
 from tomomesh.settings import NetworkSettings
 
@@ -188,7 +188,7 @@ class TestLoops:
         if not plane.any():
             return
         mask, found = plane[None], trained([plane], "loops")
-        insides = insides_of(found, mask, Frame.of(found, (1.0, 1.0)))
+        insides = insides_of(found, mask, RingFrame.of(found, (1.0, 1.0)))
         rows, columns = insides.depths.shape[1:]
         framed = np.pad(mask, ((0, 0), (8, 8), (8, 8)))
         x, y = insides.low[:2] + 8
@@ -237,7 +237,7 @@ class TestBetween:
             return
         found = train_contours(mask, NetworkSettings(contours="loops"))
         filled = filled_between(found, mask, study(mask)).voxels > 0
-        insides = insides_of(found, mask, Frame.of(found, (1.0, 1.0)))
+        insides = insides_of(found, mask, RingFrame.of(found, (1.0, 1.0)))
         own = filled[3:-3:4] if len(filled) > 7 else filled[3:4]
         np.testing.assert_array_equal(own, insides.depths > 0)
         pieces, count = ndimage.label(filled, np.ones((3, 3, 3)))

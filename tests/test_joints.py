@@ -122,13 +122,13 @@ class TestBridges:
         """Two boxes with coplanar tops: what lies flat at both ends may still not be a hole."""
         apart = 3 * spacing_of(24, 5_000)
         samples = settle_points(beside_another(on_box(5_000), apart))
-        x = bridges(samples, 0.05).places[:, 0]
+        x = bridges(samples, 0.05)[:, 0]
         assert not ((x > 1 + 0.3 * apart) & (x < 1 + 0.7 * apart)).any()
 
     def test_one_leads_over_a_hole(self) -> None:
         cloud = on_sphere(5_000)
         samples = settle_points(cloud[np.hypot(cloud[:, 0], cloud[:, 1]) + 100 * (cloud[:, 2] < 0) > 1.0])
-        places = bridges(samples, 0.25).places
+        places = bridges(samples, 0.25)
         assert ((np.hypot(places[:, 0], places[:, 1]) < 0.5) & (places[:, 2] > 0)).any()
 
 

@@ -47,6 +47,11 @@ def test_turns_and_parts_are_those_of_numpy(views: list[Any]) -> None:
     np.testing.assert_array_equal(lazy.read(), whole, strict=True)
     for n in range(-whole.shape[0], whole.shape[0]):
         np.testing.assert_array_equal(lazy[n], whole[n], strict=True)
+        np.testing.assert_array_equal(lazy[n, ::-1], whole[n, ::-1], strict=True)
+    with pytest.raises(IndexError):
+        lazy[whole.shape[0]]
+    if whole.size:
+        np.testing.assert_array_equal(lazy[:, -1, :, 0], whole[:, -1, :, 0], strict=True)
     if whole.shape[3]:
         np.testing.assert_array_equal(lazy.layer(0).read(), whole[..., 0], strict=True)
 
@@ -96,6 +101,10 @@ ALL_AT_ONCE: dict[str, Callable[[Any], Any]] = {
     "count": np.count_nonzero,
     "take": lambda voxels: np.take(voxels, 0, 0),
     "contiguous": np.ascontiguousarray,
+    "layers": lambda voxels: voxels[..., 0],
+    "mask": lambda voxels: voxels[np.ones(5, bool)],
+    "list": lambda voxels: voxels[[0, 1]],
+    "deeper": lambda voxels: voxels[0, 0, 0, 0, 0],
 }
 
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from conftest import law
+from conftest import COMPILED, law
 from tomomesh import Volume, reconstruct, reconstruct_labels
 from tomomesh.errors import EmptyError
 from tomomesh.isosurface.rings import Rings
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 AFFINE = np.array([[-0.7, 0.0, 0.0, 10.3], [0.0, 0.8, 0.1, -77.1], [0.0, 0.0, 0.9, 3.33], [0.0, 0.0, 0.0, 1.0]])
 FIT = Settings().fit
+SLOW = pytest.mark.skipif(not COMPILED, reason="solids of 40 voxels, a minute each without the compiler")
 
 
 @st.composite
@@ -312,6 +313,7 @@ class TestThick:
             check_promise(one.made.mesh, cavities=one.cavities)
         assert not CrossingFaces()(walls.mesh).any()
 
+    @SLOW
     @pytest.mark.parametrize("thick", [2, 4])
     def test_a_label_by_itself_is_divided_as_alone(self, thick: int) -> None:
         volume = Volume.from_stored(map_of([ball(15)])[::thick], np.diag([1.0, 1.0, thick, 1.0]))
@@ -323,6 +325,7 @@ class TestThick:
         assert np.percentile(apart, 90) < 0.005  # shares have 16 bits
         assert apart.max() < 0.2  # beside voxels that are kept with less than half
 
+    @SLOW
     @pytest.mark.parametrize("name", ["halves", "thirds", "core"])
     @pytest.mark.parametrize("thick", [2, 4])
     def test_no_mesh_is_a_tenth_farther_than_alone(self, name: str, thick: int) -> None:
@@ -335,6 +338,7 @@ class TestThick:
             assert one < 1.1 * other < 0.1 * thick
 
 
+@SLOW
 class TestExact:
     @pytest.mark.parametrize("name", SOLIDS)
     def test_no_mesh_is_a_tenth_farther_than_alone(self, name: str) -> None:

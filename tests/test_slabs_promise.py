@@ -13,7 +13,7 @@ from conftest import law, seeds, size
 from cut_meshes import cut, cuts
 from test_twins_topology import ball, beside, isosurface, ring
 from tomomesh.errors import InternalCheckError
-from tomomesh.measure.topology import check_promise, distinct_positions, topology
+from tomomesh.measure.topology import check_promise, distinct_positions, face_components, topology
 from tomomesh.model.mesh import TriMesh
 from tomomesh.slabs.patches.patch import patches_of
 from tomomesh.slabs.patches.promise import check_patches
@@ -25,14 +25,16 @@ if TYPE_CHECKING:
 
 class TestTopology:
     @law(200)
-    @given(seed=seeds, n=st.integers(3, 12), m=st.integers(1, 25), at=cuts, centers=st.integers(0, 3))
+    @given(seed=seeds, n=st.integers(3, 40), m=st.integers(1, 25), at=cuts, centers=st.integers(0, 3))
     def test_of_any_faces_in_any_pieces_is_the_whole_s(
         self, seed: int, n: int, m: int, at: list[int], centers: int
     ) -> None:
         rng = np.random.default_rng(seed)
         mesh = TriMesh(rng.normal(size=(n, 3)), np.array([rng.choice(n, 3, replace=False) for _ in range(m)], np.int64))
         pieces = cut(mesh, [one % n for one in at], min(centers, n), min(centers, m), seed)
-        assert whole_of(patches_of(pieces)).topology == topology(pieces.joined())
+        found = whole_of(patches_of(pieces))
+        assert found.topology == topology(pieces.joined())
+        assert found.table.faces.tolist() == np.bincount(face_components(pieces.joined())).tolist()
 
     @law(60)
     @given(seed=seeds, share=st.floats(0.05, 0.6), at=cuts, left=st.sampled_from([0.7, 0.98, 1.0]))

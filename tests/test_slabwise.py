@@ -14,7 +14,8 @@ from conftest import law, seeds
 from tomomesh import Settings, Volume
 from tomomesh.errors import EmptyError, TomomeshError, UsageError
 from tomomesh.isosurface.run_mask import RunMask
-from tomomesh.model.lazy import Held, LazyVoxels, in_memory
+from tomomesh.model.lazy import ArraySource, LazyVoxels, in_memory
+from tomomesh.segmentation.otsu import otsu_threshold
 from tomomesh.segmentation.padding import beside
 from tomomesh.segmentation.slabwise.cut import Cutting
 from tomomesh.segmentation.slabwise.levels import TAILS, levels_of
@@ -104,7 +105,7 @@ def kept(volume: Volume, asked: dict[str, Any], cutting: Cutting, labels: Volume
 
 def lazily(volume: Volume) -> Volume:
     """Have its voxels stay where they are until they are read."""
-    voxels: Any = LazyVoxels.of(Held(volume.voxels))
+    voxels: Any = LazyVoxels.of(ArraySource(volume.voxels))
     return replace(volume, voxels=voxels)
 
 
@@ -199,9 +200,26 @@ class TestSelection:
         with pytest.raises(UsageError, match="in memory alone"):
             kept(lazily(Volume.from_stored(labels, np.eye(4))), {"select": (1,), "fill_slices": True}, Cutting())
 
-    def test_nothing_in_the_window_names_the_range_of_the_whole(self) -> None:
+    @pytest.mark.parametrize("kind", ["i2", "f4"])
+    def test_nothing_in_the_window_names_the_range_of_the_whole(self, kind: str) -> None:
         with pytest.raises(EmptyError, match="between 0 and 1"):
-            kept(lazily(Volume.from_stored(BALL.astype(np.int16), np.eye(4))), {"lower": 7.0}, Cutting(range_of))
+            kept(lazily(Volume.from_stored(BALL.astype(kind), np.eye(4))), {"lower": 7.0}, Cutting(range_of))
+
+
+class TestPadding:
+    @pytest.mark.parametrize("kind", ["i2", "f4", "f8"])
+    @pytest.mark.parametrize("level", [0.4, -9.0])
+    @pytest.mark.parametrize("place", [SLICES < 4, SLICES > 8, COLUMNS > 12, ROWS < 3, CIRCLE])
+    def test_is_found_in_slabs_and_has_no_say(self, place: NDArray[np.bool_], level: float, kind: str) -> None:
+        noise = 0.06 * np.random.default_rng(4).normal(size=SHAPE)
+        levels = (np.where(place, level, BALL + noise) * (500 if kind == "i2" else 1)).astype(kind)
+        for cutting in (Cutting(whole), Cutting(range_of), Cutting(lambda shape: [0, 2, 10, shape[0]])):
+            for study in (Volume.from_stored(levels, np.eye(4)), lazily(Volume.from_stored(levels, np.eye(4)))):
+                found = kept(study, {}, cutting).value.chosen
+                assert found.counts.padding == np.count_nonzero(place)
+                assert found.lower == otsu_threshold(levels[~place])
+                background = np.where(place, levels[~place].min(), levels)
+                np.testing.assert_array_equal(in_memory(found.volume.voxels), background)
 
 
 def range_of(shape: tuple[int, ...]) -> range:
@@ -226,16 +244,26 @@ class TestBody:
     @law(25)
     @given(
         cutting=cuttings(), preset=st.sampled_from(["bone", "skin", "lung", "fat", None]), slices=st.integers(0, 2),
-        keep=st.sampled_from(["auto", "body", "all"]), padded=st.booleans(), edge=st.sampled_from([1.0, 4.0]),
+        keep=st.sampled_from(["auto", "body", "all"]), padded=st.booleans(), edge=st.sampled_from([0.7, 4.0]),
+        cells=st.sampled_from([20, 160]),
     )  # fmt: skip
     def test_of_a_head_on_a_table(
-        self, cutting: Cutting, preset: str | None, slices: int, keep: str, padded: bool, edge: float
+        self,
+        cutting: Cutting,
+        preset: str | None,
+        slices: int,
+        keep: str,
+        padded: bool,
+        edge: float,
+        cells: int,
     ) -> None:
         levels = head()
         levels[:, :2] = -3000 if padded else levels[:, :2]
         study = replace(Volume.from_stored(levels, np.diag([edge, edge, edge, 1.0])), unit="HU")
         asked = {"keep": keep, "slices": ("axial", "coronal", "sagittal")[slices]}
-        assert_the_same(study, asked | ({"preset": preset} if preset else {}), cutting)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("tomomesh.segmentation.body.CELLS", cells)
+            assert_the_same(study, asked | ({"preset": preset} if preset else {}), cutting)
 
 
 @st.composite
@@ -259,7 +287,7 @@ class TestSources:
         inner = np.arange(1, 1 + np.prod(sizes)).reshape(sizes)
         whole = np.zeros((8, 8, 8), inner.dtype)
         whole[tuple(slice(a, a + size) for a, size in zip(low, sizes, strict=True))] = inner
-        placed = LazyVoxels.of(Placed(inner if here else LazyVoxels.of(Held(inner)), low, (8, 8, 8)))
+        placed = LazyVoxels.of(Placed(inner if here else LazyVoxels.of(ArraySource(inner)), low, (8, 8, 8)))
         np.testing.assert_array_equal(placed[at].read(), whole[at])
 
     @law(100)

@@ -178,22 +178,23 @@ def unit_of(mask: Sliced) -> float:
     return max(1.0, longest / PARTS)
 
 
-def _filled(mask: Sliced, bearing: Mask, box: tuple[slice, ...], start: int, stop: int, threads: int) -> Mask:
+def _filled(mask: Sliced, bearing: Mask, box: tuple[slice, slice], start: int, stop: int, threads: int) -> Mask:
     """Fill what the outside does not reach in some slices, as `tomomesh.segmentation.signal.outline` does.
 
     A bare slice between two others is filled where both of them are: a surface goes through it. Which are not is told
     by `bearing` (K + 2,), from the one before the first on.
     """
-    some = some_of(mask, start, stop)
+    some, (rows, columns) = some_of(mask, start, stop), box
     filled = np.zeros_like(some)
 
     def work(first: int, last: int) -> None:
         for n in range(first, last):
             k = start + n
             if bearing[k + 1]:
-                filled[n, *box] = _closed(some[n][box])
+                filled[n, rows, columns] = _closed(some[n, rows, columns])
             elif bearing[k] and bearing[k + 2]:
-                filled[n, *box] = _closed(mask[k - 1][box]) & _closed(mask[k + 1][box])
+                below, above = mask[k - 1], mask[k + 1]
+                filled[n, rows, columns] = _closed(below[rows, columns]) & _closed(above[rows, columns])
 
     in_blocks(work, len(some), block=1, threads=threads)
     return filled

@@ -69,7 +69,10 @@ def reconstruct_each_label(chosen: Namespace, settings: Settings, given: Mapping
     studies = [io.Study(_file_name(number, names), Path(sources[0]), None, files) for number in numbers]
     labels = {study.name: number for study, number in zip(studies, numbers, strict=True)}
     columns = (COLUMNS[0], "label", "label_name", *COLUMNS[1:])
-    do_all(Batch(studies, chosen, settings, folder, _Done(labels, names, make), columns, "labels"))
+    try:
+        do_all(Batch(studies, chosen, settings, folder, _Done(labels, names, make), columns, "labels"))
+    finally:
+        _KEPT.clear()
 
 
 def _checked(chosen: Namespace, settings: Settings) -> Path:

@@ -215,10 +215,10 @@ class _ProjectionSteps:
 
 @dataclass(frozen=True)
 class _Projector:
-    """Samples that face outward, and how far each vertex looks for them."""
+    """Samples that face outward, in their cubes, and how far each vertex looks for them."""
 
     samples: Floats
-    index: Index
+    cells: tuple[NDArray[np.int64], NDArray[np.int32], Floats]
     nearest: NDArray[np.int32]
     exact: bool
     threads: int
@@ -241,19 +241,19 @@ class _Projector:
             index = Index.of(rows[:, :3], index.frame[3])
             rows = np.ascontiguousarray(rows[index.order])
         near = np.empty(len(vertices), np.int32)
-        projector = cls(rows, index, near, samples.offsets is not None, threads)
-        projector.run(lambda a, b: nearest_places(vertices, rows, *index.cells, near, a, b))
+        projector = cls(rows, index.cells, near, samples.offsets is not None, threads)
+        projector.run(lambda a, b: nearest_places(vertices, rows, *projector.cells, near, a, b))
         return projector
 
     def first(self, places: Floats, normals: Floats) -> tuple[Floats, Floats]:
         """Return height and normal of the surface under each place (n, 4), and where it was measured (n, 3)."""
-        found, anchors, seen = np.empty((len(places), 4)), np.empty_like(places), (self.samples, *self.index.cells)
+        found, anchors, seen = np.empty((len(places), 4)), np.empty_like(places), (self.samples, *self.cells)
         self.run(lambda a, b: first_projections(places, normals, self.nearest, *seen, found, anchors, a, b))
         return found, anchors
 
     def renew(self, places: Floats, stale: float, projections: Floats, anchors: Floats, *, through: bool) -> None:
         """Project those vertices anew that have moved some way from where they last were projected."""
-        how = *self.index.cells, stale, through
+        how = *self.cells, stale, through
         self.run(lambda a, b: renew_projections(places, self.nearest, self.samples, *how, projections, anchors, a, b))
 
     def run(self, work: Callable[[int, int], None]) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .shape import Extent, unfolded
+from .shape import MeshExtent, unfolded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,7 +29,7 @@ class Components:
     def __init__(self, links: Links, areas: Floats, volumes: Floats, lengths: Floats) -> None:
         """Start with what the adjacency, areas (m,), volumes (m,) and edge lengths (e,) tell."""
         self._piece, self._count = links.face_pieces, links.pieces
-        extent = Extent.of(links)
+        extent = MeshExtent.of(links)
         total, enclosed = (
             unfolded(sums(values, self._piece, self._count))
             for sums, values in ((extent.areas, areas), (extent.volumes, volumes))

@@ -64,8 +64,7 @@ class CrossingFaces:
 
     def __init__(self, threads: int = 0, *, single: bool = False) -> None:
         self._threads, self._single = threads, single
-        self.tree: Tree | None = None
-        """Of the mesh that was last looked at."""
+        self._tree: Tree | None = None
 
     def __call__(self, mesh: TriMesh, moved: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
         """Mark the faces (m,) of a mesh.
@@ -80,11 +79,16 @@ class CrossingFaces:
             return np.zeros(0, np.bool_)
         if self._single:
             mesh = mesh.moved(mesh.vertices.astype(np.float32).astype(np.float64))
-        if self.tree is None or moved is None:
-            self.tree = Tree.of_faces(mesh, threads=self._threads)
-            return marked_in(self.tree, threads=self._threads)
-        self.tree = self.tree.moved(mesh.vertices, threads=self._threads)
-        return marked_in(self.tree, any_of(moved[mesh.faces]), threads=self._threads)
+        if self._tree is None or moved is None:
+            self._tree = Tree.of_faces(mesh, threads=self._threads)
+            return marked_in(self._tree, threads=self._threads)
+        self._tree = self._tree.moved(mesh.vertices, threads=self._threads)
+        return marked_in(self._tree, any_of(moved[mesh.faces]), threads=self._threads)
+
+    def handed_over(self) -> Tree | None:
+        """Return the tree of the mesh that was last looked at, and keep it no longer."""
+        tree, self._tree = self._tree, None
+        return tree
 
 
 def crossing_of(mesh: TriMesh, some: NDArray[np.bool_], *, threads: int = 0) -> NDArray[np.bool_]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from ..kernels.measure.edges import count_misoriented, join_borders, join_corners, join_vertices, order_half_edges
+from ..model.columns import for_kernels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,8 +40,8 @@ class Links:
     """
 
     def __init__(self, mesh: Triangles) -> None:
-        self.vertices = np.ascontiguousarray(mesh.vertices, np.float64)
-        self.faces = np.ascontiguousarray(mesh.faces, np.int32)
+        self.vertices = for_kernels(mesh.vertices, np.float64)
+        self.faces = for_kernels(mesh.faces, np.int32)
 
     @cached_property
     def edges(self) -> tuple[Ints, Ints]:

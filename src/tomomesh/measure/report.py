@@ -13,7 +13,7 @@ from .components import Components
 from .distance import distance_to_surface, spread_of
 from .intersections import marked_in
 from .links import Links
-from .shape import Extent, areas_and_volumes, lengths_and_turns, shapes_of_edges, shapes_of_faces, unfolded
+from .shape import MeshExtent, areas_and_volumes, lengths_and_turns, shapes_of_edges, shapes_of_faces, unfolded
 from .topology import Topology, distinct_positions, topology, topology_of, welded
 from .tree import Tree
 from .winding import places_in_cavities, winding_number
@@ -102,7 +102,7 @@ def _of_surface(mesh: TriMesh, cavities: int, threads: int, progress: Progress) 
     areas, volumes = areas_and_volumes(links, threads=threads)
     found = _counted(mesh, topology_of(links, volumes, cavities=cavities), cavities)
     progress("measure", 5, HUNDRED)
-    extent = Extent.of(links)
+    extent = MeshExtent.of(links)
     found["area_mm2"] = float(unfolded(extent.areas(areas))[0])
     found["volume_mm3"] = float(unfolded(extent.volumes(volumes))[0]) if found["closed"] else None
     lengths, turns = lengths_and_turns(links, threads=threads)

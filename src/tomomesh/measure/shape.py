@@ -36,7 +36,7 @@ EDGE_PARTS, ANGLE_PARTS = (0, 5, 50, 95, 100), (0, 1, 5, 50)
 
 
 @dataclass(frozen=True)
-class Extent:
+class MeshExtent:
     """The box around a mesh and the number of its faces: what bounds the sums over these.
 
     Attributes
@@ -50,7 +50,7 @@ class Extent:
     faces: int
 
     @classmethod
-    def of(cls, links: Links) -> Extent:
+    def of(cls, links: Links) -> MeshExtent:
         """Return that of a whole mesh; without vertices it is a point."""
         low, high = box(links.vertices) if len(links.vertices) else (np.zeros(3), np.zeros(3))
         return cls(low, high, len(links.faces))
@@ -117,13 +117,13 @@ def mean_of(values: Floats, bound: float) -> float:
     return float(unfolded(folded(values, bound, len(values)))[0] / max(len(values), 1))
 
 
-def areas_and_volumes(links: Links, extent: Extent | None = None, *, threads: int = 0) -> tuple[Floats, Floats]:
+def areas_and_volumes(links: Links, extent: MeshExtent | None = None, *, threads: int = 0) -> tuple[Floats, Floats]:
     """Return the area of each face, and the signed volume between it and the middle of the box, both (m,).
 
     The sum of the volumes is the volume of a closed mesh. The box is that of the whole where this is a part of it.
     """
     vertices, faces = links.vertices, links.faces
-    center = (extent or Extent.of(links)).middle
+    center = (extent or MeshExtent.of(links)).middle
     areas, volumes = np.empty((2, len(faces)))
 
     def work(start: int, stop: int) -> None:

@@ -12,7 +12,7 @@ from ..kernels.measure.positions import first_equal
 from ..model.columns import any_of
 from ..model.mesh import TriMesh
 from .links import Links
-from .shape import Extent, areas_and_volumes, unfolded
+from .shape import MeshExtent, areas_and_volumes, unfolded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -92,7 +92,7 @@ def topology_of(links: Links, volumes: NDArray[np.float64], *, cavities: int = 0
     """Count what `topology` counts, from the adjacency of a mesh and the volumes (m,) under its faces."""
     vertices, (fans, loops) = int(links.used.sum()), links.fans_and_loops
     euler = vertices - len(links.uses) + len(links.faces)
-    inward = unfolded(Extent.of(links).volumes(volumes, links.face_pieces, links.pieces)) < 0
+    inward = unfolded(MeshExtent.of(links).volumes(volumes, links.face_pieces, links.pieces)) < 0
     inward[links.face_pieces[links.borders // 3]] = False
     return Topology(
         components=links.pieces,

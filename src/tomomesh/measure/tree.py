@@ -175,4 +175,4 @@ def sort_keys(keys: NDArray[np.int64]) -> Ints:
     """Sort the first row of keys (2, m), where the second is room to work in, and return their order, (m,)."""
     order = np.empty(keys.shape, np.int32)
     order_keys(keys, order)
-    return order[0].copy()  # without the room
+    return np.array(order[0])  # without the room

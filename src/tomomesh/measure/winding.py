@@ -8,7 +8,7 @@ import numpy as np
 
 from ..model.mesh import TriMesh
 from .links import Links
-from .shape import Extent, areas_and_volumes, unfolded
+from .shape import MeshExtent, areas_and_volumes, unfolded
 from .tree import Tree
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def pieces_of(mesh: TriMesh) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Return the number of the connected piece of each face, (m,), and the signed volume of each piece, (c,)."""
     links = Links(mesh)
     volumes = areas_and_volumes(links)[1]
-    return links.face_pieces, unfolded(Extent.of(links).volumes(volumes, links.face_pieces, links.pieces))
+    return links.face_pieces, unfolded(MeshExtent.of(links).volumes(volumes, links.face_pieces, links.pieces))
 
 
 def linings(mesh: TriMesh) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,8 +15,8 @@ if TYPE_CHECKING:
 LARGE = 1 << 22
 """Bytes from which an array may lie in a file. Chosen: with a quarter of it a run takes 6 % more time, for no less
 memory that counts."""
-MANY = 1 << 14
-"""Large arrays at once, over which they lie in the memory; less than the 65,530 maps that Linux lets a process have."""
+MANY = 1 << 12
+"""Large arrays at once; more of them lie in the memory. A run of a cloud has 45 at most."""
 SET_HANDLER = 304
 """The place of ``PyDataMem_SetHandler`` in NumPy's table of functions, which keeps its order for good."""
 CAPSULE = ctypes.create_string_buffer(b"mem_handler")
@@ -82,9 +83,8 @@ def _start() -> int:
 
 def swapped(capsule: Any) -> Any:
     """Have NumPy ask another handler from now on, in this thread; return the one before."""
-    from numpy._core import _multiarray_umath
-
-    table = _api().PyCapsule_GetPointer(_multiarray_umath._ARRAY_API, None)  # type: ignore[attr-defined] # as import_array() of NumPy's headers does
+    functions = import_module("numpy._core._multiarray_umath")._ARRAY_API  # as import_array() of its headers does
+    table = _api().PyCapsule_GetPointer(functions, None)
     address = ctypes.cast(table, ctypes.POINTER(ctypes.c_void_p))[SET_HANDLER]
     return ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.py_object)(address or 0)(capsule)
 

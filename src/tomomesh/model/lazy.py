@@ -12,7 +12,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from ..errors import ResourceError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import DTypeLike, NDArray
 
@@ -146,16 +146,18 @@ class LazyVoxels(NDArrayOperatorsMixin):
         return replace(self, source=Mapped(self.source, function, np.dtype(dtype)))
 
     def __getitem__(self, key: Any) -> Any:
-        """Return a view of a part for slices, the first axis first; for a number, that slice itself, read."""
-        if isinstance(key, (int, np.integer)):
-            count = len(self)
-            if not -count <= key < count:  # as a sequence it ends here
-                raise IndexError(key)
-            return self[key % count : key % count + 1].read()[0]
+        """Return a view of a part for slices, the first axis first; with a number among them, that part, read."""
+        parts = key if isinstance(key, tuple) else (key,)
+        if len(parts) > self.ndim or not all(isinstance(part, (int, np.integer, slice)) for part in parts):
+            self._refused()
         ranges = list(self.ranges)
-        for axis, part in zip(self.order, key if isinstance(key, tuple) else (key,), strict=False):
-            ranges[axis] = ranges[axis][part]
-        return replace(self, ranges=tuple(ranges))
+        for axis, part in zip(self.order, parts, strict=False):
+            side = ranges[axis]
+            ranges[axis] = side[part] if isinstance(part, slice) else range(side[part], side[part] + 1)
+        view = replace(self, ranges=tuple(ranges))
+        if all(isinstance(part, slice) for part in parts):
+            return view
+        return view.read()[tuple(slice(None) if isinstance(part, slice) else 0 for part in parts)]
 
     def read(self) -> NDArray[Any]:
         """Read all of the view."""
@@ -226,15 +228,13 @@ def in_memory(voxels: NDArray[Any] | LazyVoxels) -> NDArray[Any]:
     return voxels.read() if isinstance(voxels, LazyVoxels) else voxels
 
 
-def slabs(voxels: NDArray[Any] | LazyVoxels) -> Iterator[NDArray[Any]]:
-    """Go through voxels along their first axis: an array at once, others by `SLAB_BYTES`, in whole chunks if any."""
+def slabs(voxels: Voxels) -> list[Voxels]:
+    """Cut voxels along their first axis: an array not at all, others by `SLAB_BYTES`, in whole chunks if any fits."""
     if not isinstance(voxels, LazyVoxels):
-        yield voxels
-        return
+        return [voxels]
     depth = max(SLAB_BYTES // max(math.prod(voxels.shape[1:]) * voxels.dtype.itemsize, 1), 1)
     depth -= depth % min(voxels.chunks[0], depth)
-    for start in range(0, len(voxels), depth):
-        yield voxels[start : start + depth].read()
+    return [voxels[start : start + depth] for start in range(0, len(voxels), depth)]
 
 
 def _rising(side: range) -> slice:

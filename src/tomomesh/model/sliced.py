@@ -30,15 +30,16 @@ class Sliced(Protocol):
         """Return a slice, or those of a range."""
 
 
-def ranges(start: int, stop: int, step: int = SOME) -> list[tuple[int, int]]:
-    """Part slices into ranges that are worked on together.
+def ranges(start: int, stop: int, step: int | None = None) -> list[tuple[int, int]]:
+    """Part slices into ranges that are worked on together: `SOME` slices, or `step`.
 
     Examples
     --------
     >>> ranges(5, 70)
     [(5, 37), (37, 69), (69, 70)]
     """
-    return [(first, min(first + step, stop)) for first in range(start, stop, max(step, 1))]
+    step = max(SOME if step is None else step, 1)
+    return [(first, min(first + step, stop)) for first in range(start, stop, step)]
 
 
 def parts_of(sliced: Sliced) -> list[tuple[int, int]]:

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..dynamics.untangle import Tangled
-    from ..pointcloud.bridges import Bridges
     from ..pointcloud.samples import Samples
     from ..progress import Progress
     from ..settings import Settings
@@ -108,7 +107,7 @@ class OpenSheet:
 
 def open_sheet(
     samples: Samples,
-    spanned: Bridges,
+    spanned: Floats,
     cell: Floats,
     settings: Settings,
     tangled: Tangled,
@@ -119,8 +118,8 @@ def open_sheet(
     Parameters
     ----------
     samples : Samples
-    spanned : Bridges
-        What spans the narrow holes between them.
+    spanned : (b, 3) float array
+        What spans the narrow holes between them (`tomomesh.pointcloud.bridges`).
     cell : (3,) float array
         Edge of the cubes along each axis.
     settings : Settings
@@ -198,11 +197,11 @@ class _ShellSide:
     side: Side
 
 
-def _kept_side(samples: Samples, spanned: Bridges, found: Borders, cell: Floats, settings: Settings) -> _ShellSide:
+def _kept_side(samples: Samples, spanned: Floats, found: Borders, cell: Floats, settings: Settings) -> _ShellSide:
     """Return one of the two sides of the shell around the sheet, from the narrowest closing that keeps them apart."""
     edge = float(cell.min())
     apron, share = found.apron(APRON, DENSE * edge)
-    lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places, apron]), cell)
+    lowest, keys = cubes_over(np.concatenate([samples.positions, spanned, apron]), cell)
     cells = cells_of(dilate(np.unique(keys), 1))
     for closing in CLOSINGS:
         shell = close_shell(cells, closing, threads=settings.run.threads)

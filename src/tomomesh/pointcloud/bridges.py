@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +14,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .samples import Samples
+
+    Floats = NDArray[np.float64]
 
 BLOCK = 4_096
 """Points worked on in one call. No result depends on it."""
@@ -31,25 +32,9 @@ DENSE = 0.5
 +0.5 %."""
 
 
-@dataclass(frozen=True)
-class Bridges:
-    """What spans the holes between samples.
-
-    Attributes
-    ----------
-    places : (b, 3) float array
-        On straight lines from rim to rim.
-    sectors : (p,) int64 array
-        In which of 16 directions in its plane each sample has neighbors, one bit each.
-    """
-
-    places: NDArray[np.float64]
-    sectors: NDArray[np.int64]
-
-
 def bridges(
     samples: Samples, edge: float, *, span: float = SPAN, threads: int = 0, progress: Progress = silent
-) -> Bridges:
+) -> Floats:
     """Lay places on straight lines across the holes between samples.
 
     A line joins two samples that have no neighbors in its direction, and lies flat on the surface at both. So
@@ -67,7 +52,8 @@ def bridges(
 
     Returns
     -------
-    Bridges
+    (b, 3) float array
+        The places, on straight lines from rim to rim.
     """
     index, rows = samples.index, samples.rows
     cells, count = index.cells, len(rows)
@@ -85,6 +71,4 @@ def bridges(
 
     in_blocks(look, count, block=BLOCK, threads=threads, done=lambda n: progress("bridges", n, 2 * count))
     in_blocks(lay, count, block=BLOCK, threads=threads, done=lambda n: progress("bridges", count + n, 2 * count))
-    back = np.empty(count, np.int64)
-    back[index.order] = sectors
-    return Bridges(np.concatenate([np.empty((0, 3)), *(found[start] for start in sorted(found))]), back)
+    return np.concatenate([np.empty((0, 3)), *(found[start] for start in sorted(found))])

@@ -6,7 +6,7 @@ with the area that these bound.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -179,10 +179,12 @@ def outlines_of(mask: NDArray[np.bool_] | RunMask, pixel_mm: tuple[float, float]
     parts = [
         _Part.of(boxed.part(start, min(stop + 1, count)), stop - start, pixel_mm) for start, stop in ranges(0, count)
     ]
-    *columns, shared = (np.concatenate(each) for each in zip(*(part.columns for part in parts), strict=True))
+    each = zip(fields(Outlines), zip(*(part.columns for part in parts), strict=True), strict=False)
+    columns: dict[str, Any] = {entry.name: np.concatenate(found) for entry, found in each}
     bodies, forks = _bodies(parts), sum(part.forks for part in parts)
     largest = float(bodies.max(initial=0.0) / max(bodies.sum(), 1.0))
-    return Outlines(*columns, shared[:-1], len(bodies), largest, forks, pixel_mm)
+    columns["shared"] = columns["shared"][:-1]
+    return Outlines(**columns, bodies=len(bodies), largest_body=largest, forks=forks, pixel_mm=pixel_mm)
 
 
 @dataclass(frozen=True)
@@ -222,8 +224,9 @@ def _bodies(parts: list[_Part]) -> Floats:
     first = np.cumsum([0, *(len(part.sizes) for part in parts)])
     roots = np.arange(len(sizes), dtype=np.int32)
     for part, before in zip(parts, first.tolist(), strict=False):
-        join_pairs(*(part.links + before), roots)
-    found = _sum(roots, sizes)
+        one, other = part.links + before
+        join_pairs(one, other, roots)
+    found = _sum(roots.astype(np.int64), sizes)
     return found[found > 0]
 
 

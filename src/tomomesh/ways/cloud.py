@@ -71,10 +71,12 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
     tangled = CrossingFaces(settings.run.threads)
     apart = measured("untangle", untangle, rest.value.mesh, smoothed, ring, tangled, rough.value.lattice)
     mesh, taken_back, crossing = apart.value
-    followed = follows(shell.value, mesh, samples, origin, tangled.tree, threads=settings.run.threads)
+    trace, filled = None if rest.value.fitted is None else rest.value.fitted.trace, rest.value.filled
+    moved = folded(None, rest, apart)
+    del rest, apart  # and with them where the mesh was before
+    followed = follows(shell.value, mesh, samples, origin, tangled, threads=settings.run.threads)
     del samples, settled, tangled  # before more is made
-    trace = None if rest.value.fitted is None else rest.value.fitted.trace
-    filled = rest.value.filled | interpolated(mesh.moved(mesh.vertices + origin), points)
+    filled = filled | interpolated(mesh.moved(mesh.vertices + origin), points)
     enclosed = hollow(shell.value.leak_test, shell.value.taken(settings), shell.value.cubes, shell.value.cell)
     surface = Surface(
         points.cloud, rough.value.cuberille(origin), mesh.moved(smoothed + origin),
@@ -83,7 +85,7 @@ def surface_of_cloud(points: Points, settings: Settings, progress: Progress) -> 
         encloses=enclosed if walls.value == 1 else None,
     )  # fmt: skip
     fitted = fit_found(trace, len(smoothed), taken_back=taken_back, filled=filled)
-    return folded(surface, told, shell, walls, rough, rest, apart, fitted, followed, place_found(points))
+    return folded(surface, told, shell, walls, rough, moved, fitted, followed, place_found(points))
 
 
 def _smoothed(shell: Shell, settings: Settings) -> Rough:

@@ -10,11 +10,13 @@ import numpy as np
 from ..errors import EmptyError
 from ..followed import Followed, boundary_followed, components_followed
 from ..isosurface.crossings import Levels
+from ..isosurface.run_mask import RunMask
 from ..isosurface.voxels import Boundary, boundary, voxel_surface
 from ..measure.rings import assess_contours
+from ..model.sliced import SOME, ranges, some_of
 from ..progress import Progress, silent
 from ..results import Enclosed, Segmentation, Surface
-from ..segmentation.contours.between import filled_between
+from ..segmentation.contours.between import Between, filled_between
 from ..segmentation.contours.train import train_contours
 from ..segmentation.networks.training import regions
 from ..segmentation.sample import sample_contours
@@ -24,6 +26,7 @@ from .way import POINTS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
     from ..model.contours import Contours
+    from ..model.volume import Volume
     from ..segmentation.study import Selected
     from ..settings import Settings
 
@@ -79,6 +82,25 @@ def _followed(found: Segmentation[Contours], threads: int) -> Followed:
     return components_followed(found.runs, found.volume, outlined=outlined, threads=threads)
 
 
+def levels_of_rings(found: Segmentation[Contours], threads: int = 0) -> tuple[Volume, RunMask]:
+    """Return the levels around rings, drawn as they are asked for, and which voxels lie inside: what slabs take.
+
+    Inside is what is over 0.
+
+    Raises
+    ------
+    EmptyError
+        As `surface_by_contours`.
+    """
+    _refuse_one_slice(found.source)
+    between = Between.of(found.source, found.runs, found.volume, found.levels, threads)
+    volume = between.over(found.volume)
+    parts = ranges(0, between.shape[0], SOME * between.times)
+    inside = RunMask.of((some_of(volume.voxels, *part) > 0 for part in parts), threads)
+    _refuse_none(found.source, inside.count)
+    return volume, inside
+
+
 def boundary_of_rings(
     found: Segmentation[Contours], *, surface: str = "all", threads: int = 0, progress: Progress = silent
 ) -> Boundary:
@@ -87,11 +109,7 @@ def boundary_of_rings(
     _refuse_one_slice(contours)
     filled = filled_between(contours, found.runs, found.volume, levels=found.levels, threads=threads, progress=progress)
     inside = filled.voxels > 0
-    if not inside.any():
-        raise EmptyError(
-            "the contours enclose no pixel", found=f"{len(contours)} contours", expected="contours wider than a pixel",
-            hint="--way contours",
-        )  # fmt: skip
+    _refuse_none(contours, int(np.count_nonzero(inside)))
     outer = "outer" if surface == "outer" else "all"
     return boundary(filled, inside, lower=0.0, surface=outer, threads=threads)
 
@@ -100,6 +118,14 @@ def _refuse_one_slice(contours: Contours) -> None:
     if len(contours.slices) < 2:
         found = f"{len(contours.slices)} slice"
         raise EmptyError("contours on one slice enclose no volume", found=found, expected="at least two slices")
+
+
+def _refuse_none(contours: Contours, pixels: int) -> None:
+    if not pixels:
+        raise EmptyError(
+            "the contours enclose no pixel", found=f"{len(contours)} contours", expected="contours wider than a pixel",
+            hint="--way contours",
+        )  # fmt: skip
 
 
 def _contours_found(contours: Contours, kept: Selected, settings: Settings) -> Stage[None]:

@@ -48,7 +48,7 @@ def _lay(samples: Samples, settings: Settings, progress: Progress) -> Stage[Open
     spanned = bridges(samples, float(cell.min()), threads=threads, progress=progress)
     made = open_sheet(samples, spanned, cell, settings, CrossingFaces(threads), progress)
     every = np.ones(made.leak_test.faces.count, bool)
-    return folded(made, shell_found(made.leak_test, every, cell, made.cubes, len(spanned.places)), walls_found(1))
+    return folded(made, shell_found(made.leak_test, every, cell, made.cubes, len(spanned)), walls_found(1))
 
 
 WAY = Way(

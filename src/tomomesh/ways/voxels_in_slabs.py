@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import UsageError
-from ..segmentation.slabwise.sources import Drawn
+from ..segmentation.slabwise.sources import MaskVoxels
 from ..settings import option_of
 from ..slabs.patches.patch import patches_of
 from ..slabs.patches.promise import check_patches
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from ..slabs.cuts import Cuts
     from ..slabs.keep import Slabs
     from ..slabs.patches.patch import Patches
-    from ..slabs.patches.seams import Whole
+    from ..slabs.patches.seams import Gathered
     from ..slabs.surface import SlabSurface
 
 WHOLE = ("smooth", "edge", "target_faces")
@@ -61,7 +63,7 @@ def _asked(chosen: Chosen, settings: Settings) -> Asked:
     """Ask for the boundary of the voxels that are kept; of labels that all are, they tell all that there is to know."""
     volume, runs = chosen.volume, chosen.runs
     source = getattr(volume.voxels, "source", None)
-    alone = isinstance(source, Drawn) and source.mask.count == runs.count
+    alone = isinstance(source, MaskVoxels) and source.mask.count == runs.count
     surface = "outer" if settings.cubes.surface == "outer" else "all"
     return Asked(
         runs, None if alone else volume.voxels, volume.affine, chosen.lower, chosen.upper, settings.window.layers,
@@ -93,7 +95,7 @@ def _told(made: SlabSurface, kept: Selected, *, labels: bool) -> tuple[dict[str,
 
 
 @timed("quality")
-def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> Stage[tuple[Patches, Whole, int]]:
+def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> Stage[tuple[Patches, Gathered, int]]:
     """Check across all seams what is promised of a mesh; return it as patches, what was counted, and its cavities.
 
     Raises
@@ -101,7 +103,7 @@ def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> S
     InternalCheckError
     """
     progress("checks", 0, 1)
-    across = kept.study.affine[:3, 2]
+    across = np.linalg.inv(kept.study.affine)[2, :3]  # at right angles to the slices, also where these are tilted
     patches = patches_of(made.mesh, tuple(map(float, across)))
     whole = check_patches(patches, cavities=made.cavities)
     progress("checks", 1, 1)
@@ -111,6 +113,6 @@ def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> S
 
 
 @timed("quality")
-def measured_in_slabs(patches: Patches, whole: Whole, cavities: int) -> Stage[None]:
+def measured_in_slabs(patches: Patches, whole: Gathered, cavities: int) -> Stage[None]:
     """Measure a mesh that is never whole."""
     return Stage(None, {"quality": assess_patches(patches, whole, cavities=cavities)})

@@ -63,7 +63,7 @@ class StackedSlices:
         TomomeshError
             As `read_dicom`, for the slices of this part.
         """
-        with Decoder() as decode, reading_later(True):
+        with Decoder() as decode, reading_later(map):
             slices = _Near(self, decode)
             return np.stack([slices.at_level(k)[box[1:]] for k in range(self.shape[0])[box[0]]])
 

@@ -5,10 +5,11 @@ No handle is kept: whoever reads a part, in this process or in another, opens th
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ...errors import UnreadableError
 from .source import existing
@@ -17,22 +18,30 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-_later = ContextVar("_later", default=False)
+Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+"""Who does the same work on several parts, as `map` does, here or elsewhere; what comes out is in their order."""
+
+_each: ContextVar[Each | None] = ContextVar("_each", default=None)
 
 
 def read_later() -> bool:
     """Tell whether voxels are to stay in their file, where its format allows it."""
-    return _later.get()
+    return _each.get() is not None
+
+
+def each_part(work: Callable[[Any], Any], parts: Sequence[Any]) -> Iterable[Any]:
+    """Do the work on all parts, by whoever was named for that."""
+    return (_each.get() or map)(work, parts)
 
 
 @contextmanager
-def reading_later(later: bool) -> Iterator[None]:
-    """Say whether voxels are to stay in their file."""
-    before = _later.set(later)
+def reading_later(each: Each | None) -> Iterator[None]:
+    """Let voxels stay in their file; who is named goes through all of them where that cannot wait. None: read now."""
+    before = _each.set(each)
     try:
         yield
     finally:
-        _later.reset(before)
+        _each.reset(before)
 
 
 @dataclass(frozen=True)
@@ -67,13 +76,18 @@ class Seen:
 
         Raises
         ------
-        UnreadableError, FormatError
+        UnreadableError
             Where it is gone, or was written since it was opened.
         """
-        if Seen.of(self.path) != self:
+        try:
+            stat = self.path.stat()
+            found = f"size = {stat.st_size} bytes, {self.size} before"
+            same = (stat.st_size, stat.st_mtime_ns) == (self.size, self.changed_ns)
+        except OSError as fault:
+            same, found = False, str(fault.strerror).lower()
+        if not same:
+            hint = "the same command again, once nothing writes to it"
             raise UnreadableError(
-                "the file has changed since it was opened",
-                file=str(self.path),
-                hint="the same command again, once nothing writes to it",
+                "the file has changed since it was opened", file=self.path.name, found=found, hint=hint
             )
         return self.path

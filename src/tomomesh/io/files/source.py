@@ -109,7 +109,7 @@ def stored(path: str | Path) -> memoryview:
 
     path = existing_file(path)
     try:
-        return memoryview(np.fromfile(path, np.uint8))
+        return np.fromfile(path, np.uint8).data
     except OSError as fault:
         raise UnreadableError("the file cannot be read", file=str(path), found=_reason(fault)) from None
 

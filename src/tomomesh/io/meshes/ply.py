@@ -42,8 +42,7 @@ WRITTEN = ("u1", "i4", "u4", "f4", "f8")
 """Codes of the types that are written: meshio's reader of binary files knows no other names of ours."""
 
 MOST_VERTICES = 2**31 - 1
-"""As many as ``int`` numbers. Of ``uint``, which would reach twice as far, VTK makes ``int`` again, and PLY has nothing
-longer."""
+"""As many as ``int`` numbers, which every reader takes; ``uint``, the longest that PLY has, reaches twice as far."""
 
 LINE_END = re.compile(rb"[ \t]*(\r\n|\n|\r)")
 """The end of the header's last line: behind a lone carriage return the first row may begin with any byte but that of a

@@ -121,7 +121,7 @@ def _stepped(
     return starts, end
 
 
-def _block(data: bytes, start: int, element: PlyElement, order: str) -> NDArray[Any] | None:
+def _block(data: bytes | memoryview, start: int, element: PlyElement, order: str) -> NDArray[Any] | None:
     """Return the rows as one array where each list is as long in all of them; None where they differ."""
     kinds: list[tuple[Any, ...]] = []
     for words, kind in zip(element.properties, element.types(order), strict=True):

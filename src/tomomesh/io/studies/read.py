@@ -13,7 +13,7 @@ from ..dicom import index_in, is_dicom, is_index, is_segmentation, lone_object, 
 from ..dicom.headers.kinds import STRUCTURES, storage_class
 from ..dicom.objects.segmentation import read_segmentation
 from ..files.archive import unpacked_zip
-from ..files.parts import reading_later
+from ..files.parts import Each, reading_later
 from ..files.source import counted, existing, existing_file, regular_files, suffix_of
 from ..volumes.images import FAMILIES, read_images
 from ..volumes.metaimage import read_metaimage
@@ -49,7 +49,7 @@ def _read_one_dicom(
 
 def _read_zip(path: Path, settings: ReadSettings, select: Sequence[int] | None = None) -> Volume:
     """Read the slices in an archive, or the only volume; archives inside it are not opened."""
-    with unpacked_zip(path) as folder, reading_later(False):  # the folder is gone afterwards
+    with unpacked_zip(path) as folder, reading_later(None):  # the folder is gone afterwards
         files, _ = regular_files(folder, deep=True)
         stores = [folder] if is_zarr(folder) else [path for path in folder.iterdir() if path.is_dir() and is_zarr(path)]
         whole = stores + [file for file in volumes_among(files) if suffix_of(file) not in ARCHIVES]
@@ -180,6 +180,7 @@ def open_study(
     settings: ReadSettings | None = None,
     *,
     select: Sequence[int] | None = None,
+    each: Each = map,
 ) -> Volume:
     """Open a study whose voxels are read later, part by part: it may be larger than the memory.
 
@@ -187,6 +188,9 @@ def open_study(
     ----------
     path, settings, select
         As `read_volume`.
+    each : callable
+        Who goes through all voxels where that cannot wait, those of real numbers, in search of NaN: ``each(work,
+        parts)`` returns what the work finds in every part, as `map` does, one after another. Both can be pickled.
 
     Returns
     -------
@@ -200,7 +204,7 @@ def open_study(
     UnreadableError, FormatError, GeometryError, UsageError, ResourceError
         As `read_volume`; what lies in a damaged part is told when that is read.
     """
-    with reading_later(True):
+    with reading_later(each):
         opened = read_volume(path, settings=settings, select=select)
     return opened if opened.in_parts is not None else replace(opened, notes=(*opened.notes, WHOLE))
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import FormatError, GeometryError
-from ...model.lazy import LazyVoxels, Voxels, slabs
+from ...model.lazy import LazyVoxels, Voxels, in_memory, slabs
+from ..files.parts import each_part
 
 if TYPE_CHECKING:
     from numpy.typing import DTypeLike, NDArray
@@ -155,9 +156,8 @@ def without_holes(voxels: Voxels, *, file: str) -> tuple[Voxels, tuple[str, ...]
     if voxels.dtype.kind != "f":
         return voxels, ()
     total = math.prod(voxels.shape)
-    count = total - sum(
-        np.count_nonzero(np.isfinite(part)) for slab in slabs(voxels) for part in slab
-    )  # no mask of all
+    counts, lowest = zip(*each_part(_finite, slabs(voxels)), strict=True)
+    count = total - sum(counts)
     if 2 * count > total:
         raise GeometryError(
             "more than half of the voxels are no numbers",
@@ -166,11 +166,21 @@ def without_holes(voxels: Voxels, *, file: str) -> tuple[Voxels, tuple[str, ...]
         )
     if count == 0:
         return voxels, ()
-    low = min(part.min(where=np.isfinite(part), initial=np.inf) for slab in slabs(voxels) for part in slab)
-    note = f"NaN or infinite voxels set to the background: {count}"
+    note, low = f"NaN or infinite voxels set to the background: {count}", min(lowest)
     if isinstance(voxels, LazyVoxels):
         return voxels.map(partial(_filled, low=low), voxels.dtype), (note,)
     return _filled(voxels, low), (note,)
+
+
+def _finite(voxels: NDArray[Any] | LazyVoxels) -> tuple[int, np.floating[Any]]:
+    """Count the finite voxels, and find the lowest of them."""
+    count, low = 0, np.inf
+    for part in in_memory(voxels):  # slice by slice: no mask of all
+        finite = np.isfinite(part)
+        within = int(np.count_nonzero(finite))
+        count += within
+        low = min(low, part.min() if within == part.size else part.min(where=finite, initial=np.inf))
+    return count, voxels.dtype.type(low)
 
 
 def _filled(voxels: NDArray[Any], low: np.floating[Any]) -> NDArray[Any]:

@@ -225,7 +225,7 @@ def many_levels(stored: Voxels) -> bool:
         return False
     seen = np.zeros((stored.shape[3], 256), np.bool_)
     for slab in slabs(stored):
-        for layer, levels in zip(np.moveaxis(slab, 3, 0), seen, strict=True):
+        for layer, levels in zip(np.moveaxis(in_memory(slab), 3, 0), seen, strict=True):
             levels |= np.bincount(layer.ravel(), minlength=256) > 0
         if (seen.sum(axis=1) > 2).any():
             return True

@@ -10,10 +10,15 @@ none, and a size for each large array; the size is below 0 where the array lies 
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numba
 from numba import types
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Function = TypeVar("Function", bound="Callable[..., Any]")
 
 ROOM, LARGE, FOLDER, FAULT, TOP, FIRST = 0, 1, 2, 3, 4, 8
 """Places in a state: bytes of large arrays that may still lie in the memory; bytes from which an array is large; the
@@ -30,6 +35,14 @@ def _of_c(name: str, result: Any, *arguments: Any) -> Any:
     return types.ExternalFunction(name, result(*arguments))
 
 
+def _compiled(function: Function) -> Function:
+    return cast("Function", numba.njit(function))
+
+
+def _for_c(signature: Any) -> Callable[[Callable[..., Any]], Any]:
+    return cast("Callable[[Callable[..., Any]], Any]", numba.cfunc(signature))
+
+
 malloc = _of_c("malloc", ADDRESS, ADDRESS)
 calloc = _of_c("calloc", ADDRESS, ADDRESS, ADDRESS)
 realloc = _of_c("realloc", ADDRESS, ADDRESS, ADDRESS)
@@ -43,7 +56,7 @@ munmap = _of_c("munmap", NUMBER, ADDRESS, ADDRESS)
 madvise = _of_c("madvise", NUMBER, ADDRESS, ADDRESS, NUMBER)
 
 
-@numba.njit
+@_compiled
 def find(state: Any, place: int) -> int:
     """Return where a state has an address; its end where it has not."""
     at = FIRST
@@ -52,7 +65,7 @@ def find(state: Any, place: int) -> int:
     return at
 
 
-@numba.njit
+@_compiled
 def map_file(state: Any, size: int) -> int:
     """Return the address of a new file in the memory, all 0; 0 where there is no room.
 
@@ -65,25 +78,25 @@ def map_file(state: Any, size: int) -> int:
     state[FAULT] = fallocate(file, 0, size)
     place = mmap(0, size, READ_WRITE, SHARED, file, 0) if state[FAULT] == 0 else FAILED
     close(file)
-    return 0 if place == FAILED else place
+    return 0 if place == FAILED else int(place)
 
 
-@numba.njit
+@_compiled
 def take(state: Any, size: int, zero: bool) -> int:
     """Return the address of so many bytes, 0 where there are none."""
     at = len(state) if size < state[LARGE] else find(state, 0)
     if at == len(state):
-        return calloc(1, size) if zero else malloc(size)
+        return int(calloc(1, size) if zero else malloc(size))
     kept = size <= state[ROOM]
     place = (calloc(1, size) if zero else malloc(size)) if kept else map_file(state, size)
     if place:
         state[at], state[at + 1] = place, -size if kept else size
         state[ROOM] -= size if kept else 0
         state[TOP] = max(state[TOP], at + 2)
-    return place
+    return int(place)
 
 
-@numba.njit
+@_compiled
 def give_back(state: Any, place: int) -> None:
     """Take bytes back."""
     at = find(state, place)
@@ -99,20 +112,20 @@ def give_back(state: Any, place: int) -> None:
         state[TOP] -= 2
 
 
-@numba.njit
+@_compiled
 def take_again(state: Any, place: int, size: int) -> int:
     """Return the address of as many bytes as are wanted now, with what was at another."""
     at = find(state, place)
     if place == 0 or at >= state[TOP]:
-        return realloc(place, size)
+        return int(realloc(place, size))
     found = take(state, size, False)
     if found:
         memcpy(found, place, min(abs(state[at + 1]), size))
         give_back(state, place)
-    return found
+    return int(found)
 
 
-@numba.njit
+@_compiled
 def leave(state: Any) -> None:
     """Let the pages of all files go; they are read again where they are needed."""
     for at in range(FIRST, state[TOP], 2):
@@ -123,23 +136,23 @@ def leave(state: Any) -> None:
 def entries(length: int) -> dict[str, Any]:
     """Compile what NumPy calls, and ``leave``, over states of a length; each has its ``address``."""
 
-    @numba.cfunc(ADDRESS(STATE, ADDRESS))
+    @_for_c(ADDRESS(STATE, ADDRESS))
     def malloc_(state: Any, size: int) -> int:
         return take(numba.carray(state, length), size, False)
 
-    @numba.cfunc(ADDRESS(STATE, ADDRESS, ADDRESS))
+    @_for_c(ADDRESS(STATE, ADDRESS, ADDRESS))
     def calloc_(state: Any, count: int, each: int) -> int:
         return take(numba.carray(state, length), count * each, True)
 
-    @numba.cfunc(ADDRESS(STATE, ADDRESS, ADDRESS))
+    @_for_c(ADDRESS(STATE, ADDRESS, ADDRESS))
     def realloc_(state: Any, place: int, size: int) -> int:
         return take_again(numba.carray(state, length), place, size)
 
-    @numba.cfunc(types.void(STATE, ADDRESS, ADDRESS))
+    @_for_c(types.void(STATE, ADDRESS, ADDRESS))
     def free_(state: Any, place: int, size: int) -> None:
         give_back(numba.carray(state, length), place)
 
-    @numba.cfunc(types.void(STATE))
+    @_for_c(types.void(STATE))
     def leave_(state: Any) -> None:
         leave(numba.carray(state, length))
 

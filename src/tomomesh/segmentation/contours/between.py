@@ -10,10 +10,10 @@ import numpy as np
 
 from ...kernels.threads import in_blocks
 from ...model.lazy import LazyVoxels
-from ...model.sliced import ranges, some_of
+from ...model.sliced import SOME, ranges, some_of
 from ...progress import Progress, silent
-from .gray import Gray
-from .insides import Frame, insides_of
+from .gray import FullLevels
+from .insides import RingFrame, insides_of
 from .spaces import Spaces
 
 if TYPE_CHECKING:
@@ -44,8 +44,8 @@ class Between:
     contours : Contours
     mask : (K, J, I) bool array or slices of it
         The window.
-    frame : Frame
-    gray : Gray or None
+    frame : RingFrame
+    gray : FullLevels or None
         What tells of loops how near the surface is above and below.
     step : float
         Distance of the slices of rings, mm.
@@ -56,8 +56,8 @@ class Between:
 
     contours: Contours
     mask: Sliced
-    frame: Frame
-    gray: Gray | None
+    frame: RingFrame
+    gray: FullLevels | None
     step: float
     times: int
     threads: int = 0
@@ -70,9 +70,9 @@ class Between:
 
         The gray levels and the window on them tell of loops how near the surface is above and below.
         """
-        frame = Frame.of(contours, study.spacing_mm[:2])
+        frame = RingFrame.of(contours, study.spacing_mm[:2])
         parts = (insides_of(contours, mask, frame, threads, *some) for some in ranges(0, frame.shape[0]))
-        gray = Gray.of(levels if contours.kind == "loops" else None, mask, parts, threads)
+        gray = FullLevels.of(levels if contours.kind == "loops" else None, mask, parts, threads)
         step = study.slice_distance_mm
         most = MOST_VOXELS // int(np.prod(frame.shape))
         times = max(min(round(step / float(frame.pixel.max())), most), 1)
@@ -130,7 +130,8 @@ class Between:
         affine[:3, 2] /= self.times
         low = self.frame.low * (1, 1, self.times) - (0, 0, self.around)
         affine[:3, 3] += affine[:3, :3] @ low
-        return replace(study, voxels=LazyVoxels.of(self), affine=affine)
+        voxels: Any = LazyVoxels.of(self)
+        return replace(study, voxels=voxels, affine=affine)
 
 
 def filled_between(
@@ -145,9 +146,9 @@ def filled_between(
         As of `Between.of`.
     progress : callable
     """
-    volume = Between.of(contours, mask, study, levels, threads).over(study)
-    count, found = volume.shape[0], np.empty(volume.voxels.shape, volume.voxels.dtype)
-    for start, stop in ranges(0, count):
+    between = Between.of(contours, mask, study, levels, threads)
+    volume, count, found = between.over(study), between.shape[0], np.empty(between.shape, between.dtype)
+    for start, stop in ranges(0, count, SOME * between.times):
         found[start:stop] = some_of(volume.voxels, start, stop)
         progress("slices", stop, count)
     return replace(volume, voxels=found)

@@ -29,7 +29,7 @@ BEYOND = (1.0, 2.5)
 
 
 @dataclass(frozen=True)
-class Gray:
+class FullLevels:
     """The gray levels of a study that tell how near the surface is, and what levels are full.
 
     Attributes
@@ -44,7 +44,7 @@ class Gray:
     full: tuple[float, float]
 
     @classmethod
-    def of(cls, levels: Levels | None, mask: Sliced, parts: Iterable[Insides], threads: int = 0) -> Gray | None:
+    def of(cls, levels: Levels | None, mask: Sliced, parts: Iterable[Insides], threads: int = 0) -> FullLevels | None:
         """Find what levels are full, over all slices; None where there are no levels, or those of a mask or of layers.
 
         Parameters
@@ -77,14 +77,14 @@ class Gray:
                 if full > 0:
                     here = side * depths > 0
                     deep[here] *= np.clip(side * within[here] / full, 0, 1)
-            return np.clip(depths, -deep, deep)
+            return np.asarray(np.clip(depths, -deep, deep))
 
         return np.stack(in_order(temper, len(seen), threads=threads))
 
 
 def _within(levels: Levels, seen: NDArray[np.float32]) -> Values:
     """Return how far levels are within the bounds; infinitely beyond them where they are not known."""
-    return np.nan_to_num(np.minimum(seen - levels.lower, levels.upper - seen), nan=-np.inf)
+    return np.asarray(np.nan_to_num(np.minimum(seen - levels.lower, levels.upper - seen), nan=-np.inf))
 
 
 def _full(insides: Insides, levels: Levels, threads: int) -> list[list[Values]]:

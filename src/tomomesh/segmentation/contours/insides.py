@@ -39,7 +39,7 @@ middle of a voxel (`isosurface.crossings.CLOSEST`)."""
 
 
 @dataclass(frozen=True)
-class Frame:
+class RingFrame:
     """The pixels around the rings of all slices, from the first slice to the last that has one.
 
     Attributes
@@ -57,7 +57,7 @@ class Frame:
     shape: tuple[int, int, int]
 
     @classmethod
-    def of(cls, contours: Contours, pixel_mm: tuple[float, float]) -> Frame:
+    def of(cls, contours: Contours, pixel_mm: tuple[float, float]) -> RingFrame:
         """Look at the pixels around the rings."""
         every = np.concatenate([one.codebook for one in contours.contours])
         low = np.append(np.floor(every.min(axis=0)).astype(np.int64) - MARGIN, contours.slices[0])
@@ -121,7 +121,7 @@ class Insides:
 
 
 def insides_of(
-    contours: Contours, mask: Sliced, frame: Frame, threads: int = 0, start: int = 0, stop: int | None = None
+    contours: Contours, mask: Sliced, frame: RingFrame, threads: int = 0, start: int = 0, stop: int | None = None
 ) -> Insides:
     """Draw the rings of some slices onto the pixels around all.
 
@@ -133,7 +133,7 @@ def insides_of(
     contours : Contours
     mask : (K, J, I) bool array or slices of it
         The window.
-    frame : Frame
+    frame : RingFrame
     threads : int
     start, stop : int
         The slices, counted from the first of the frame; all where not given.

@@ -80,12 +80,12 @@ class Shown:
         levels = None if self.levels is None else self.levels.part(start, stop)
         if self.settings.contours == "loops":
             return in_order(lambda n: (_of_loops(some[n], levels, n), 0), len(some), threads=threads)
-        return in_order(lambda n: self._of_walls(some[n], start + n), len(some), threads=threads)
+        return in_order(lambda n: self._of_sides(some[n], start + n), len(some), threads=threads)
 
     def _of_components(self, components: list[Component], dropped: int) -> Found:
         return [one.inputs(solid=one.body in self.solid) for one in components], dropped
 
-    def _of_walls(self, plane: Mask, k: int) -> Found:
+    def _of_sides(self, plane: Mask, k: int) -> Found:
         return inputs_of_walls(plane, self.settings, np.random.default_rng([self.seed, k]), self.pixel_mm)
 
 

@@ -192,7 +192,8 @@ class ByLayer:
             return np.asarray(self[slices : slices + 1][0])
         start, stop, _ = slices.indices(self.shape[0])
         some = replace(self.volume, voxels=some_of(self.volume.voxels, start, stop))
-        return by_layer(some, lower=self.lower, upper=self.upper) & some_of(self.mask, start, stop)[..., None]
+        kept = by_layer(some, lower=self.lower, upper=self.upper)
+        return np.asarray(kept & some_of(self.mask, start, stop)[..., None])
 
 
 def _times_shown(layers: Sliced) -> float:

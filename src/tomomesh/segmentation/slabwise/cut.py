@@ -11,7 +11,7 @@ import numpy as np
 
 from ...isosurface.run_mask import RunMask
 from ...model.lazy import LazyVoxels, in_memory
-from .levels import Counted, gathered
+from .levels import LevelCounts, gathered
 from .sources import Made
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ class Cut:
     @cached_property
     def ends(self) -> tuple[float, float]:
         """The lowest and the highest level, NaN where any is NaN."""
-        if isinstance(self.levels, Counted):
+        if isinstance(self.levels, LevelCounts):
             return self.levels.ends
         lows, highs = zip(*self.each(_ends), strict=True)
         return float(np.minimum.reduce(lows)), float(np.maximum.reduce(highs))

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Ints = NDArray[np.int64]
     Looked = Callable[[NDArray[Any]], Any]
     Sum = Callable[[Looked], Any]
-    Levels: TypeAlias = "Counted | Ordered"
+    Levels: TypeAlias = "LevelCounts | Ordered"
 
 TAILS = (2.0, 0.01)
 """Percents of the levels at each end that have no say in the range of the histogram, tried in turn. 2 % are twice the
@@ -34,7 +34,7 @@ than a bin."""
 
 def levels_of(levels: Levels | NDArray[Any]) -> Levels:
     """Look at gray levels in memory, of any shape; what was looked at stays as it is."""
-    return levels if isinstance(levels, Counted | Ordered) else gathered(lambda work: work(levels), levels.dtype)
+    return levels if isinstance(levels, LevelCounts | Ordered) else gathered(lambda work: work(levels), levels.dtype)
 
 
 def gathered(total: Sum, dtype: np.dtype[Any]) -> Levels:
@@ -50,11 +50,11 @@ def gathered(total: Sum, dtype: np.dtype[Any]) -> Levels:
     """
     kind, counts = plain(np.empty(0, dtype)).dtype, total(partial(digit_counts, begun=[0], depth=0))[0]
     short = kind.kind in "iu" and 8 * kind.itemsize <= DIGIT
-    return Counted(counts, int(np.iinfo(kind).min)) if short else Ordered(counts, kind, total)
+    return LevelCounts(counts, int(np.iinfo(kind).min)) if short else Ordered(counts, kind, total)
 
 
 @dataclass(frozen=True)
-class Counted:
+class LevelCounts:
     """How many there are of each level.
 
     Attributes
@@ -88,7 +88,7 @@ class Counted:
         return float(self.present[0]), float(self.present[-1])
 
     @property
-    def finite(self) -> Counted:
+    def finite(self) -> LevelCounts:
         """What is finite of it."""
         return self
 
@@ -96,9 +96,9 @@ class Counted:
         """Count levels that are held."""
         return [int(self.counts[int(level) - self.base]) for level in levels]
 
-    def without(self, level: float) -> Counted:
+    def without(self, level: float) -> LevelCounts:
         """Return all but a level."""
-        return Counted(np.where(np.arange(len(self.counts)) + self.base == level, 0, self.counts), self.base)
+        return LevelCounts(np.where(np.arange(len(self.counts)) + self.base == level, 0, self.counts), self.base)
 
     def bulk(self, tail: float = TAILS[0]) -> tuple[float, float]:
         """Return the percentiles that leave out so many percent of the levels at each end; levels that are held."""

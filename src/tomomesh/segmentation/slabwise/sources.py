@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...model.lazy import in_memory
+from ...model.lazy import LazyVoxels, in_memory
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from ...isosurface.run_mask import RunMask
     from ...model.boxes import Box
-    from ...model.lazy import LazyVoxels
 
     Voxels = NDArray[Any] | LazyVoxels
     Making = Callable[[NDArray[Any], Box], NDArray[Any]]
@@ -44,6 +43,11 @@ class Made:
         """Sizes of all axes."""
         return self.voxels.shape
 
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Those of the others."""
+        return self.voxels.chunks
+
     def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Return the voxels of a part."""
         return self.work(self.voxels[box].read(), (box[0], box[1], box[2]))
@@ -64,6 +68,11 @@ class MaskVoxels:
     def dtype(self) -> np.dtype[Any]:
         """Eight bits."""
         return np.dtype(np.uint8)
+
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Whole slices are drawn."""
+        return 1, *self.shape[1:]
 
     def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Draw a part of it."""
@@ -93,6 +102,11 @@ class Placed:
     def dtype(self) -> np.dtype[Any]:
         """That of the voxels."""
         return self.voxels.dtype
+
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Those of the voxels."""
+        return self.voxels.chunks if isinstance(self.voxels, LazyVoxels) else self.shape
 
     def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Return the voxels of a part."""

@@ -10,14 +10,14 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .patch import Patch
+    from .patch import MeshPatch
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Grid:
+class CellGrid:
     """Cubes of one side, counted from a corner.
 
     Attributes
@@ -61,7 +61,7 @@ class Clipped:
         return self.corners[self.first[at[0]] : self.first[at[0] + 1]] if len(at) else self.corners[:0]
 
 
-def clipped(patch: Patch, grid: Grid) -> Clipped:
+def clipped(patch: MeshPatch, grid: CellGrid) -> Clipped:
     """Cut the faces of a patch along a grid, and sort them by its cells."""
     corners = cut_along(patch.vertices[patch.faces], grid)
     cells, which = np.unique(grid.cells(corners), axis=0, return_inverse=True)
@@ -69,7 +69,7 @@ def clipped(patch: Patch, grid: Grid) -> Clipped:
     return Clipped(cells, np.cumsum([0, *count]), corners[np.argsort(which.reshape(-1), kind="stable")])
 
 
-def cut_along(corners: Floats, grid: Grid) -> Floats:
+def cut_along(corners: Floats, grid: CellGrid) -> Floats:
     """Cut faces (m, 3, 3) along the planes of a grid, those that lie in one cell already stay as they are.
 
     An edge is cut at the same places, to the last bit, in both faces that have it, so the pieces fit together.
@@ -79,7 +79,7 @@ def cut_along(corners: Floats, grid: Grid) -> Floats:
     return corners
 
 
-def _cut_across(corners: Floats, grid: Grid, axis: int) -> Floats:
+def _cut_across(corners: Floats, grid: CellGrid, axis: int) -> Floats:
     done = []
     while len(corners):
         along = corners[:, :, axis]

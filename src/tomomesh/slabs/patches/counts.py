@@ -14,15 +14,15 @@ from ...measure.shape import areas_and_volumes
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...measure.shape import Extent
-    from .patch import Patch
+    from ...measure.shape import MeshExtent
+    from .patch import MeshPatch
 
     Floats = NDArray[np.float64]
     Counts = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Table:
+class Tally:
     """What is known of connected pieces, a row each.
 
     Attributes
@@ -71,12 +71,12 @@ class Rim:
 
 
 @dataclass(frozen=True)
-class Counted:
+class PatchCounts:
     """What a patch has away from shared vertices, whose neighborhoods are left to the whole.
 
     Attributes
     ----------
-    table : Table
+    table : Tally
         Of its pieces.
     fans, overused, misoriented : int
         Fans around vertices, edges with three faces or more, and edges that two faces run through in one direction.
@@ -85,7 +85,7 @@ class Counted:
     rim : Rim
     """
 
-    table: Table
+    table: Tally
     fans: int
     overused: int
     misoriented: int
@@ -93,7 +93,7 @@ class Counted:
     rim: Rim
 
 
-def counted(patch: Patch, extent: Extent) -> Counted:
+def counted(patch: MeshPatch, extent: MeshExtent) -> PatchCounts:
     """Count what no other patch has a part in."""
     links = Links(patch)
     corner = links.faces.reshape(-1)
@@ -107,7 +107,7 @@ def counted(patch: Patch, extent: Extent) -> Counted:
     roots = np.flatnonzero(fans == np.arange(len(fans)))
     rim = np.flatnonzero(patch.beside)
     lines, loops = _borders(fans, alone, rim)
-    return Counted(
+    return PatchCounts(
         _table(patch, links, extent, inner, alone, loops),
         int((~patch.shared[corner[roots]]).sum()),
         int((links.uses[inner] > 2).sum()),
@@ -120,7 +120,7 @@ def counted(patch: Patch, extent: Extent) -> Counted:
     )  # fmt: skip
 
 
-def inner_edges(patch: Patch, links: Links) -> NDArray[np.bool_]:
+def inner_edges(patch: MeshPatch, links: Links) -> NDArray[np.bool_]:
     """Tell which edges (e,) of a patch no other has a part in."""
     return ~at_marked(links, patch.shared)
 
@@ -143,9 +143,9 @@ def _borders(
 
 
 def _table(
-    patch: Patch, links: Links, extent: Extent, inner: NDArray[np.bool_], alone: NDArray[np.int32],
+    patch: MeshPatch, links: Links, extent: MeshExtent, inner: NDArray[np.bool_], alone: NDArray[np.int32],
     loops: NDArray[np.int32],
-) -> Table:  # fmt: skip
+) -> Tally:  # fmt: skip
     count, piece = links.pieces, links.face_pieces
 
     def number(pieces: NDArray[np.int32]) -> Counts:
@@ -154,7 +154,7 @@ def _table(
     used, lowest = links.used, np.full(count, np.iinfo(np.int64).max)
     np.minimum.at(lowest, links.vertex_pieces[used], patch.numbers[used])
     areas, volumes = areas_and_volumes(links, extent)
-    return Table(
+    return Tally(
         lowest, number(piece), number(links.vertex_pieces[used & ~patch.shared]), number(links.edge_pieces[inner]),
         number(piece[alone // 3]), number(piece[loops // 3]),
         extent.areas(areas, piece, count), extent.volumes(volumes, piece, count),

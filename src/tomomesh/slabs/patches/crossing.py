@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .patch import Patch, Patches
+    from .patch import MeshPatch, Patches
 
     Floats = NDArray[np.float64]
     Lent = tuple[NDArray[np.int64], Floats]
@@ -34,7 +34,7 @@ def crossing_in(patches: Patches) -> NDArray[np.int64]:
     return np.concatenate([np.empty(0, np.int64), *patches.told(_crossing, lent)])
 
 
-def _span(patch: Patch, along: Sequence[float]) -> tuple[float, float]:
+def _span(patch: MeshPatch, along: Sequence[float]) -> tuple[float, float]:
     """Return the least and the greatest height of a patch's faces."""
     heights = heights_of(patch.vertices, along)[patch.faces]
     return float(heights.min(initial=np.inf)), float(heights.max(initial=-np.inf))
@@ -48,13 +48,13 @@ def _lent_to(patches: Patches, spans: Floats, one: int) -> list[object]:
     return patches.slabs.each(_lent, kept, [low] * count, [high] * count, [patches.along] * count)
 
 
-def _lent(patch: Patch, low: float, high: float, along: Sequence[float]) -> Lent:
+def _lent(patch: MeshPatch, low: float, high: float, along: Sequence[float]) -> Lent:
     heights = heights_of(patch.vertices, along)[patch.faces]
     some = patch.faces[(heights.min(axis=1) <= high) & (heights.max(axis=1) >= low)]
     return patch.numbers[some], patch.vertices[some]
 
 
-def _crossing(patch: Patch, lent: Sequence[Lent]) -> NDArray[np.int64]:
+def _crossing(patch: MeshPatch, lent: Sequence[Lent]) -> NDArray[np.int64]:
     """Count the faces of each connected piece of a patch that pass through its own or those that were lent to it."""
     own, links = len(patch.faces), Links(patch)
     if not own:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...measure.shape import Extent
+from ...measure.shape import MeshExtent
 from ...model.columns import any_of, box, carried, parts_of
 from ..keep import InMemory
 from ..mesh import Piece, SlabMesh
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Patch:
+class MeshPatch:
     """The faces of a slab, over vertices that are numbered within it.
 
     Attributes
@@ -71,10 +71,10 @@ class Patches:
     slabs : Slabs
         Who works on them.
     kept : list of Kept
-        Of `Patch`.
+        Of `MeshPatch`.
     vertex_count : int
         Of the whole mesh.
-    extent : Extent
+    extent : MeshExtent
         The box around it.
     shared : (s,) int64 array
         Numbers of the vertices that several patches may use, rising.
@@ -86,14 +86,14 @@ class Patches:
     slabs: Slabs
     kept: list[Kept]
     vertex_count: int
-    extent: Extent
+    extent: MeshExtent
     shared: Ints
     along: tuple[float, ...]
 
     def __len__(self) -> int:
         return len(self.kept)
 
-    def __iter__(self) -> Iterator[Patch]:
+    def __iter__(self) -> Iterator[MeshPatch]:
         """Hand out one patch after the other."""
         return (self.slabs.fetch([one])[0] for one in self.kept)
 
@@ -108,10 +108,9 @@ class Patches:
 
     def carried(self, matrix: Floats) -> Patches:
         """Return the mesh in another frame, at positions times a matrix (4, 4); a mirror turns the faces over."""
-        return self._with(self.each(_carried, [matrix]))
-
-    def _with(self, kept: list[Kept]) -> Patches:
-        return replace(self, kept=kept, extent=_extent(self.slabs, kept, self.face_count))
+        kept, along = self.each(_carried, [matrix]), np.array(self.along) @ np.linalg.inv(matrix[:3, :3])
+        extent = _extent(self.slabs, kept, self.face_count)
+        return replace(self, kept=kept, extent=extent, along=tuple(along.tolist()))
 
     @property
     def face_count(self) -> int:
@@ -120,34 +119,45 @@ class Patches:
 
     def vertices(self) -> Iterator[Floats]:
         """Hand out positions (n, 3)."""
-        return self._rows(lambda one: one.vertices[: one.own], lambda one: one.kept[one.own :], lambda one, some: some)
+        return self._rows(lambda one: one.vertices[: one.own], lambda one, rows: rows, _centers)
 
     def faces(self) -> Iterator[Ints]:
         """Hand out vertex numbers (m, 3)."""
-        return self._faces(lambda one, some: one.numbers[some])
+        return self._rows(lambda one: one.faces[: one.halves], lambda one, rows: one.numbers[rows], _quarters)
 
     def corners(self) -> Iterator[Floats]:
         """Hand out the positions of the corners of faces, (m, 3, 3)."""
-        return self._faces(lambda one, some: one.vertices[some])
+        return self._rows(lambda one: one.faces[: one.halves], lambda one, rows: one.vertices[rows], _quarter_corners)
 
     def distinct(self, kind: type[np.floating[Any]]) -> int:
         """Count the positions that stay apart at a precision."""
         return distinct_in(self, kind)
 
-    def _faces(self, made: Callable[[Patch, Any], NDArray[Any]]) -> Iterator[NDArray[Any]]:
-        return self._rows(lambda one: one.faces[: one.halves], lambda one: one.faces[one.halves :], made)
-
     def _rows(
         self,
-        first: Callable[[Patch], NDArray[Any]],
-        last: Callable[[Patch], NDArray[Any]],
-        made: Callable[[Patch, Any], NDArray[Any]],
+        many: Callable[[MeshPatch], NDArray[Any]],
+        made: Callable[[MeshPatch, Any], NDArray[Any]],
+        few: Callable[[MeshPatch], NDArray[Any]],
     ) -> Iterator[NDArray[Any]]:
-        """Hand out what is made of some rows of each patch, then of others, some at a time."""
-        for rows_of in (first, last):
-            for one in self:
-                rows = rows_of(one)
-                yield from (made(one, rows[part]) for part in parts_of(len(rows)))
+        """Hand out what is made of many rows of each patch, then a few of each, which alone are brought here."""
+        for one in self:
+            rows = many(one)
+            yield from (made(one, rows[part]) for part in parts_of(len(rows)))
+        for kept in self.each(few):
+            rows = self.slabs.fetch([kept])[0]
+            yield from (rows[part] for part in parts_of(len(rows)))
+
+
+def _centers(patch: MeshPatch) -> Floats:
+    return patch.kept[patch.own :]
+
+
+def _quarters(patch: MeshPatch) -> Ints:
+    return patch.numbers[patch.faces[patch.halves :]]
+
+
+def _quarter_corners(patch: MeshPatch) -> Floats:
+    return patch.vertices[patch.faces[patch.halves :]]
 
 
 def patches_of(mesh: SlabMesh, along: tuple[float, ...] = (0.0, 0.0, 1.0)) -> Patches:
@@ -170,18 +180,18 @@ def in_one_patch(mesh: TriMesh) -> Patches:
     return patches_of(SlabMesh.of([piece], InMemory()))
 
 
-def _extent(slabs: Slabs, kept: list[Kept], faces: int) -> Extent:
+def _extent(slabs: Slabs, kept: list[Kept], faces: int) -> MeshExtent:
     boxes = [one for one in slabs.fetch(slabs.each(_box, kept)) if one is not None] or [np.zeros((2, 3))]
-    return Extent(np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1], faces)
+    return MeshExtent(np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1], faces)
 
 
-def _carried(patch: Patch, matrix: Floats) -> Patch:
+def _carried(patch: MeshPatch, matrix: Floats) -> MeshPatch:
     turned = slice(None, None, -1 if np.linalg.det(matrix[:3, :3]) < 0 else 1)
     places = carried(patch.vertices, matrix[:3, :3].T, matrix[:3, 3])
     return replace(patch, vertices=places, faces=np.ascontiguousarray(patch.faces[:, turned]))
 
 
-def _box(patch: Patch) -> Floats | None:
+def _box(patch: MeshPatch) -> Floats | None:
     return np.stack(box(patch.kept)) if len(patch.kept) else None
 
 
@@ -218,7 +228,7 @@ def _places(piece: Piece, begins: Ints, numbers: Ints) -> Floats:
     return np.asarray(np.concatenate([piece.vertices, piece.centers])[_owned(piece, begins, numbers)])
 
 
-def _patch(piece: Piece, begins: Ints, asked: Ints, beside: Ints, given: Floats) -> Patch:
+def _patch(piece: Piece, begins: Ints, asked: Ints, beside: Ints, given: Floats) -> MeshPatch:
     """Put a piece and what it uses of others together."""
     own, centers = len(piece.vertices), len(piece.centers)
     shared = np.zeros(own + centers + len(beside), np.bool_)
@@ -226,7 +236,7 @@ def _patch(piece: Piece, begins: Ints, asked: Ints, beside: Ints, given: Floats)
     shared[own + centers :] = True
     ranges = [begins[0] + np.arange(own), begins[1] + np.arange(centers), beside]
     faces = [_local(piece, begins, some, beside).astype(np.int32) for some in (piece.halves, piece.quarters)]
-    return Patch(
+    return MeshPatch(
         np.concatenate([piece.vertices, piece.centers, given]), np.concatenate(faces), np.concatenate(ranges), shared,
         own, centers, len(piece.halves),
     )  # fmt: skip

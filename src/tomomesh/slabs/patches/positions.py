@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .patch import Patch, Patches
+    from .patch import MeshPatch, Patches
 
     Floats = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def zones_of(spans: Floats, one: int) -> Floats:
     return np.stack([low[begins], reached[ends]], axis=1)
 
 
-def _places(patch: Patch, kind: type[np.floating[Any]]) -> Floats:
+def _places(patch: MeshPatch, kind: type[np.floating[Any]]) -> Floats:
     with np.errstate(over="ignore"):
         return np.array(patch.kept.astype(kind, copy=False), np.float64, order="C")
 
@@ -53,13 +53,13 @@ def heights_of(places: Floats, along: Sequence[float]) -> Floats:
     return np.asarray(x * places[:, 0] + y * places[:, 1] + z * places[:, 2])
 
 
-def _span(patch: Patch, kind: type[np.floating[Any]], along: Sequence[float]) -> tuple[float, float]:
+def _span(patch: MeshPatch, kind: type[np.floating[Any]], along: Sequence[float]) -> tuple[float, float]:
     heights = heights_of(_places(patch, kind), along)
     return float(heights.min(initial=np.inf)), float(heights.max(initial=-np.inf))
 
 
 def _unique(
-    patch: Patch, kind: type[np.floating[Any]], along: Sequence[float], zones: Floats
+    patch: MeshPatch, kind: type[np.floating[Any]], along: Sequence[float], zones: Floats
 ) -> tuple[int, Floats]:  # fmt: skip
     """Count the positions of a patch, and return those within zones, each once."""
     places = _places(patch, kind)

@@ -11,12 +11,12 @@ from .seams import whole_of
 
 if TYPE_CHECKING:
     from .patch import Patches
-    from .seams import Whole
+    from .seams import Gathered
 
 
 def check_patches(
     patches: Patches, *, cavities: int = 0, open_: bool = False
-) -> Whole:  # fmt: skip
+) -> Gathered:  # fmt: skip
     """Check across all seams what `tomomesh.measure.topology.check_promise` checks on a whole mesh.
 
     Parameters
@@ -29,7 +29,7 @@ def check_patches(
 
     Returns
     -------
-    Whole
+    Gathered
         What was counted.
 
     Raises

@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .patch import Patches
-    from .seams import Whole
+    from .seams import Gathered
 
     Floats = NDArray[np.float64]
 
 
-def assess_patches(patches: Patches, whole: Whole | None = None, *, cavities: int = 0) -> dict[str, Any]:
+def assess_patches(patches: Patches, whole: Gathered | None = None, *, cavities: int = 0) -> dict[str, Any]:
     """Measure a mesh that is never whole.
 
     Parameters
     ----------
     patches : Patches
         One face at least, and finite vertices; it may have borders.
-    whole : Whole, optional
+    whole : Gathered, optional
         What was counted on it, where that is known already.
     cavities : int
         Components that may face inward.
@@ -59,7 +59,7 @@ def assess_patches(patches: Patches, whole: Whole | None = None, *, cavities: in
     return found | {"components_not_listed": counts.components - len(found["per_component"])}
 
 
-def _components(whole: Whole, ends: Floats, crossing: NDArray[np.int64]) -> list[dict[str, Any]]:
+def _components(whole: Gathered, ends: Floats, crossing: NDArray[np.int64]) -> list[dict[str, Any]]:
     """Return one dictionary a component, that of the largest area first."""
     table, areas = whole.table, unfolded(whole.table.areas)
     largest = np.argsort(-areas, kind="stable")[:LISTED]

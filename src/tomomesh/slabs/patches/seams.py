@@ -13,7 +13,7 @@ from ...measure.links import Links
 from ...measure.shape import unfolded
 from ...measure.topology import Topology
 from ...model.mesh import TriMesh
-from .counts import Counted, Rim, Table, at_marked, counted
+from .counts import PatchCounts, Rim, Tally, at_marked, counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -116,13 +116,13 @@ class Seams:
 
 
 @dataclass(frozen=True)
-class Whole:
+class Gathered:
     """A mesh as its patches tell of it together.
 
     Attributes
     ----------
     topology : Topology
-    table : Table
+    table : Tally
         Of its connected pieces, in the order of their lowest vertex.
     seams : Seams
     numbers : (p,) int64 array
@@ -132,13 +132,13 @@ class Whole:
     """
 
     topology: Topology
-    table: Table
+    table: Tally
     seams: Seams
     numbers: NDArray[np.int64]
     finite: bool
 
 
-def whole_of(patches: Patches, *, cavities: int = 0) -> Whole:
+def whole_of(patches: Patches, *, cavities: int = 0) -> Gathered:
     """Count on a mesh in patches what `tomomesh.measure.topology.topology` counts on a whole one.
 
     Parameters
@@ -149,27 +149,27 @@ def whole_of(patches: Patches, *, cavities: int = 0) -> Whole:
 
     Returns
     -------
-    Whole
+    Gathered
     """
-    found: list[Counted] = patches.told(counted, [patches.extent])
+    found: list[PatchCounts] = patches.told(counted, [patches.extent])
     seams = Seams.between([one.rim for one in found], [len(one.table.faces) for one in found], patches.shared)
     table, numbers = _joined([one.table for one in found], seams)
-    return Whole(_topology(found, table, seams, cavities), table, seams, numbers, all(one.finite for one in found))
+    return Gathered(_topology(found, table, seams, cavities), table, seams, numbers, all(one.finite for one in found))
 
 
-def _joined(tables: list[Table], seams: Seams) -> tuple[Table, NDArray[np.int64]]:
+def _joined(tables: list[Tally], seams: Seams) -> tuple[Tally, NDArray[np.int64]]:
     """Add up the rows of what hangs together, and what the seams add to them; return also where each row went."""
-    rows = Table(*(np.concatenate([getattr(one, field.name) for one in tables]) for field in fields(Table)))
+    rows = Tally(*(np.concatenate([getattr(one, field.name) for one in tables]) for field in fields(Tally)))
     rows = _with_seams(rows, seams)
     number = seams.joined(len(rows.faces))
     lowest = np.full(number.max(initial=-1) + 1, np.iinfo(np.int64).max)
     np.minimum.at(lowest, number, rows.lowest)
     number = np.argsort(np.argsort(lowest))[number]
-    sums = {field.name: _added(getattr(rows, field.name), number, len(lowest)) for field in fields(Table)}
-    return replace(Table(**sums), lowest=np.sort(lowest)), number
+    sums = {field.name: _added(getattr(rows, field.name), number, len(lowest)) for field in fields(Tally)}
+    return replace(Tally(**sums), lowest=np.sort(lowest)), number
 
 
-def _with_seams(rows: Table, seams: Seams) -> Table:
+def _with_seams(rows: Tally, seams: Seams) -> Tally:
     """Give the vertices, edges and borders that are counted at the seams to pieces that they belong to."""
     count, piece = len(rows.faces), seams.rim.pieces
     corner = seams.links.faces.reshape(-1)
@@ -191,7 +191,7 @@ def _added(values: NDArray[Any], numbers: NDArray[np.int64], count: int) -> NDAr
     return sums
 
 
-def _topology(found: list[Counted], table: Table, seams: Seams, cavities: int) -> Topology:
+def _topology(found: list[PatchCounts], table: Tally, seams: Seams, cavities: int) -> Topology:
     vertices, edges, loops = (int(values.sum()) for values in (table.vertices, table.edges, table.loops))
     euler, components = vertices - edges + int(table.faces.sum()), len(table.faces)
     overused = int((seams.theirs & (seams.links.uses > 2)).sum())

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..keep import Kept
-    from .patch import Patch, Patches
-    from .seams import Whole
+    from .patch import MeshPatch, Patches
+    from .seams import Gathered
 
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
@@ -80,7 +80,7 @@ class Shaped:
     ends: Floats
 
 
-def shapes_in(patches: Patches, whole: Whole) -> tuple[dict[str, float], Floats]:
+def shapes_in(patches: Patches, whole: Gathered) -> tuple[dict[str, float], Floats]:
     """Measure what `tomomesh.measure.shape.triangle_shapes` does on a whole mesh, to the last bit.
 
     Returns
@@ -107,7 +107,7 @@ def shapes_in(patches: Patches, whole: Whole) -> tuple[dict[str, float], Floats]
     return told, _ends([*(one.ends for one in found), np.stack([lengths[theirs]] * 2)], pieces, len(whole.table.faces))
 
 
-def _shaped(patch: Patch, edges: int, faces: int) -> Shaped:
+def _shaped(patch: MeshPatch, edges: int, faces: int) -> Shaped:
     links = Links(patch)
     lengths, turns = lengths_and_turns(links)
     inner = inner_edges(patch, links)

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .patch import Patch, Patches
+    from ..keep import Kept, Slabs
+    from .patch import MeshPatch, Patches
 
     Ints = NDArray[np.int64]
 
@@ -32,34 +33,35 @@ def shares(patches: Patches, count: int) -> Iterator[TriMesh]:
     count : int
         Number of parts. One needs memory.
     """
-    found = patches.told(_spread, [patches.vertex_count])
+    lowest = patches.each(_lowest)
+    found = patches.slabs.fetch(patches.slabs.each(_spread, lowest, [patches.vertex_count] * len(patches)))
     spans = np.array([span for span, _ in found], np.int64)
     reached = np.cumsum(np.sum([faces for _, faces in found], axis=0))
     bins = np.searchsorted(reached, np.arange(1, count) * patches.face_count / count)
     # the first vertex whose bin is behind these
     ends = -(-(bins + 1) * patches.vertex_count // BINS)
     for start, stop in zip([0, *ends.tolist()], [*ends.tolist(), patches.vertex_count], strict=True):
-        yield _share(patches, np.flatnonzero((spans[:, 0] < stop) & (spans[:, 1] >= start)), start, stop)
+        some = np.flatnonzero((spans[:, 0] < stop) & (spans[:, 1] >= start))
+        columns = [patches.kept[one] for one in some], [lowest[one] for one in some]
+        yield _together(patches.slabs, patches.slabs.each(_between, *columns, [start] * len(some), [stop] * len(some)))
 
 
-def _lowest(patch: Patch) -> Ints:
+def _lowest(patch: MeshPatch) -> Ints:
     """Return the lowest vertex of every face, (f,)."""
     a, b, c = patch.numbers[patch.faces.T]
     lowest: Ints = np.minimum(np.minimum(a, b), c)
     return lowest
 
 
-def _spread(patch: Patch, total: int) -> tuple[tuple[int, int], Ints]:
+def _spread(lowest: Ints, total: int) -> tuple[tuple[int, int], Ints]:
     """Return the lowest and the highest of the faces' lowest vertices, and how many faces have theirs in each bin."""
-    lowest = _lowest(patch)
     bins = np.bincount(lowest * BINS // max(total, 1), minlength=BINS)
     return (int(lowest.min(initial=total)), int(lowest.max(initial=-1))), bins.astype(np.int64)
 
 
-def _share(patches: Patches, some: NDArray[np.intp], start: int, stop: int) -> TriMesh:
-    slabs = patches.slabs
-    kept = [patches.kept[one] for one in some]
-    found = [slabs.fetch([one])[0] for one in slabs.each(_between, kept, [start] * len(kept), [stop] * len(kept))]
+def _together(slabs: Slabs, kept: list[Kept]) -> TriMesh:
+    """Put faces of several patches into one mesh, halves before quarters, over each vertex once."""
+    found = slabs.fetch(kept)
     halves, quarters = (np.concatenate([np.empty((0, 3), np.int64), *(one[n] for one in found)]) for n in (0, 1))
     numbers = np.concatenate([np.empty(0, np.int64), *(one[2] for one in found)])
     places = np.concatenate([np.empty((0, 3)), *(one[3] for one in found)])
@@ -67,9 +69,8 @@ def _share(patches: Patches, some: NDArray[np.intp], start: int, stop: int) -> T
     return TriMesh(places[first], np.searchsorted(once, np.concatenate([halves, quarters])))
 
 
-def _between(patch: Patch, start: int, stop: int) -> tuple[Ints, Ints, Ints, NDArray[np.float64]]:
+def _between(patch: MeshPatch, lowest: Ints, start: int, stop: int) -> tuple[Ints, Ints, Ints, NDArray[np.float64]]:
     """Return the faces of a patch whose lowest vertex lies in a range, and the numbers and places of all they use."""
-    lowest = _lowest(patch)
     some = (lowest >= start) & (lowest < stop)
     used = np.unique(patch.faces[some])
     halves, quarters = (

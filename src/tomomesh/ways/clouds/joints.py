@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...cuberille.bitmasks import Bitmask
+    from ...measure.intersections import CrossingFaces
     from ...pointcloud.samples import Samples
     from ...progress import Progress
     from ...settings import Settings
@@ -131,7 +132,7 @@ def of_small_cubes(shell: Shell, samples: Samples, settings: Settings, progress:
     if settings.cubes.cell_mm or cell[0] > SMALLER * shell.cell.min():
         return shell
     threads = settings.run.threads
-    lowest, keys = cubes_over(np.concatenate([samples.positions, shell.spanned.places]), cell)
+    lowest, keys = cubes_over(np.concatenate([samples.positions, shell.spanned]), cell)
     between = keys_between(samples, lowest, cell, threads=threads, progress=progress)
     cells = cells_of(once_each(np.concatenate([keys, between])))
     cavities = settings.cubes.surface != "outer"
@@ -190,14 +191,14 @@ def _places(shell: Shell, bitmask: Bitmask) -> Floats:
 
 
 def follows(
-    shell: Shell, mesh: TriMesh, samples: Samples, origin: Floats, tree: Tree | None, *, threads: int = 0
+    shell: Shell, mesh: TriMesh, samples: Samples, origin: Floats, tangled: CrossingFaces, *, threads: int = 0
 ) -> Stage[None]:
-    """Say where points lie deep inside of a mesh, or it passes them by; the tree is that of its faces."""
+    """Say where points lie deep inside of a mesh, or it passes them by; its faces were last looked at by `tangled`."""
     if not shell.leak_test.tight or shell.doubt:
         return Stage(None)
     deep = joint(shell.leak_test.shell, shell.finer)
     inside = None if deep is None else shell.middles(deep)
-    place = passed_by(mesh, samples, tree, threads=threads) if inside is None else inside
+    place = passed_by(mesh, samples, tangled, threads=threads) if inside is None else inside
     if place is None:
         return Stage(None)
     where = f"points lie deep inside of the surface around {place_in_words(place + origin)}"
@@ -209,13 +210,16 @@ def place_in_words(place: Floats) -> str:
     return "(" + ", ".join(f"{c:.6g}" for c in place) + ")"
 
 
-def passed_by(mesh: TriMesh, samples: Samples, tree: Tree | None = None, *, threads: int = 0) -> Floats | None:
+def passed_by(
+    mesh: TriMesh, samples: Samples, tangled: CrossingFaces | None = None, *, threads: int = 0
+) -> Floats | None:
     """Return the place (3,) where a mesh passes samples by, facing pairs or most; None if it follows all but a few."""
     spacing, noise = float(np.median(samples.spacing)), float(np.median(samples.noise))
     enough = min(OFF * spacing, TAKEN_IN * spacing + noise)
-    tree = Tree.of_faces(mesh, threads=threads) if tree is None else tree
+    tree = (tangled and tangled.handed_over()) or Tree.of_faces(mesh, threads=threads)
     order = np.arange(len(samples.positions), dtype=np.int32)  # that of their cubes
     away, face = tree.nearest(samples.positions, order=order, enough=enough, threads=threads)
+    del tree, order  # before rows of the samples are made
     asked = away > TAKEN_IN * spacing + noise if _is_clean(samples) else np.zeros(len(away), np.bool_)
     between = facing_pairs(samples, FACING * spacing, asked, threads=threads) if asked.any() else NO_PAIRS
     taken_in = away[between].max(axis=1, initial=0)

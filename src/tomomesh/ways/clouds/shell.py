@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...cuberille.leak_test import LeakTest
-    from ...pointcloud.bridges import Bridges
     from ...pointcloud.samples import Samples
     from ...progress import Progress
     from ...settings import Settings
@@ -71,7 +70,7 @@ class Shell:
     cell: Floats
     lowest: Floats
     cubes: int
-    spanned: Bridges
+    spanned: Floats
     leak_test: LeakTest
     by_normals: bool = False
     """Whether inside and outside were told apart by the normals alone."""
@@ -115,7 +114,7 @@ def shell_around(points: Points, samples: Samples, settings: Settings, progress:
         origin = lowest_corner(points)
         normals = partial(_by_normals, samples=samples, origin=origin, settings=settings, progress=progress)
         shell = apart(shell, samples, origin, settings, progress, normals)
-    told = shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned.places))
+    told = shell_found(shell.leak_test, shell.taken(settings), shell.cell, shell.cubes, len(shell.spanned))
     return folded(shell, told, Stage(None, warnings=(shell.doubt,) if shell.doubt else ()))
 
 
@@ -129,7 +128,7 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
     for tried, span, cell in product(closings, SPANS, edges):
         require_room(count, samples, cell)
         spanned = bridges(samples, float(cell.min()), span=span, threads=settings.run.threads, progress=progress)
-        lowest, keys = cubes_over(np.concatenate([samples.positions, spanned.places]), cell)
+        lowest, keys = cubes_over(np.concatenate([samples.positions, spanned]), cell)
         cells = cells_of(once_each(keys))
         steps = [k for k in tried if cubes.closing is not None or k * cell.min() <= reach]
         leak_test = close_leaks(
@@ -147,7 +146,7 @@ def _by_normals(shell: Shell, samples: Samples, origin: Floats, settings: Settin
     """Return a shell around what the normals say is inside; the one that leaks where they say nothing of the kind."""
     if not samples.normals.any():
         return shell
-    places, threads = np.concatenate([samples.positions, shell.spanned.places]), settings.run.threads
+    places, threads = np.concatenate([samples.positions, shell.spanned]), settings.run.threads
     lowest, keys = cubes_over(places, shell.cell)
     leaky = close_leaks(cells_of(once_each(keys)), TRIED[-1][-1:], threads=threads, progress=progress)
     asked = float(shell.cell.min()) if settings.cubes.cell_mm else None

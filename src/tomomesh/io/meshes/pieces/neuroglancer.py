@@ -17,7 +17,7 @@ import numpy as np
 from ....errors import OutputError, UsageError
 from ....model.mesh import TriMesh
 from ....model.units import MM
-from ....slabs.patches.clipping import Grid
+from ....slabs.patches.clipping import CellGrid
 from ....slabs.patches.patch import in_one_patch
 from ...documents import json_of
 from ...files.atomic import replacing
@@ -120,7 +120,7 @@ def _made(folder: Path) -> Iterator[Path]:
         raise
 
 
-def _grid(whole: Patches, faces: int) -> tuple[Grid, int]:
+def _grid(whole: Patches, faces: int) -> tuple[CellGrid, int]:
     """Return the finest grid, and how many levels there are until one cell holds all.
 
     A surface passes through about so many cells as a square of the box's longest side has.
@@ -130,7 +130,7 @@ def _grid(whole: Patches, faces: int) -> tuple[Grid, int]:
     origin = np.nextafter(extent.low.astype(np.float32), np.float32(-np.inf))
     longest = max(float((extent.high - origin).max()), float(np.finfo(np.float32).tiny))
     side = np.nextafter(np.float32(longest / 2 ** (levels - 1)), np.float32(np.inf))
-    return Grid(origin.astype(np.float64), float(side)), levels
+    return CellGrid(origin.astype(np.float64), float(side)), levels
 
 
 def _simplified(mesh: TriMesh, faces: int) -> TriMesh:
@@ -153,7 +153,7 @@ class _Written:
     length: int
 
 
-def _encoded(draco: Any, fragment: Fragment, grid: Grid) -> bytes:
+def _encoded(draco: Any, fragment: Fragment, grid: CellGrid) -> bytes:
     """Return a fragment by Draco, positions as whole numbers from 0 to 65535 within the cell."""
     most, side = 2**BITS - 1, grid.side * 2**fragment.level
     low = grid.origin + side * np.array(fragment.cell)
@@ -171,7 +171,7 @@ def _detail(whole: Patches) -> float:
     return float(np.sqrt(2 * (a * b + b * c + c * a) / max(whole.face_count, 1)))
 
 
-def _index(written: list[_Written], grid: Grid, levels: int, detail: float) -> bytes:
+def _index(written: list[_Written], grid: CellGrid, levels: int, detail: float) -> bytes:
     """Return where the fragments are: those of each level, their cells as columns, then their lengths."""
     parts = [
         np.full(3, grid.side, "<f4"), grid.origin.astype("<f4"), np.array([levels], "<u4"),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....model.mesh import TriMesh
-from ....slabs.patches.clipping import Clipped, Grid, clipped, cut_along
+from ....slabs.patches.clipping import CellGrid, Clipped, clipped, cut_along
 from ..cells import weld
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Fragment:
     mesh: TriMesh
 
 
-def fragments(patches: Patches, grid: Grid, levels: int, simplify: Simplify) -> Iterator[Fragment]:
+def fragments(patches: Patches, grid: CellGrid, levels: int, simplify: Simplify) -> Iterator[Fragment]:
     """Hand out the fragments of all levels, those of the finest first, each level along a Z-order curve.
 
     Fragments of one level fit together: where a mesh is simplified its border stays. How the mesh was cut into slabs
@@ -54,7 +54,7 @@ def fragments(patches: Patches, grid: Grid, levels: int, simplify: Simplify) -> 
     Parameters
     ----------
     patches : Patches
-    grid : Grid
+    grid : CellGrid
         Of the finest level.
     levels : int
     simplify : callable
@@ -66,7 +66,7 @@ def fragments(patches: Patches, grid: Grid, levels: int, simplify: Simplify) -> 
         for cell, corners in made:
             kept[cell] = patches.slabs.each(_same, [corners])[0]
             yield Fragment(level, cell, _welded(corners))
-        finer = Grid(grid.origin, grid.side * 2**level)
+        finer = CellGrid(grid.origin, grid.side * 2**level)
         made = _coarser(patches, kept, finer, simplify)
 
 
@@ -74,7 +74,7 @@ def _same(corners: Floats) -> Floats:
     return corners
 
 
-def _finest(patches: Patches, grid: Grid) -> Iterator[tuple[Cell, Floats]]:
+def _finest(patches: Patches, grid: CellGrid) -> Iterator[tuple[Cell, Floats]]:
     """Yield the faces (m, 3, 3) in each cell of the finest level."""
     kept = patches.each(clipped, [grid])
     holding: dict[Cell, list[Any]] = {}
@@ -90,7 +90,7 @@ def _cells(found: Clipped) -> NDArray[np.int64]:
 
 
 def _coarser(
-    patches: Patches, kept: dict[Cell, Kept], finer: Grid, simplify: Simplify
+    patches: Patches, kept: dict[Cell, Kept], finer: CellGrid, simplify: Simplify
 ) -> Iterator[tuple[Cell, Floats]]:
     """Yield the faces of the level above another, cut along the planes of that other's cells."""
     children: dict[Cell, list[Kept]] = {}

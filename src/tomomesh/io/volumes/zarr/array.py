@@ -9,23 +9,21 @@ from __future__ import annotations
 
 import json
 import math
-import operator
-import os
-import re
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ....errors import FormatError, ResourceError
-from ....model.lazy import LazyVoxels, in_memory
+from ....errors import FormatError, ResourceError, UnreadableError
+from ....model.lazy import LazyVoxels
 from ...files.detached import beside
 from ...files.extras import required
 from ...files.limits import require_memory
 from ...files.parts import Seen, read_later
 from ...files.source import third_party, whole
 from ..gray import native
+from .missing import are_fill, grid_of, missing_chunks, unit_of
 from .packed_chunk import promised_bytes
 
 if TYPE_CHECKING:
@@ -46,10 +44,6 @@ CODECS = {
 
 MOST_CHUNKS = 2**22
 """Most chunks that an array may have; of 64 cubed voxels, a usual size, they are a million million voxels."""
-
-TORN = 0.25
-"""A missing chunk was lost where more than this part of the voxels beside it differ from the fill value: what writers
-leave out is background, which an object touches in part at most; around a lost part of it, it is on all sides."""
 
 
 def document_of(folder: Path, name: str, *, file: str) -> dict[str, Any]:
@@ -82,11 +76,11 @@ def open_array(folder: Path, *, file: str) -> Any:
     described = document_of(folder, DOCUMENTS[3 - version], file=file)
     _check_codecs(described, file)
     with third_party("zarr", file):
-        store = zarr.storage.LocalStore(folder, read_only=True)
+        store = zarr.storage.LocalStore(folder.absolute(), read_only=True)
         array = zarr.open_array(store, mode="r", zarr_format=version)
-        least = array.chunks if read_later() else tuple(map(max, array.shape, _unit(array)))
+        least = array.chunks if read_later() else tuple(map(max, array.shape, unit_of(array)))
     require_memory(math.prod(least) * array.dtype.itemsize, file=file)
-    if 0 in array.shape or math.prod(_grid(array)) > MOST_CHUNKS:
+    if 0 in array.shape or math.prod(grid_of(array)) > MOST_CHUNKS:
         found = f"shape = {array.shape}, chunks = {array.chunks}"
         raise FormatError("the sizes of the array are invalid", file=file, found=found)
     return array
@@ -111,17 +105,6 @@ def _codecs(described: Any) -> list[str]:
     codecs = [one for codec in nested for one in (codec if isinstance(codec, list) else [codec])]
     names = [str(codec.get("id") or codec["name"]) for codec in codecs]
     return names + [name for codec in codecs for name in _codecs(codec.get("configuration") or {})]
-
-
-def _grid(array: Any) -> tuple[int, ...]:
-    """Return how many chunks, or shards, lie along each axis."""
-    return tuple(-(-size // chunk) for size, chunk in zip(array.shape, _unit(array), strict=True))
-
-
-def _unit(array: Any) -> tuple[int, ...]:
-    """Return the sizes of what a file holds: a chunk, or a shard."""
-    unit: tuple[int, ...] = array.shards or array.chunks
-    return unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +162,7 @@ class Chunks:
 
     def _keys(self, box: tuple[slice, ...]) -> Iterator[str]:
         """Return the keys of the chunks in a box, but for those that were not there."""
-        sides = zip(box, self.array.shape, _unit(self.array), strict=False)
+        sides = zip(box, self.array.shape, unit_of(self.array), strict=False)
         touched = [np.unique(np.arange(size)[side] // unit).tolist() for side, size, unit in sides]
         for place in product(*touched):
             if not self.missing[place]:
@@ -187,6 +170,9 @@ class Chunks:
 
     def _check_length(self, key: str) -> None:
         """Compare what a chunk holds with its voxels; shards, and zstd's that do not say it, are passed over."""
+        if not (self.folder / key).is_file():
+            found, hint = f"chunk = {key}", "the same command again, once nothing writes to the folder"
+            raise UnreadableError("a chunk is gone since the array was opened", file=self.file, found=found, hint=hint)
         codecs = self.array.compressors[-1:] if not self.array.shards else ()
         packing = next((str(getattr(codec, "codec_id", type(codec).__name__)) for codec in codecs), "")
         most = 2 * math.prod(self.array.chunks) * self.array.dtype.itemsize + 2**16
@@ -222,14 +208,14 @@ def read_array(array: Any, folder: Path, *, fill_chunks: bool, file: str) -> tup
     FormatError
         For damaged chunks, and for missing ones that were not left out because they hold the fill value.
     """
-    missing = _missing(array, folder, file)
+    missing = missing_chunks(array, folder, file)
     document = next(folder / name for name in DOCUMENTS if (folder / name).exists())
-    lazy = LazyVoxels.of(Chunks(array, folder, Seen.of(document), missing, file))
+    lazy = LazyVoxels.of(Chunks(array, folder.absolute(), Seen.of(document), missing, file))
     voxels = native(lazy, file=file) if read_later() else native(lazy.read(), file=file)
     if not missing.any():
         return voxels, ()
     fill, told = array.fill_value, f"{int(missing.sum())} of {missing.size}"
-    if missing.all() or not (fill_chunks or _are_fill(voxels, missing, _unit(array), fill)):
+    if missing.all() or not (fill_chunks or are_fill(voxels, missing, unit_of(array), fill)):
         raise FormatError(
             "chunks of the array are missing",
             file=file,
@@ -238,63 +224,3 @@ def read_array(array: Any, folder: Path, *, fill_chunks: bool, file: str) -> tup
             hint="" if missing.all() else f"a fresh copy of the folder, or --fill-chunks, which takes them for {fill}",
         )
     return voxels, (f"chunks that are not in the file, taken for the fill value {fill}: {told}",)
-
-
-def _missing(array: Any, folder: Path, file: str) -> NDArray[np.bool_]:
-    """Tell which chunks, or shards, there are not."""
-    missing = np.ones(_grid(array), np.bool_)
-    for key in _files(folder, "", file):
-        place = tuple(map(int, re.findall("[0-9]+", key)))
-        inside = len(place) == missing.ndim and all(map(operator.lt, place, missing.shape))
-        if inside and array.metadata.encode_chunk_key(place) == key:
-            missing[place] = False
-    return missing
-
-
-def _files(folder: Path, prefix: str, file: str) -> Iterator[str]:
-    """Return the files of an array by their keys; nothing is opened where one of them is a link."""
-    with os.scandir(folder / prefix) as entries:
-        for entry in entries:
-            if entry.is_dir(follow_symlinks=False):
-                yield from _files(folder, f"{prefix}{entry.name}/", file)
-            elif entry.is_file(follow_symlinks=False):
-                yield prefix + entry.name
-            else:
-                expected = "the chunks themselves, no links"
-                raise FormatError(
-                    "a chunk is no regular file", file=file, found=f"chunk = {entry.name}", expected=expected
-                )
-
-
-def _are_fill(voxels: Any, missing: NDArray[np.bool_], chunks: tuple[int, ...], fill: Any) -> bool:
-    """Tell whether the voxels beside the missing chunks are mostly of the fill value, as theirs were then.
-
-    No more is read than the planes of other chunks that touch them.
-    """
-    other = np.zeros(missing.shape, np.int64)
-    area = np.zeros(missing.shape, np.int64)
-    for axis, step in product(range(missing.ndim), (-1, 1)):
-        for place in map(tuple, np.argwhere(missing & ~_shifted(missing, axis, step))):
-            part = in_memory(voxels[_face(place, axis, step, chunks)])
-            other[place] += np.count_nonzero(_differs(part, fill))
-            area[place] += part.size
-    return bool((other <= TORN * area).all())
-
-
-def _shifted(missing: NDArray[np.bool_], axis: int, step: int) -> NDArray[np.bool_]:
-    """Tell of every chunk whether that beside it is missing, or beyond the end."""
-    around = np.pad(missing, [(int(n == axis),) * 2 for n in range(missing.ndim)], constant_values=True)
-    start = 1 + step
-    return around[(*(slice(None),) * axis, slice(start, start + missing.shape[axis]))]
-
-
-def _face(place: tuple[int, ...], axis: int, step: int, chunks: tuple[int, ...]) -> tuple[slice, ...]:
-    """Return the plane of voxels that touches a chunk from the side along an axis."""
-    box = [slice(n * chunk, (n + 1) * chunk) for n, chunk in zip(place, chunks, strict=True)]
-    plane = box[axis].stop if step > 0 else box[axis].start - 1
-    box[axis] = slice(plane, plane + 1)
-    return tuple(box)
-
-
-def _differs(values: NDArray[Any], fill: Any) -> NDArray[np.bool_]:
-    return np.asarray(values != fill if fill == fill else ~np.isnan(values))

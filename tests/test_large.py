@@ -1,0 +1,196 @@
+"""Studies slab by slab: the bytes, the report and the errors of the run in memory, here and on workers."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from conftest import law, seeds
+from studies import write_nifti
+from tomomesh import Volume, read_mesh, reconstruct
+from tomomesh.cli import main
+from tomomesh.large import LargeSurface, reconstruct_large
+from tomomesh.slabs import rest, surface
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from tomomesh.results import Surface
+
+MEMORY: dict[str, Any] = {"remesh": False, "divide": False}
+"""What the run in memory leaves out for the same bytes."""
+LEFT_OUT = {"timings", "settings", "versions", "written", "slabs"}
+APART = {"points_to_surface", "vertices_to_points"}
+"""What is not measured of a mesh that is never whole begins with one of these."""
+
+
+def blobs(seed: int, shape: tuple[int, int, int] = (22, 16, 18)) -> NDArray[np.int16]:
+    """Return smooth noise on background."""
+    levels = np.random.default_rng(seed).normal(size=shape)
+    for axis in range(3):
+        levels = levels + np.roll(levels, 1, axis) + np.roll(levels, -1, axis)
+    return np.round(40 * levels).astype(np.int16)
+
+
+def same(large: LargeSurface | Surface, whole: Surface) -> bool:
+    mesh = large.joined() if isinstance(large, LargeSurface) else large.mesh
+    return (mesh.vertices.tobytes(), mesh.faces.tobytes()) == (
+        whole.mesh.vertices.tobytes(),
+        whole.mesh.faces.tobytes(),
+    )
+
+
+class TestSame:
+    @law(25)
+    @given(seeds, st.integers(1, 30), st.sampled_from(["gray", "otsu", "labels", "outer", "color"]))
+    def test_bytes_for_any_slabs(self, seed: int, slab: int, kind: str) -> None:
+        levels, asked = blobs(seed), {"way": "voxels", **MEMORY}
+        if kind == "labels":
+            levels, asked = (levels > 30).astype(np.int16), asked | {"select": (1,)}
+        elif kind == "color":
+            levels = np.stack([levels, np.roll(levels, 1, 0), levels], axis=3).clip(0, 255).astype(np.uint8)
+        else:
+            asked |= {"gray": {"lower": 20}, "otsu": {}, "outer": {"lower": 20, "surface": "outer"}}[kind]
+        study = Volume.from_stored(levels, np.diag([0.7, 0.8, 0.9, 1.0]))
+        assert same(reconstruct_large(study, slab=slab, **asked), reconstruct(study, **asked))
+
+    def test_the_report(self) -> None:
+        study = Volume.from_stored(blobs(3), np.eye(4))
+        large = reconstruct_large(study, slab=5, lower=20, way="voxels", **MEMORY).report
+        whole = reconstruct(study, lower=20, way="voxels", **MEMORY).report
+        for section in whole.keys() - LEFT_OUT - {"points", "quality", "warnings"}:
+            assert large[section] == whole[section], section
+        quality = {name: value for name, value in large["quality"].items() if name != "per_component"}
+        assert quality.items() <= whole["quality"].items()
+        missing = {name for name in whole["quality"].keys() - quality.keys() if not name.startswith((*APART,))}
+        assert missing == {"per_component", "follows", "cavity_places_mm"}
+        assert large["points"].items() <= whole["points"].items()
+        assert large["slabs"] == {"count": 5}
+
+    @pytest.mark.parametrize("way", ["ring", "contours", "voxels"])
+    def test_files_of_every_way_read_slab_by_slab(self, way: str, tmp_path: Path) -> None:
+        k, j, i = np.ogrid[:24, :30, :30]
+        ball = (100 - 8 * np.sqrt((k - 11.5) ** 2 + (j - 14.5) ** 2 + (i - 14.5) ** 2)).astype(np.int16)
+        write_nifti(tmp_path / "ball.nii", ball, np.eye(4))
+        line = ["reconstruct", str(tmp_path / "ball.nii"), "--lower", "20", "--way", way, "--quiet"]
+        plain = ["--no-remesh", "--no-divide"]
+        assert main([*line, *plain, "-o", str(tmp_path / "whole.ply")]) == 0
+        for options in (["--slab", "5"], ["--memory", "1GB"]):
+            assert main([*line, *plain, *options, "-o", str(tmp_path / "slabs.ply")]) == 0
+            assert (tmp_path / "slabs.ply").read_bytes() == (tmp_path / "whole.ply").read_bytes()
+
+    def test_files_that_weld(self, tmp_path: Path, folder: Path) -> None:
+        write_nifti(tmp_path / "a.nii", blobs(1), np.eye(4))
+        line = ["reconstruct", str(tmp_path / "a.nii"), "--lower", "20", "--way", "voxels", "--quiet", "--slab", "4"]
+        assert main([*line, "-o", str(folder / "whole.ply")]) == 0
+        assert main([*line, "-o", str(folder / "part.ply"), "--pieces", "3", "--report", str(folder / "r.json")]) == 0
+        parts = [read_mesh(folder / f"part-{n:03d}.ply") for n in (1, 2, 3)]
+        whole = read_mesh(folder / "whole.ply")
+        assert sum(len(part.faces) for part in parts) == len(whole.faces)
+        places = np.concatenate([part.vertices for part in parts])
+        assert len(np.unique(places, axis=0)) == len(whole.vertices)
+        told = json.loads((folder / "r.json").read_text())["written"]["files"]
+        assert told == ["part-001.ply", "part-002.ply", "part-003.ply", "part-pieces.json"]
+
+
+STAGES = [
+    *((surface, name) for name in ("ground", "squares_from", "region", "chosen", "piece")),
+    *((rest, name) for name in ("begun", "returned", "stepped")),
+]
+"""What is done to a slab, by the function that does it and the module that asks for it."""
+
+
+def killed_once(*given: Any, work: Any, marker: Path, **named: Any) -> Any:
+    if not marker.exists():
+        marker.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return work(*given, **named)
+
+
+class TestWorkers:
+    @pytest.fixture
+    def study(self, tmp_path: Path) -> Path:
+        write_nifti(tmp_path / "labels.nii", np.pad((blobs(5) > 20).astype(np.uint8), 1), np.eye(4))
+        return tmp_path / "labels.nii"
+
+    def line(self, study: Path, name: str) -> list[str]:
+        return ["reconstruct", str(study), "--select", "1", "--quiet", "-o", str(study.parent / name)]
+
+    def test_the_same_bytes(self, study: Path, here: Any) -> None:
+        on = ["--scheduler", here.scheduler_address, "--slab", "6"]
+        assert main([*self.line(study, "workers.ply"), *on]) == 0
+        assert main([*self.line(study, "whole.ply"), "--no-remesh"]) == 0
+        assert (study.parent / "workers.ply").read_bytes() == (study.parent / "whole.ply").read_bytes()
+
+    @pytest.mark.parametrize(("module", "stage"), STAGES)
+    def test_a_worker_killed_in_any_stage(
+        self, module: Any, stage: str, study: Path, here: Any, client: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        marker = study.parent / "marker"
+        monkeypatch.setattr(module, stage, partial(killed_once, work=getattr(module, stage), marker=marker))
+        monkeypatch.setattr(here.scheduler, "allowed_failures", 1)
+        labels = Volume.from_stored((blobs(5) > 20).astype(np.uint8), np.eye(4))
+        found = reconstruct_large(labels, client=client, slab=6, select=(1,))
+        assert marker.exists()
+        assert same(found, reconstruct(labels, select=(1,), remesh=False))
+
+
+class TestFaults:
+    @pytest.mark.parametrize(
+        ("options", "code", "said"),
+        [
+            (["--slab", "0"], 2, "a slab has a slice. Found: [--slab 0]"),
+            (["--workers", "0"], 2, "there must be a worker. Found: [--workers 0]"),
+            (["--memory", "4 rooms"], 2, "that is no limit of the memory"),
+            (["--slab", "4", "--figures", "f"], 2, "this needs the study whole. Found: [--figures, and"),
+            (["--slab", "4", "--smooth", "2"], 2, "this needs the whole mesh at once. Found: [--smooth"),
+            (["--slab", "4", "--edge", "2"], 2, "this needs the whole mesh at once. Found: [--edge"),
+            (["--slab", "4", "--hollow", "1"], 2, "a part to print"),
+            (["--slab", "4", "--pieces", "0"], 2, "a mesh is written in 1 to 200 pieces"),
+            (["--slab", "4", "--lower", "1e9"], 6, "the window selects nothing"),
+        ],
+    )
+    def test_refused_in_one_line(
+        self, options: list[str], code: int, said: str, tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))
+        line = ["reconstruct", str(tmp_path / "a.nii"), "--way", "voxels", "-o", str(folder / "a.ply"), "--quiet"]
+        window = [] if "--lower" in options else ["--lower", "20"]
+        assert main([*line, *window, *options]) == code
+        (told,) = capsys.readouterr().err.splitlines()
+        assert said in told
+        assert not any(folder.iterdir())
+
+    def test_a_format_that_is_not_written_in_parts(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))
+        assert main(["reconstruct", str(tmp_path / "a.nii"), "--slab", "4", "-o", str(tmp_path / "a.glb")]) == 2
+        assert ".obj" in capsys.readouterr().err
+
+    def test_a_chunk_that_is_missing(self, tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        zarr = pytest.importorskip("zarr", reason="the extra `zarr` is not installed")
+        array = zarr.create_array(tmp_path / "a.zarr", shape=(24, 24, 24), chunks=(8, 8, 8), dtype=np.int16)
+        array[:] = 5 + (np.indices((24, 24, 24)).sum(axis=0) % 40)
+        shutil.rmtree(tmp_path / "a.zarr" / "c" / "1" / "1")
+        line = ["reconstruct", str(tmp_path / "a.zarr"), "--spacing", "1", "1", "1", "--lower", "20", "--quiet"]
+        assert main([*line, "--way", "voxels", "--slab", "4", "-o", str(folder / "a.ply")]) == 4
+        (told,) = capsys.readouterr().err.splitlines()
+        assert told.startswith("error: chunks of the array are missing")
+        assert not any(folder.iterdir())
+
+    def test_a_memory_that_holds_no_slab(self) -> None:
+        """Which no mesh depends on is only how much of it there is."""
+        study = Volume.from_stored(np.broadcast_to(np.int16(1), (4, 4000, 4000)), np.eye(4))
+        with pytest.raises(Exception, match="the memory does not hold a slab of one slice") as caught:
+            reconstruct_large(study, memory=190e6, lower=0, way="voxels")
+        assert caught.value.exit_code == 7  # type: ignore[attr-defined]

@@ -1,0 +1,45 @@
+"""From a window in slabs to its files: checked, measured and written as in memory, by workers in any order."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from conftest import law, seeds
+from cut_meshes import Sent
+from test_slabs import Study, cuts_of, studies
+from test_slabs_measures import wanted
+from tomomesh import write_mesh
+from tomomesh.io import write_pieces
+from tomomesh.measure.topology import topology
+from tomomesh.slabs.keep import InMemory
+from tomomesh.slabs.mesh import SlabMesh
+from tomomesh.slabs.patches.patch import patches_of
+from tomomesh.slabs.patches.promise import check_patches
+from tomomesh.slabs.patches.report import assess_patches
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+class TestOutput:
+    @law(30)
+    @given(study=studies(), data=st.data(), seed=seeds)
+    def test_of_a_window_is_that_in_memory(
+        self, tmp_path_factory: Any, study: Study, data: st.DataObject, seed: int
+    ) -> None:
+        folder: Path = tmp_path_factory.mktemp("m")
+        mesh, cavities = study.in_memory()[1].mesh, study.in_memory()[0].cavities
+        made = study.in_slabs(cuts_of(data, len(study.mask)), InMemory()).mesh
+        found = patches_of(SlabMesh.of(made.pieces, Sent(seed)))
+        whole = check_patches(found, cavities=cavities)
+        assert whole.topology == topology(mesh, cavities=cavities)
+        assert assess_patches(found, whole, cavities=cavities) == wanted(mesh, cavities)
+        for suffix in (".ply", ".stl", ".obj"):
+            for name, one in (("whole", mesh), ("slabs", found)):
+                write_mesh(one, folder / f"{name}{suffix}")
+            assert (folder / f"whole{suffix}").read_bytes() == (folder / f"slabs{suffix}").read_bytes()
+        files = [write_pieces(one, folder / f"{name}.ply", 3) for name, one in (("whole", mesh), ("slabs", found))]
+        assert [path.read_bytes() for path in files[0][:3]] == [path.read_bytes() for path in files[1][:3]]
