@@ -58,11 +58,11 @@ def crossings_of(net: Net, shares: Sequence[NDArray[np.float64]], rows: Any = sl
 
 
 def begun(place: Extent, found: Region, squares: Sequence[Part], *, springs: Springs) -> Part:
-    """Return what a slab's own vertices are drawn to, and where they are then, (n, 3) each."""
+    """Return what a slab's own vertices are drawn to (n, 3), and where they are then, if that is elsewhere."""
     net, (_, *shares) = found.net, gathered(squares, place.of_squares)
     rows = place.vertices_around
     goals = means(crossings_of(net, shares), net.fans, found.rings.threads, rows(HALO - 1))
-    return _own(place, (goals, evened(goals, net.low, found.rings, springs, rows) if springs.evens else goals))
+    return _own(place, (goals, *([evened(goals, net.low, found.rings, springs, rows)] if springs.evens else [])))
 
 
 def returned(
