@@ -56,7 +56,7 @@ def mesh_in_slabs(
     """
     asked = _asked(kept.chosen, settings)
     made = surface_in_slabs(asked, cuts, settings.fit, slabs, threads=settings.run.threads, progress=progress)
-    return Stage(made, *_told(made, kept, labels=settings.window.select is not None))
+    return Stage(made, *told_of_slabs(made, kept, labels=settings.window.select is not None))
 
 
 def _asked(chosen: Chosen, settings: Settings) -> Asked:
@@ -71,7 +71,9 @@ def _asked(chosen: Chosen, settings: Settings) -> Asked:
     )  # fmt: skip
 
 
-def _told(made: SlabSurface, kept: Selected, *, labels: bool) -> tuple[dict[str, dict[str, Any]], tuple[str, ...]]:
+def told_of_slabs(
+    made: SlabSurface, kept: Selected, *, labels: bool
+) -> tuple[dict[str, dict[str, Any]], tuple[str, ...]]:
     """Tell of the voxels, and how the net came to rest, as `tomomesh.ways.sections.boundary_found` does."""
     steps, counts = len(made.trace.speed), made.mesh.counts.sum(axis=0)
     squares = int(counts[2]) // 2
