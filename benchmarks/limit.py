@@ -20,7 +20,7 @@ from bench import at_most, header, holds, note
 from tomomesh import memory_limit, reconstruct_points
 
 FEW, MANY = 1_000_000, 10_000_000
-LIMITS = {FEW: 500, MANY: 1024}
+LIMITS = {FEW: 600, MANY: 1024}
 """MiB, by points."""
 CPU, MIB = 1.3, 1024
 """The mark, and kibibytes a mebibyte, in which the system tells peaks on Linux."""

@@ -12,6 +12,7 @@ import argparse
 import time
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -112,7 +113,10 @@ def spent(work: Callable[[], object]) -> float:
     return time.process_time() - start
 
 
-def meshes(volume: Volume, **options: bool) -> list[TriMesh]:
+OPTIONS: tuple[dict[str, Any], ...] = ({"shared_walls": True}, {}, {"remesh": False})
+
+
+def meshes(volume: Volume, **options: Any) -> list[TriMesh]:
     """Return the mesh of every label."""
     return [one.mesh for one in reconstruct_labels(volume, **options).values()]
 
@@ -121,7 +125,7 @@ def times(side: int, count: int) -> None:
     """Say what nets and meshes cost."""
     voxels = label_map(side, count)
     volume, settings = Volume.from_stored(voxels, np.eye(4)), Settings()
-    every = [spent(partial(meshes, volume, **options)) for options in ({"shared_walls": True}, {}, {"remesh": False})]
+    every = [spent(partial(meshes, volume, **options)) for options in OPTIONS]
     verdict = "passed" if every[0] <= TIMES * every[1] else "LOST"
     print(f"{count} labels at {side}^3: shared {every[0]:.2f} s, without {every[1]:.2f} s ({verdict}), "
           f"nor even {every[2]:.2f} s")  # fmt: skip

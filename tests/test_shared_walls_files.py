@@ -103,6 +103,14 @@ class TestFiles:
         assert len(found) > 1
         assert all((mesh.vertices.max(axis=0) < (9, -65, 21.5)).all() for mesh in found.values())
 
+    def test_they_lie_on_the_grid_of_the_study(self) -> None:
+        """As labels by themselves do, where their own is a little beside it."""
+        beside = AFFINE.copy()
+        beside[:3, 3] += 0.02
+        study, labels = (Volume.from_stored(organs(), affine) for affine in (AFFINE, beside))
+        one, other = (reconstruct_labels(study, labels=found, shared_walls=True) for found in (study, labels))
+        np.testing.assert_array_equal(one[2].mesh.vertices, other[2].mesh.vertices)
+
     def test_one_line_tells_of_the_walls(self) -> None:
         from tomomesh.cli.summary.run import of_surface
 

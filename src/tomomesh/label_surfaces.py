@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from .begin import laid_out, settled
 from .errors import EmptyError, UsageError
-from .pipeline import laid_out, reconstructed, settled
+from .pipeline import reconstructed
 from .progress import Progress, silent
 from .segmentation.labels import MOST
 
@@ -66,14 +67,11 @@ class LabelSurfaces(Mapping[int, "Surface"]):
         assert labels is not None
         if labels.walls is not None:
             return study
+        on_study = replace(labels, volume=replace(study.volume, voxels=labels.volume.voxels))
         walls = walls_between(
-            labels,
-            settings.fit,
-            inside=study.inside,
-            divide=settings.cubes.divide,
-            threads=settings.run.threads,
+            on_study, settings.fit, inside=study.inside, divide=settings.cubes.divide, threads=settings.run.threads,
             progress=progress,
-        )
+        )  # fmt: skip
         return replace(study, labels=replace(labels, walls=walls))
 
     def __iter__(self) -> Iterator[int]:

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .begin import begun_on, settled
 from .errors import ResourceError
 from .model.mesh import TriMesh
-from .pipeline import begun_on, finished, settled
+from .pipeline import finished
 from .pointcloud.forecast import bytes_in_words, free_memory
 from .progress import Progress, silent
 from .report import Reported
@@ -27,9 +28,9 @@ from .ways.contours_in_slabs import contours_in_slabs
 from .ways.voxels_in_slabs import checked_in_slabs, measured_in_slabs, mesh_in_slabs, require_slabs
 
 if TYPE_CHECKING:
+    from .begin import Begun
     from .isosurface.run_mask import RunMask
     from .model.volume import Volume
-    from .pipeline import Begun
     from .results import Surface
     from .settings import Settings
     from .slabs.keep import Slabs

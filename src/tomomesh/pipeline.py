@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import ctypes
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from .effect import without_effect
-from .errors import UsageError
+from .begin import begin, begun_on, laid_out, settled
 from .finish import compare_with, finish
 from .memory.limit import memory_limit
 from .model.points import PointSet
 from .progress import Progress, silent
-from .segmentation.study import lay_out, select_in
-from .settings import Settings
+from .segmentation.study import lay_out
 from .stage import Stage, folded
-from .ways import choose_way, way_of
-from .ways.choice import take_way
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -26,12 +22,13 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from .begin import Begun
     from .model.mesh import TriMesh
     from .model.volume import Volume
     from .results import Segmentation, Surface
-    from .segmentation.study import LaidOut, Selected
+    from .segmentation.study import LaidOut
+    from .settings import Settings
     from .stage import Later
-    from .ways.way import Way
 
 
 def reconstruct(
@@ -184,7 +181,7 @@ def _of_points(
     cloud = points if isinstance(points, PointSet) else PointSet.from_positions(points)
     taken = take_points(cloud, settings)
     settings = replace(settings, printing=turned(settings.printing, cloud.frame))
-    begun = _begin(settings, given, input=taken.value.input)
+    begun = begin(settings, given, input=taken.value.input)
     made = begun.value.surface(taken.value, settings, progress)
     _give_back()
     done, later = finish(replace(made.value, place=taken.value.place), settings, progress)
@@ -241,73 +238,8 @@ def _give_back() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
-def settled(settings: Settings | None, changes: dict[str, Any], *, every: bool = False) -> Settings:
-    """Return the settings of a run; refuse those whose packages are not installed, or that are for every label."""
-    settings = (settings or Settings()).replace(**changes)
-    if settings.cubes.shared_walls and not every:
-        raise UsageError(
-            "walls are shared among all labels of a map", found="--shared-walls for one mesh", hint="--each-label"
-        )
-    if settings.printing.asked:
-        from .printing.part import require_printing
-
-        require_printing(settings)
-    return settings
-
-
-def _input_of(volume: Volume) -> str:
-    return "color" if getattr(volume, "layers", 1) > 1 else "gray"
-
-
-def _begin(settings: Settings, given: Collection[str], *, input: str) -> Stage[Way]:
-    """Choose the way, and warn of what was asked for and changes nothing on it."""
-    way = way_of(choose_way(settings, input))
-    section = {"name": way.name, "because": way.because(settings, input)}
-    return Stage(way, {"way": section}, tuple(without_effect(settings, given, input=input)))
-
-
 def _laid_out(volume: Volume, labels: Volume | None, settings: Settings, progress: Progress) -> LaidOut:
     return laid_out(volume, labels, settings, progress, labelled=settings.window.select is not None)
-
-
-def laid_out(
-    volume: Volume, labels: Volume | None, settings: Settings, progress: Progress, *, labelled: bool
-) -> LaidOut:
-    """Lay out a study (`lay_out`), once its way to a surface does not refuse the settings."""
-    way_of(choose_way(settings, _input_of(volume))).require(settings)
-    progress("window", 0, 2)
-    return lay_out(volume, labels, settings, labelled=labelled)
-
-
-@dataclass(frozen=True)
-class Begun:
-    """A study of which it is known what is kept and which way it goes.
-
-    Attributes
-    ----------
-    kept : Selected
-    way : Way
-    settings, taken : Settings
-        As they were asked for, and with nothing about the way left open.
-    told : Stage
-        What there is to be told so far.
-    """
-
-    kept: Selected
-    way: Way
-    settings: Settings
-    taken: Settings
-    told: Stage[None]
-
-
-def begun_on(study: LaidOut, settings: Settings, given: Collection[str], progress: Progress) -> Begun:
-    """Choose the voxels of a study that was laid out, and the way to their surface; parameters as `reconstructed`."""
-    kept = select_in(study, settings)
-    progress("window", 1, 2)
-    taken = take_way(kept.value, settings)
-    progress("window", 2, 2)
-    begun = _begin(taken.value, given, input=_input_of(study.volume))
-    return Begun(kept.value, begun.value, settings, taken.value, folded(None, begun, taken, kept))
 
 
 def _segmented(begun: Begun, progress: Progress) -> Segmentation[Any]:

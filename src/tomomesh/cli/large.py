@@ -13,7 +13,7 @@ from ..memory.limit import bytes_of
 from ..settings import option_of
 from ..stage import Stage
 from .bars import bars_of
-from .outputs.checks import check_frame, check_outputs
+from .outputs.checks import check_folder, check_frame, check_outputs
 from .outputs.write import write_documents, write_surface
 from .sources import open_study, sources_of
 from .spread import check_workers
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from .bars import Bars
 
-IN_SLABS = ("memory", "slab", "workers", "scheduler", "pieces")
+IN_SLABS = ("memory", "slab", "workers", "scheduler", "pieces", "neuroglancer")
 """Options of one study by which it is worked on slab by slab."""
 WHOLE = ("points", "labels", "mask_out", "figures", "patient")
 """Results that need the study whole."""
@@ -71,6 +71,8 @@ def _check(chosen: Namespace, settings: Settings) -> None:
         raise UsageError("a slab has a slice", found=f"--slab {chosen.slab}", expected="at least 1")
     check_outputs(chosen, io.PART_WRITERS, *sources_of(chosen, settings))
     check_frame(chosen.output, settings)
+    if chosen.neuroglancer:
+        check_folder(chosen.neuroglancer)
 
 
 @contextmanager
@@ -98,6 +100,8 @@ def _write(chosen: Namespace, found: LargeSurface, settings: Settings, progress:
     else:
         files = io.write_pieces(mesh, chosen.output, chosen.pieces, **named, precision=settings.run.precision)
         told["files"] = [file.name for file in files]
+    if chosen.neuroglancer:
+        io.write_neuroglancer(mesh, chosen.neuroglancer, **named)
     progress("write", 1, 1)
     found = replace(found, stages=(*found.stages, Stage(None, {"written": told})))
     write_documents(chosen, found.report, settings)

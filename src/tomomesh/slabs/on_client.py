@@ -78,7 +78,7 @@ class OnClient:
 
 
 @dataclass(frozen=True)
-class _Held:
+class _AtWorker:
     """What a worker keeps of a slab."""
 
     value: Any
@@ -92,13 +92,13 @@ def _values(kept: Any) -> Any:
     """Return what is kept, in lists and tuples too."""
     if isinstance(kept, list | tuple):
         return type(kept)(map(_values, kept))
-    return mapped(kept.value, own=True) if isinstance(kept, _Held) else kept
+    return mapped(kept.value, own=True) if isinstance(kept, _AtWorker) else kept
 
 
-def _done(work: Callable[..., Any], row: list[Any], beside: int) -> _Held:
+def _done(work: Callable[..., Any], row: list[Any], beside: int) -> _AtWorker:
     """Do a slab's work on a worker, with the cores that others on its machine leave to it."""
     share_cores(max((os.cpu_count() or 1) // beside, 1))
-    return _Held(put_away(work(*_values(row)), File(Path(tempfile.gettempdir()))))
+    return _AtWorker(put_away(work(*_values(row)), File(Path(tempfile.gettempdir()))))
 
 
 def _explained(fault: Exception) -> TomomeshError:

@@ -99,6 +99,11 @@ def add_scale(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="write a mesh that was made slab by slab as N files, NAME-001.ply and so on, that weld exactly",
     )
+    group.add_argument(
+        "--neuroglancer",
+        metavar="FOLDER",
+        help="write levels of detail of such a mesh too, as Neuroglancer reads them",
+    )
 
 
 def add_outputs(parser: argparse.ArgumentParser, *files: str) -> Any:

@@ -26,9 +26,8 @@ if TYPE_CHECKING:
 
 TOGETHER = 2**21
 """Voxels of a slab where the study is in memory: what is made of each stays in the cache of a core, and bounds what is
-made besides. No result depends on it."""
-
-
+made besides. No result depends on it. Measured on 512 x 512 x 200 voxels: half of it takes as long, twice 1.1 to 1.6
+times as long."""
 AT_ONCE = 32
 """Slabs of which what was found is brought here at once: 16 MiB of counts of levels. No result depends on it."""
 
