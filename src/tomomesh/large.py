@@ -24,8 +24,8 @@ from .slabs.cuts import Cuts
 from .slabs.keep import OnDisk
 from .slabs.on_client import OnClient
 from .slabs.place import HALO
-from .ways.contours_in_slabs import contours_in_slabs
-from .ways.voxels_in_slabs import checked_in_slabs, measured_in_slabs, mesh_in_slabs, require_slabs
+from .ways.in_slabs.contours import contours_in_slabs
+from .ways.in_slabs.voxels import checked_in_slabs, measured_in_slabs, mesh_in_slabs, require_slabs
 
 if TYPE_CHECKING:
     from .begin import Begun

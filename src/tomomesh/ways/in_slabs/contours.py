@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..slabs.surface import Asked, surface_in_slabs
-from ..stage import Stage, folded, measured
-from .contours import levels_of_rings, segment_by_contours
-from .voxels_in_slabs import told_of_slabs
+from ...slabs.surface import Asked, surface_in_slabs
+from ...stage import Stage, folded, measured
+from ..contours import levels_of_rings, segment_by_contours
+from .voxels import told_of_slabs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..isosurface.run_mask import RunMask
-    from ..model.volume import Volume
-    from ..progress import Progress
-    from ..segmentation.study import Selected
-    from ..settings import Settings
-    from ..slabs.cuts import Cuts
-    from ..slabs.keep import Slabs
-    from ..slabs.surface import SlabSurface
+    from ...isosurface.run_mask import RunMask
+    from ...model.volume import Volume
+    from ...progress import Progress
+    from ...segmentation.study import Selected
+    from ...settings import Settings
+    from ...slabs.cuts import Cuts
+    from ...slabs.keep import Slabs
+    from ...slabs.surface import SlabSurface
 
 
 def contours_in_slabs(

@@ -6,25 +6,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
-from ..segmentation.slabwise.sources import MaskVoxels
-from ..settings import option_of
-from ..slabs.patches.patch import patches_of
-from ..slabs.patches.promise import check_patches
-from ..slabs.patches.report import assess_patches
-from ..slabs.surface import Asked, surface_in_slabs
-from ..stage import Stage, timed
+from ...errors import UsageError
+from ...segmentation.slabwise.sources import MaskVoxels
+from ...settings import option_of
+from ...slabs.patches.patch import patches_of
+from ...slabs.patches.promise import check_patches
+from ...slabs.patches.report import assess_patches
+from ...slabs.surface import Asked, surface_in_slabs
+from ...stage import Stage, timed
 
 if TYPE_CHECKING:
-    from ..progress import Progress
-    from ..segmentation.selection import Chosen
-    from ..segmentation.study import Selected
-    from ..settings import Settings
-    from ..slabs.cuts import Cuts
-    from ..slabs.keep import Slabs
-    from ..slabs.patches.patch import Patches
-    from ..slabs.patches.seams import Gathered
-    from ..slabs.surface import SlabSurface
+    from ...progress import Progress
+    from ...segmentation.selection import Chosen
+    from ...segmentation.study import Selected
+    from ...settings import Settings
+    from ...slabs.cuts import Cuts
+    from ...slabs.keep import Slabs
+    from ...slabs.patches.patch import Patches
+    from ...slabs.patches.seams import Gathered
+    from ...slabs.surface import SlabSurface
 
 WHOLE = ("smooth", "edge", "target_faces")
 """Parameters of a run that need the whole mesh at once."""
