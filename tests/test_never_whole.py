@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from conftest import law, seeds
-from tomomesh import Settings, Volume, phantom
+from tomomesh import Settings, Volume, phantom, reconstruct
 from tomomesh.errors import EmptyError
 from tomomesh.followed import outline_followed
 from tomomesh.isosurface.crossings import Levels
 from tomomesh.isosurface.run_mask import RunMask
 from tomomesh.isosurface.sides import WindowSides
 from tomomesh.judgement import follow
+from tomomesh.large import LargeSurface, reconstruct_large
 from tomomesh.model.lattice import lattice
 from tomomesh.model.lazy import LazyVoxels
 from tomomesh.segmentation.contours.between import Between, filled_between
@@ -285,3 +286,20 @@ class TestWays:
         faces = np.concatenate([one.halves for one in pieces] + [one.quarters for one in pieces])
         assert vertices.tobytes() == surface.mesh.vertices.tobytes()  # type: ignore[union-attr]
         assert np.array_equal(faces, surface.mesh.faces)  # type: ignore[union-attr]
+
+    @pytest.mark.parametrize("slab", [5, 64])
+    def test_contours_are_meshed_slab_by_slab(self, slab: int) -> None:
+        """From a study that stays in its file; only how far the mesh is from its window is not measured."""
+        settings = Settings().replace(way="contours", lower=HEAD.lower, remesh=False)
+        whole = reconstruct(HEAD.volume, settings)
+        voxels: Any = LazyVoxels.of(Watched(HEAD.volume.voxels, 26))
+        parts = reconstruct_large(Volume(voxels, HEAD.volume.affine, HEAD.volume.grid), settings, slab=slab)
+        assert isinstance(parts, LargeSurface)
+        mesh = parts.joined()
+        assert (mesh.vertices.tobytes(), mesh.faces.tolist()) == (
+            whole.mesh.vertices.tobytes(),
+            whole.mesh.faces.tolist(),
+        )
+        for section in ("networks", "rings", "points", "voxels"):
+            assert parts.report[section] == whole.report[section]
+        assert parts.report["quality"]["closed"]

@@ -24,7 +24,8 @@ from .slabs.cuts import Cuts
 from .slabs.keep import OnDisk
 from .slabs.on_client import OnClient
 from .slabs.place import HALO
-from .ways.voxels_in_slabs import checked_in_slabs, measured_in_slabs, mesh_in_slabs, require_slabs
+from .ways.in_slabs.contours import contours_in_slabs
+from .ways.in_slabs.voxels import checked_in_slabs, measured_in_slabs, mesh_in_slabs, require_slabs
 
 if TYPE_CHECKING:
     from .begin import Begun
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from .settings import Settings
     from .slabs.keep import Slabs
     from .slabs.patches.patch import Patches
+    from .slabs.surface import SlabSurface
+    from .stage import Stage
 
 BASE = 180e6
 """Bytes of Python, its packages, the kernels and Dask."""
@@ -102,7 +105,8 @@ def reconstruct_large(
     Returns
     -------
     LargeSurface, or Surface
-        The latter where networks are taken, whose neurons and mesh fit into the memory where the study does not.
+        The latter where a network a slice is taken, whose neurons and mesh fit into the memory where the study does
+        not.
 
     Raises
     ------
@@ -115,17 +119,26 @@ def reconstruct_large(
     progress("window", 0, 2)
     study = lay_out(volume, labels, settings, labelled=settings.window.select is not None, cutting=cutting)
     begun = begun_on(study, settings, changes, progress)
-    if begun.way.name != "voxels":
+    if begun.way.name not in ("voxels", "contours"):
         return finished(begun, progress)
-    return _by_voxels(begun, slabs, slab, most, progress)
-
-
-def _by_voxels(begun: Begun, slabs: Slabs, slab: int | None, most: float, progress: Progress) -> LargeSurface:
     require_slabs(begun.taken)
+    kept, cut = begun.kept, partial(_cuts_of, slab=slab, most=most)
+    if begun.way.name == "voxels":
+        made = mesh_in_slabs(kept, begun.taken, slabs, cut(kept.study, kept.chosen.runs), progress)
+    else:
+        made = contours_in_slabs(kept, begun.taken, slabs, cut, progress)
+    return _checked(begun, made, progress)
+
+
+def _cuts_of(volume: Volume, runs: RunMask, *, slab: int | None, most: float) -> Cuts:
+    """Cut a volume of which some voxels are kept."""
+    each = volume.layers * volume.voxels.dtype.itemsize
+    return Cuts(_cuts(volume.shape, slab=slab, most=most, itemsize=each, runs=runs))
+
+
+def _checked(begun: Begun, made: Stage[SlabSurface], progress: Progress) -> LargeSurface:
+    """Check a surface in pieces across its seams; it is measured once the report is read."""
     kept, study = begun.kept, begun.kept.study
-    each = study.layers * study.voxels.dtype.itemsize
-    cuts = Cuts(_cuts(study.shape, slab=slab, most=most, itemsize=each, runs=kept.chosen.runs))
-    made = mesh_in_slabs(kept, begun.taken, slabs, cuts, progress)
     checked = checked_in_slabs(made.value, kept, progress)
     patches = checked.value[0]
     later = partial(measured_in_slabs, *checked.value)

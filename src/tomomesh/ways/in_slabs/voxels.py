@@ -6,25 +6,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
-from ..segmentation.slabwise.sources import MaskVoxels
-from ..settings import option_of
-from ..slabs.patches.patch import patches_of
-from ..slabs.patches.promise import check_patches
-from ..slabs.patches.report import assess_patches
-from ..slabs.surface import Asked, surface_in_slabs
-from ..stage import Stage, timed
+from ...errors import UsageError
+from ...segmentation.slabwise.sources import MaskVoxels
+from ...settings import option_of
+from ...slabs.patches.patch import patches_of
+from ...slabs.patches.promise import check_patches
+from ...slabs.patches.report import assess_patches
+from ...slabs.surface import Asked, surface_in_slabs
+from ...stage import Stage, timed
 
 if TYPE_CHECKING:
-    from ..progress import Progress
-    from ..segmentation.selection import Chosen
-    from ..segmentation.study import Selected
-    from ..settings import Settings
-    from ..slabs.cuts import Cuts
-    from ..slabs.keep import Slabs
-    from ..slabs.patches.patch import Patches
-    from ..slabs.patches.seams import Gathered
-    from ..slabs.surface import SlabSurface
+    from ...progress import Progress
+    from ...segmentation.selection import Chosen
+    from ...segmentation.study import Selected
+    from ...settings import Settings
+    from ...slabs.cuts import Cuts
+    from ...slabs.keep import Slabs
+    from ...slabs.patches.patch import Patches
+    from ...slabs.patches.seams import Gathered
+    from ...slabs.surface import SlabSurface
 
 WHOLE = ("smooth", "edge", "target_faces")
 """Parameters of a run that need the whole mesh at once."""
@@ -56,7 +56,7 @@ def mesh_in_slabs(
     """
     asked = _asked(kept.chosen, settings)
     made = surface_in_slabs(asked, cuts, settings.fit, slabs, threads=settings.run.threads, progress=progress)
-    return Stage(made, *_told(made, kept, labels=settings.window.select is not None))
+    return Stage(made, *told_of_slabs(made, kept, labels=settings.window.select is not None))
 
 
 def _asked(chosen: Chosen, settings: Settings) -> Asked:
@@ -71,7 +71,9 @@ def _asked(chosen: Chosen, settings: Settings) -> Asked:
     )  # fmt: skip
 
 
-def _told(made: SlabSurface, kept: Selected, *, labels: bool) -> tuple[dict[str, dict[str, Any]], tuple[str, ...]]:
+def told_of_slabs(
+    made: SlabSurface, kept: Selected, *, labels: bool
+) -> tuple[dict[str, dict[str, Any]], tuple[str, ...]]:
     """Tell of the voxels, and how the net came to rest, as `tomomesh.ways.sections.boundary_found` does."""
     steps, counts = len(made.trace.speed), made.mesh.counts.sum(axis=0)
     squares = int(counts[2]) // 2

@@ -1,0 +1,1 @@
+"""Ways whose study and mesh are never whole, slab by slab."""

@@ -1,0 +1,51 @@
+"""Several rings a slice, and nothing whole: networks -> levels around the rings -> mesh in pieces, slab by slab."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ...slabs.surface import Asked, surface_in_slabs
+from ...stage import Stage, folded, measured
+from ..contours import levels_of_rings, segment_by_contours
+from .voxels import told_of_slabs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ...isosurface.run_mask import RunMask
+    from ...model.volume import Volume
+    from ...progress import Progress
+    from ...segmentation.study import Selected
+    from ...settings import Settings
+    from ...slabs.cuts import Cuts
+    from ...slabs.keep import Slabs
+    from ...slabs.surface import SlabSurface
+
+
+def contours_in_slabs(
+    kept: Selected, settings: Settings, slabs: Slabs, cuts: Callable[[Volume, RunMask], Cuts], progress: Progress
+) -> Stage[SlabSurface]:
+    """Train a ring on every contour, and let a net around what they enclose come to rest where they pass.
+
+    As `tomomesh.ways.contours` does it in memory; how far the mesh is from its window is not measured.
+
+    Parameters
+    ----------
+    kept : Selected
+    settings : Settings
+    slabs : Slabs
+    cuts : callable
+        Told the levels around the rings and what lies inside, returns where these are cut.
+    progress : callable
+    """
+    threads, surface = settings.run.threads, "outer" if settings.cubes.surface == "outer" else "all"
+    found = segment_by_contours(kept, settings, progress)
+    levels = measured("contours", levels_of_rings, found.value, threads)
+    volume, inside = levels.value
+    asked = Asked(inside, volume.voxels, volume.affine, lower=0.0, surface=surface)
+    made = measured(
+        "fit", surface_in_slabs, asked, cuts(volume, inside), settings.fit, slabs, threads=threads, progress=progress
+    )
+    stats, warnings = told_of_slabs(made.value, kept, labels=False)
+    told = Stage(None, {name: keys for name, keys in stats.items() if name != "points"}, warnings)
+    return folded(made.value, found, levels, made, told)
