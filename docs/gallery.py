@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image
 
-from tomomesh import SOM, Volume, phantom, reconstruct_labels, window
+from tomomesh import SOM, TriMesh, Volume, phantom, reconstruct_labels, reconstruct_large, window
 from tomomesh.cli import main
 from tomomesh.measure.section import section
 from tomomesh.model.lattice import lattice
-from tomomesh.show.drawing.marks import lines
+from tomomesh.show.drawing.marks import fill, lines
 from tomomesh.show.drawing.page import Page, canvas
 from tomomesh.show.film import film_slice
 from tomomesh.show.plane import Plane
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 IMAGES = Path(__file__).parent / "images"
 BOX, PAGE = (900, 660), (1000, 1300)
@@ -44,6 +48,7 @@ def draw() -> None:
     (IMAGES / "06-film.gif").write_bytes(filmed())
     keep(overview(pictures), "phantom")
     keep(cut_labels().image().convert("RGB"), "shared-walls")
+    keep(slabs_of_a_solid().image().convert("RGB"), "slabs")
 
 
 def cut_labels() -> Page:
@@ -60,6 +65,35 @@ def cut_labels() -> Page:
         told = "both have the same line" if shared else "between neighbors are gaps and overlaps"
         ax.heading("With --shared-walls" if shared else "Each label by itself", f"three around a fourth, cut: {told}")
     return page
+
+
+def slabs_of_a_solid() -> Page:
+    """Cut a solid in slabs: the halo that the middle one sees, the rounds of its net, and the pieces of the mesh."""
+    volume, slab = Volume.from_stored((_solid(40) > 0).astype(np.uint8), np.eye(4)), 14
+    found = reconstruct_large(volume, slab=slab, select=(1,))
+    page, axes = canvas(10.0, 4.8, 1, 2)
+    for ax in axes:
+        ax.limit(-1.0, -1.0, 40.0, 40.0)
+    low, high = slab - 8.5, 2 * slab + 7.5
+    fill(axes[0], np.array([[(0, low), (39, low), (39, high), (0, high)]], float), color="#f3e3c3")
+    fill(axes[0], np.array([[(0, 13.5), (39, 13.5), (39, 27.5), (0, 27.5)]], float), color="#e5b769")
+    for ax in axes:
+        for cut in (13.5, 27.5):
+            lines(ax, np.array([[(0.0, cut), (39.0, cut)]]), color="#555555", width=1.0, dashed=True)
+    for patch, color in zip(found.mesh, PAINT, strict=False):
+        upright = TriMesh(patch.vertices[:, [0, 2, 1]], patch.faces[:, ::-1].astype(np.int64))
+        for ax in axes:
+            lines(ax, section(upright, 19.8), color=color if ax is axes[1] else "#222222", width=2.5)
+    axes[0].heading("A slab and its halo", "the middle slab looks at 8 layers of its neighbors")
+    axes[1].heading("Pieces of the mesh", "each slab has its own; they share the vertices of their seams")
+    return page
+
+
+def _solid(side: int) -> NDArray[np.float64]:
+    """Return levels over 0 in a solid with a bay."""
+    z, y, x = (axis - (side - 1) / 2 for axis in np.ogrid[:side, :side, :side])
+    bay = np.sqrt((x - 12) ** 2 + y**2 + (0.6 * z) ** 2) - 6
+    return np.asarray(np.minimum(17 - np.sqrt(x**2 + y**2 + z**2), bay))
 
 
 def filmed() -> bytes:

@@ -232,8 +232,7 @@ class TestUsage:
     @pytest.mark.parametrize(
         ("options", "code", "said"),
         [
-            (["--workers", "2"], 2, "--workers without --each"),
-            (["--scheduler", "tcp://127.0.0.1:1"], 2, "--scheduler without --each"),
+            (["--force"], 2, "--force without --each"),
             (["--each", "--workers", "0"], 2, "--workers 0"),
             (["--each", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], 2, "--workers and --scheduler"),
             (["--each", "--scheduler", "tcp://127.0.0.1:1"], 3, "no scheduler answers there. File: tcp://127.0.0.1:1"),

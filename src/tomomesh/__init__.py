@@ -24,6 +24,7 @@ _HOMES = {
     "read_volume": "io",
     "reconstruct": "pipeline",
     "reconstruct_labels": "label_surfaces",
+    "reconstruct_large": "large",
     "reconstruct_points": "pipeline",
     "segment": "pipeline",
     "window": "segmentation.window",
@@ -48,6 +49,7 @@ __all__ = [
     "read_volume",
     "reconstruct",
     "reconstruct_labels",
+    "reconstruct_large",
     "reconstruct_points",
     "segment",
     "window",
@@ -60,6 +62,7 @@ if TYPE_CHECKING:
     from .head_phantom import phantom
     from .io import read_mesh, read_points, read_volume, write_mesh
     from .label_surfaces import reconstruct_labels
+    from .large import reconstruct_large
     from .measure.fill import fill_mesh
     from .measure.report import assess
     from .memory.limit import memory_limit

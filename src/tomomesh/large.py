@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .begin import begun_on, settled
 from .errors import ResourceError
+from .memory.limit import disk_folder
 from .model.mesh import TriMesh
 from .pipeline import finished
 from .pointcloud.forecast import bytes_in_words, free_memory
@@ -40,9 +39,10 @@ if TYPE_CHECKING:
 
 BASE = 180e6
 """Bytes of Python, its packages, the kernels and Dask."""
-A_VOXEL = 6.0
-"""Bytes for each voxel of a slab and its halo, beside those of the file: read, masked, joined."""
-A_CELL = 400.0
+A_VOXEL = 4.0
+"""Bytes for each voxel of a slab and its halo, beside those of the file: read, masked, joined. Measured, as the next:
+2.5 of a ball of gray levels, and 215 to 250."""
+A_CELL = 300.0
 """Bytes for each vertex of a slab and its halo."""
 CELLS_A_RUN = 6.0
 """Vertices for each run of a mask: a run has two sides across its row, and faces are as many along other axes."""
@@ -149,7 +149,7 @@ def _checked(begun: Begun, made: Stage[SlabSurface], progress: Progress) -> Larg
 def _workers(client: Any, memory: float | None) -> tuple[Slabs, float]:
     """Return who works on slabs, and what memory each may take."""
     if client is None:
-        return OnDisk(Path(tempfile.gettempdir())), memory or free_memory()
+        return OnDisk(disk_folder()), memory or free_memory()
     limits = [one["memory_limit"] or math.inf for one in client.scheduler_info(n_workers=-1)["workers"].values()]
     return OnClient(client), memory or min(min(limits, default=math.inf), free_memory() / max(len(limits), 1))
 

@@ -97,7 +97,7 @@ def memory_limit(limit: str | float | None) -> Iterator[None]:
         raise UsageError("the memory can be limited on Linux only", found=sys.platform)
     if not COMPILED:
         raise UsageError("the memory can be limited with compiled kernels only", found="NUMBA_DISABLE_JIT")
-    folder = _disk()
+    folder = disk_folder()
     made = Arrays(folder, int(KEPT * max(most - _resident(), 0)))
     try:
         with _lying_in(made, most, folder):
@@ -108,7 +108,7 @@ def memory_limit(limit: str | float | None) -> Iterator[None]:
         raise _full(folder, made.fault) from None
 
 
-def free_disk() -> float | None:
+def freedisk_folder() -> float | None:
     """Return how many bytes more may lie on the disk, where the memory is limited here; else None."""
     folder = _folder.get()
     return None if folder is None else float(shutil.disk_usage(folder).free)
@@ -142,9 +142,11 @@ def _watched(made: Arrays, full: int) -> Iterator[None]:
         watcher.join()
 
 
-def _disk() -> Path:
+def disk_folder() -> Path:
     """Return the first of the folders for temporary files that is on a disk."""
     folders = [Path(tempfile.gettempdir()), Path("/var/tmp")]
+    if not sys.platform.startswith("linux"):
+        return folders[0]
     for folder in folders:
         if folder.is_dir() and os.access(folder, os.W_OK) and _kind(folder) not in IN_MEMORY:
             return folder
