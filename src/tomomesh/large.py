@@ -24,6 +24,7 @@ from .slabs.cuts import Cuts
 from .slabs.keep import OnDisk
 from .slabs.on_client import OnClient
 from .slabs.place import HALO
+from .stage import folded
 from .ways.in_slabs.contours import contours_in_slabs
 from .ways.in_slabs.voxels import checked_in_slabs, measured_in_slabs, mesh_in_slabs, require_slabs
 
@@ -131,7 +132,7 @@ def reconstruct_large(
         return _checked(begun, made, progress)
     found = contours_in_slabs(kept, begun.taken, slabs, cut, progress)
     surface, neurons = found.value
-    return replace(_checked(begun, replace(found, value=surface), progress), neurons=neurons)
+    return replace(_checked(begun, folded(surface, found), progress), neurons=neurons)
 
 
 def _cuts_of(volume: Volume, runs: RunMask, *, slab: int | None, most: float) -> Cuts:
