@@ -70,6 +70,11 @@ class Watched:
         """Of the numbers."""
         return self.array.dtype
 
+    @property
+    def chunks(self) -> tuple[int, ...]:
+        """Sizes of what is read together."""
+        return (1, *self.array.shape[1:])
+
     def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Return a part."""
         assert box[0].stop - box[0].start <= self.most, "more was read than is worked on"

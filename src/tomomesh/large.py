@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -23,18 +23,19 @@ from .slabs.cuts import Cuts
 from .slabs.keep import OnDisk
 from .slabs.on_client import OnClient
 from .slabs.place import HALO
+from .stage import folded
 from .ways.in_slabs.contours import contours_in_slabs
 from .ways.in_slabs.voxels import checked_in_slabs, measured_in_slabs, mesh_in_slabs, require_slabs
 
 if TYPE_CHECKING:
     from .begin import Begun
     from .isosurface.run_mask import RunMask
+    from .model.points import PointSet
     from .model.volume import Volume
     from .results import Surface
     from .settings import Settings
     from .slabs.keep import Slabs
     from .slabs.patches.patch import Patches
-    from .slabs.surface import SlabSurface
     from .stage import Stage
 
 BASE = 180e6
@@ -58,10 +59,13 @@ class LargeSurface(Reported):
         What `tomomesh.write_mesh` and `tomomesh.io.write_pieces` take as they take a mesh, in patient millimeters.
     volume : Volume
         The study, whose voxels stay in its file.
+    neurons : PointSet or None
+        Of rings, on the ways that have any.
     """
 
     mesh: Patches
     volume: Volume
+    neurons: PointSet | None = None
 
     def joined(self) -> TriMesh:
         """Return the whole mesh, where the memory holds it."""
@@ -125,9 +129,10 @@ def reconstruct_large(
     kept, cut = begun.kept, partial(_cuts_of, slab=slab, most=most)
     if begun.way.name == "voxels":
         made = mesh_in_slabs(kept, begun.taken, slabs, cut(kept.study, kept.chosen.runs), progress)
-    else:
-        made = contours_in_slabs(kept, begun.taken, slabs, cut, progress)
-    return _checked(begun, made, progress)
+        return _checked(begun, made, progress)
+    found = contours_in_slabs(kept, begun.taken, slabs, cut, progress)
+    surface, neurons = found.value
+    return replace(_checked(begun, folded(surface, found), progress), neurons=neurons)
 
 
 def _cuts_of(volume: Volume, runs: RunMask, *, slab: int | None, most: float) -> Cuts:
@@ -136,7 +141,7 @@ def _cuts_of(volume: Volume, runs: RunMask, *, slab: int | None, most: float) ->
     return Cuts(_cuts(volume.shape, slab=slab, most=most, itemsize=each, runs=runs))
 
 
-def _checked(begun: Begun, made: Stage[SlabSurface], progress: Progress) -> LargeSurface:
+def _checked(begun: Begun, made: Stage[Any], progress: Progress) -> LargeSurface:
     """Check a surface in pieces across its seams; it is measured once the report is read."""
     kept, study = begun.kept, begun.kept.study
     checked = checked_in_slabs(made.value, kept, progress)

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import io
 from ..errors import UsageError
 from ..memory.limit import bytes_of
@@ -89,6 +91,17 @@ def _client(chosen: Namespace) -> Iterator[Any]:
         yield found.client
 
 
+def _at_vertices(found: LargeSurface, output: str) -> dict[str, Any]:
+    """Return what the format keeps of the neurons, at the vertices: a ring, its side and its track."""
+    from ..pointcloud.attributes import carry
+
+    if found.neurons is None:
+        return {}
+    kept = {name: values for name, values in found.neurons.attributes.items() if io.keeps(output, name)}
+    parts = [carry(replace(found.neurons, attributes=kept), places) for places in found.mesh.vertices()]
+    return {name: np.concatenate([part[name] for part in parts]) for name in kept}
+
+
 def _write(chosen: Namespace, found: LargeSurface, settings: Settings, progress: Bars) -> LargeSurface:
     """Write the mesh in the frame that was asked for, and the documents; its report tells of both."""
     frame = io.frame_of_study(settings.run.frame, found.volume.grid)
@@ -96,7 +109,8 @@ def _write(chosen: Namespace, found: LargeSurface, settings: Settings, progress:
     progress("write", 0, 1)
     told: dict[str, Any] = dict(named)
     if chosen.pieces is None:
-        io.write_mesh(mesh, chosen.output, **named, precision=settings.run.precision)
+        fields = _at_vertices(found, chosen.output)
+        io.write_mesh(mesh, chosen.output, **named, vertex_fields=fields, precision=settings.run.precision)
     else:
         files = io.write_pieces(mesh, chosen.output, chosen.pieces, **named, precision=settings.run.precision)
         told["files"] = [file.name for file in files]

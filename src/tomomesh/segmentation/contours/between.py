@@ -107,6 +107,11 @@ class Between:
         """Depths have 32 bits."""
         return np.dtype(np.float32)
 
+    @property
+    def chunks(self) -> tuple[int, int, int]:
+        """Sizes of what is drawn together: all slices from one with rings to the next, whole."""
+        return self.times, *self.shape[1:]
+
     def read(self, box: tuple[slice, ...]) -> Depths:
         """Return the depths in a box; slices are drawn whole."""
         start, stop, by = box[0].indices(self.shape[0])

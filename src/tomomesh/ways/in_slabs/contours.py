@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ...isosurface.run_mask import RunMask
+    from ...model.points import PointSet
     from ...model.volume import Volume
     from ...progress import Progress
     from ...segmentation.study import Selected
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 def contours_in_slabs(
     kept: Selected, settings: Settings, slabs: Slabs, cuts: Callable[[Volume, RunMask], Cuts], progress: Progress
-) -> Stage[SlabSurface]:
+) -> Stage[tuple[SlabSurface, PointSet]]:
     """Train a ring on every contour, and let a net around what they enclose come to rest where they pass.
 
     As `tomomesh.ways.contours` does it in memory; how far the mesh is from its window is not measured.
@@ -37,6 +38,11 @@ def contours_in_slabs(
     cuts : callable
         Told the levels around the rings and what lies inside, returns where these are cut.
     progress : callable
+
+    Returns
+    -------
+    Stage
+        Of the surface, and of the neurons.
     """
     threads, surface = settings.run.threads, "outer" if settings.cubes.surface == "outer" else "all"
     found = segment_by_contours(kept, settings, progress)
@@ -48,4 +54,4 @@ def contours_in_slabs(
     )
     stats, warnings = told_of_slabs(made.value, kept, labels=False)
     told = Stage(None, {name: keys for name, keys in stats.items() if name != "points"}, warnings)
-    return folded(made.value, found, levels, made, told)
+    return folded((made.value, found.value.points), found, levels, made, told)
