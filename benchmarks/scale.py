@@ -147,7 +147,7 @@ def gyroid(shape: tuple[int, int, int], start: int) -> NDArray[Any]:
     """Return levels of some slices, over 0 on one side of a gyroid within an ellipsoid."""
     k, j, i = (axis * (2 * np.pi / WAVES) for axis in _axes(shape, start))
     waves = np.sin(i) * np.cos(j) + np.sin(j) * np.cos(k) + np.sin(k) * np.cos(i)
-    return 400 * np.minimum(waves, 20 * solid(shape, start) / 400)
+    return np.asarray(400 * np.minimum(waves, 20 * solid(shape, start) / 400))
 
 
 def solid(shape: tuple[int, int, int], start: int) -> NDArray[Any]:

@@ -55,7 +55,8 @@ class TestSame:
     @law(25)
     @given(seeds, st.integers(1, 30), st.sampled_from(["gray", "otsu", "labels", "outer", "color"]))
     def test_bytes_for_any_slabs(self, seed: int, slab: int, kind: str) -> None:
-        levels, asked = blobs(seed), {"way": "voxels", **MEMORY}
+        levels: Any = blobs(seed)
+        asked: dict[str, Any] = {"way": "voxels", **MEMORY}
         if kind == "labels":
             levels, asked = (levels > 30).astype(np.int16), asked | {"select": (1,)}
         elif kind == "color":

@@ -78,7 +78,7 @@ class TestArrays:
             assert len(maps()) > before
             del array
             assert len(maps()) == before
-        assert not [path for path in limit._disk().iterdir() if path.name.startswith("tomomesh")]
+        assert not [path for path in limit.disk_folder().iterdir() if path.name.startswith("tomomesh")]
 
     def test_of_large_ones_the_first_stay_in_memory(self) -> None:
         before = len(maps())
@@ -168,7 +168,7 @@ CHANGES: dict[str, Any] = {
 
 
 def test_pages_that_are_left_take_no_memory_until_they_are_read() -> None:
-    made = arrays.Arrays(limit._disk(), 0)
+    made = arrays.Arrays(limit.disk_folder(), 0)
     before = arrays.swapped(made.capsule)
     try:
         array = np.resize(np.arange(256, dtype=np.uint8), 64 * MIB)
@@ -206,7 +206,7 @@ class TestLimits:
         if limit._kind(Path("/dev/shm")) != "tmpfs":
             pytest.skip("/dev/shm is not in the memory here")
         monkeypatch.setattr(tempfile, "tempdir", "/dev/shm")
-        assert limit._kind(limit._disk()) not in limit.IN_MEMORY
+        assert limit._kind(limit.disk_folder()) not in limit.IN_MEMORY
         monkeypatch.setattr(limit, "_kind", lambda folder: "tmpfs")
         with pytest.raises(ResourceError, match="TMPDIR"), memory_limit("1GB"):
             pass
@@ -233,7 +233,7 @@ except TomomeshError as error:
         assert not done.stderr
 
     def test_other_faults_are_told_too(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-        monkeypatch.setattr(limit, "_disk", lambda: tmp_path / "none")
+        monkeypatch.setattr(limit, "disk_folder", lambda: tmp_path / "none")
         with pytest.raises(OutputError, match=r"no file can be made"), all_in_files():
             np.arange(1000)
 

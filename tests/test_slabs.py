@@ -143,7 +143,8 @@ class TestAnyCutsGiveTheSameBytes:
         gray = study.volume.voxels.astype(np.float32)
         rolled = np.random.default_rng(seed).permuted(gray, axis=1)
         volume, lower = volume_of(np.stack([gray, rolled, gray[:, ::-1]], axis=3)), np.array([0.0, -0.2, 0.1])
-        inside = (volume.voxels > lower).all(axis=3) if layers == "all" else (volume.voxels > lower).any(axis=3)
+        kept = volume.voxels > lower
+        inside = np.asarray(kept.all(axis=3) if layers == "all" else kept.any(axis=3), np.bool_)
         inside[0, 0, 0] |= not inside.any()
         colored = Study(volume, inside, lower, layers)
         assert_same(colored.in_slabs(cuts_of(data, len(inside)), InMemory()), colored)

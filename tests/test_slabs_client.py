@@ -37,7 +37,7 @@ class Row:
 
 
 def begin(number: int) -> Row:
-    return Row(number, np.arange(LONG) + float(number), (np.arange(number), "a"))
+    return Row(number, np.arange(LONG, dtype=np.float64) + number, (np.arange(number), "a"))
 
 
 def beside(own: Row, others: Sequence[Row]) -> Row:

@@ -48,7 +48,7 @@ def reconstruct_in_slabs(chosen: Namespace, settings: Settings, given: Mapping[s
     TomomeshError
     """
     _check(chosen, settings)
-    from ..large import reconstruct_large
+    from ..large import LargeSurface, reconstruct_large
 
     memory = None if chosen.memory is None else bytes_of(chosen.memory)
     with _client(chosen) as client, bars_of(chosen) as progress:
@@ -56,9 +56,9 @@ def reconstruct_in_slabs(chosen: Namespace, settings: Settings, given: Mapping[s
         found = reconstruct_large(
             volume, settings, labels=labels, client=client, memory=memory, slab=chosen.slab, progress=progress, **given
         )
-        if hasattr(found, "points"):  # of networks
-            return write_surface(chosen, found, settings, progress)
-        return _write(chosen, found, settings, progress)
+        if isinstance(found, LargeSurface):
+            return _write(chosen, found, settings, progress)
+        return write_surface(chosen, found, settings, progress)
 
 
 def _check(chosen: Namespace, settings: Settings) -> None:
@@ -105,17 +105,20 @@ def _at_vertices(found: LargeSurface, output: str) -> dict[str, Any]:
 def _write(chosen: Namespace, found: LargeSurface, settings: Settings, progress: Bars) -> LargeSurface:
     """Write the mesh in the frame that was asked for, and the documents; its report tells of both."""
     frame = io.frame_of_study(settings.run.frame, found.volume.grid)
-    mesh, named = found.mesh.carried(frame.matrix), {"unit": frame.unit, "frame": frame.name}
+    mesh, unit, name = found.mesh.carried(frame.matrix), frame.unit, frame.name
     progress("write", 0, 1)
-    told: dict[str, Any] = dict(named)
+    told: dict[str, Any] = {"unit": unit, "frame": name}
     if chosen.pieces is None:
         fields = _at_vertices(found, chosen.output)
-        io.write_mesh(mesh, chosen.output, **named, vertex_fields=fields, precision=settings.run.precision)
+        io.write_mesh(
+            mesh, chosen.output, unit=unit, frame=name, vertex_fields=fields, precision=settings.run.precision
+        )  # fmt: skip
     else:
-        files = io.write_pieces(mesh, chosen.output, chosen.pieces, **named, precision=settings.run.precision)
+        precision = settings.run.precision
+        files = io.write_pieces(mesh, chosen.output, chosen.pieces, unit=unit, frame=name, precision=precision)
         told["files"] = [file.name for file in files]
     if chosen.neuroglancer:
-        io.write_neuroglancer(mesh, chosen.neuroglancer, **named)
+        io.write_neuroglancer(mesh, chosen.neuroglancer, unit=unit, frame=name)
     progress("write", 1, 1)
     found = replace(found, stages=(*found.stages, Stage(None, {"written": told})))
     write_documents(chosen, found.report, settings)

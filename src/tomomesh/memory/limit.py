@@ -108,7 +108,7 @@ def memory_limit(limit: str | float | None) -> Iterator[None]:
         raise _full(folder, made.fault) from None
 
 
-def freedisk_folder() -> float | None:
+def free_disk() -> float | None:
     """Return how many bytes more may lie on the disk, where the memory is limited here; else None."""
     folder = _folder.get()
     return None if folder is None else float(shutil.disk_usage(folder).free)

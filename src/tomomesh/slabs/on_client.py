@@ -62,7 +62,7 @@ class OnClient:
             Where the scheduler is gone.
         """
         try:
-            return _values(self.client.gather(list(kept)))
+            return list(_values(self.client.gather(list(kept))))
         except TomomeshError:
             raise
         except Exception as fault:

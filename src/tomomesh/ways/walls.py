@@ -45,7 +45,7 @@ def segment_by_walls(kept: Selected, settings: Settings, progress: Progress) -> 
     spacing = max(kept.study.spacing_mm)
     sampling = Sampling(bounded.points, spacing, bounded.added, NOTHING, NOTHING)
     labels = kept.mask.view(np.uint8)
-    found = Segmentation(kept.study, kept.plane, kept.mask, labels, bounded.points, sampling, bounded)
+    found = Segmentation(kept.study, kept.plane, kept.chosen.runs, labels, bounded.points, sampling, bounded)
     return folded(found, points_found(bounded.points, spacing, bridged=bounded.added))
 
 

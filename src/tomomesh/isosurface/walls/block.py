@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...segmentation.labels import Labelled
+    from ..run_mask import RunMask
 
     Ints = NDArray[np.int32]
     Labels = NDArray[np.uint16]
@@ -87,7 +88,12 @@ class LabelBlock:
 
     @classmethod
     def of(
-        cls, found: Labelled, inside: NDArray[np.bool_] | None = None, *, divide: bool = False, threads: int = 0
+        cls,
+        found: Labelled,
+        inside: NDArray[np.bool_] | RunMask | None = None,
+        *,
+        divide: bool = False,
+        threads: int = 0,
     ) -> LabelBlock:
         """Take all labels of a map but 0, of the voxels that are inside; what is changed in it is a copy.
 
@@ -125,7 +131,7 @@ class LabelBlock:
 
 
 def _numbered(
-    found: Labelled, numbers: NDArray[np.int64], inside: NDArray[np.bool_] | None, margin: int
+    found: Labelled, numbers: NDArray[np.int64], inside: NDArray[np.bool_] | RunMask | None, margin: int
 ) -> tuple[Labels, NDArray[np.int64]]:
     """Return numbers for the labels in the box that holds them with a margin, and its first slice, row and column."""
     boxes = found.boxes[found.numbers != 0]

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from ...segmentation.labels import Labelled
     from ...settings import FitSettings
+    from ..run_mask import RunMask
     from ..settle import NetFit
     from .net import WallNet
 
@@ -134,7 +135,7 @@ class Walls:
 
 
 def walls_between(
-    labels: Labelled, settings: FitSettings, *, inside: Marks | None = None, divide: bool = False, threads: int = 0,
+    labels: Labelled, settings: FitSettings, *, inside: Marks | RunMask | None = None, divide: bool = False, threads: int = 0,
     progress: Progress = silent,
 ) -> Walls:  # fmt: skip
     """Let the walls between all labels of a map come to rest half way between their voxels.
@@ -144,7 +145,7 @@ def walls_between(
     labels : Labelled
     settings : FitSettings
         Stiffness, tolerance and most steps.
-    inside : (K, J, I) bool array, optional
+    inside : (K, J, I) bool array or RunMask, optional
         The voxels that may have a label.
     divide : bool
         Whether voxels of thick slices are divided first.
