@@ -25,8 +25,8 @@ from .thick import MARGIN, divided
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ...model.sliced import Sliced
     from ...segmentation.labels import Labelled
-    from ..run_mask import RunMask
 
     Ints = NDArray[np.int32]
     Labels = NDArray[np.uint16]
@@ -90,7 +90,7 @@ class LabelBlock:
     def of(
         cls,
         found: Labelled,
-        inside: NDArray[np.bool_] | RunMask | None = None,
+        inside: Sliced | None = None,
         *,
         divide: bool = False,
         threads: int = 0,
@@ -131,7 +131,7 @@ class LabelBlock:
 
 
 def _numbered(
-    found: Labelled, numbers: NDArray[np.int64], inside: NDArray[np.bool_] | RunMask | None, margin: int
+    found: Labelled, numbers: NDArray[np.int64], inside: Sliced | None, margin: int
 ) -> tuple[Labels, NDArray[np.int64]]:
     """Return numbers for the labels in the box that holds them with a margin, and its first slice, row and column."""
     boxes = found.boxes[found.numbers != 0]

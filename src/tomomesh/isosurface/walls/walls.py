@@ -22,9 +22,9 @@ from .net import net_between, places_between
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ...model.sliced import Sliced
     from ...segmentation.labels import Labelled
     from ...settings import FitSettings
-    from ..run_mask import RunMask
     from ..settle import NetFit
     from .net import WallNet
 
@@ -135,7 +135,7 @@ class Walls:
 
 
 def walls_between(
-    labels: Labelled, settings: FitSettings, *, inside: Marks | RunMask | None = None, divide: bool = False, threads: int = 0,
+    labels: Labelled, settings: FitSettings, *, inside: Sliced | None = None, divide: bool = False, threads: int = 0,
     progress: Progress = silent,
 ) -> Walls:  # fmt: skip
     """Let the walls between all labels of a map come to rest half way between their voxels.
