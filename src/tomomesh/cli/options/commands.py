@@ -85,7 +85,7 @@ def _surface(commands: Any) -> None:
     add_streams(stage_two, CLOUD_FORMATS, MESH_FORMATS, usual="xyz")
     stage_two.add_argument(
         "--memory", metavar="SIZE",
-        help="memory to take at most, as 4GB: arrays beyond it lie on the disk of TMPDIR (Linux; default: no limit)",
+        help="memory to take, about, as 4GB: arrays beyond it lie on the disk of TMPDIR (Linux; default: no limit)",
     )  # fmt: skip
     add_outputs(stage_two, "figures")
     add_settings(stage_two, ("cloud", *STAGE_TWO, "run"), without=STUDY_ONLY)
