@@ -244,7 +244,15 @@ class TestCommand:
     @pytest.mark.parametrize("name", SINGLE)
     def test_what_is_for_one_mesh_is_refused(self, tmp_path: Path, name: str, capsys: CaptureFixture[str]) -> None:
         option = f"--{name.replace('_', '-')}"
-        values = {"each": [], "workers": ["2"], "report": ["r.json"], "points": ["p.ply"]}.get(name, ["x.nii"])
+        values = {
+            "each": [],
+            "slab": ["2"],
+            "pieces": ["2"],
+            "memory": ["1GB"],
+            "workers": ["2"],
+            "report": ["r.json"],
+            "points": ["p.ply"],
+        }.get(name, ["x.nii"])
         assert each(written(tmp_path), option, *values) == 2
         assert option in capsys.readouterr().err
         assert not (tmp_path / "out").exists()

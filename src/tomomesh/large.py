@@ -116,6 +116,15 @@ def reconstruct_large(
     ------
     TomomeshError
         Of the kind that fits; see `tomomesh.errors`.
+
+    Examples
+    --------
+    >>> from tomomesh import phantom, reconstruct_large, write_mesh
+    >>> head = phantom((12, 32, 32), (7.5, 7.5, 12.0))
+    >>> found = reconstruct_large(head.volume, lower=head.lower, way="voxels", slab=5)
+    >>> write_mesh(found.mesh, "head.ply")
+    >>> found.report["quality"]["closed"], found.report["slabs"]["count"]
+    (True, 3)
     """
     settings = settled(settings, changes)
     slabs, most = _workers(client, memory)

@@ -33,8 +33,10 @@ if TYPE_CHECKING:
 TABLE = "reports.csv"
 USUAL = "stl"
 """Format of the meshes where none is asked for."""
-SINGLE = ("labels_in", "points", "labels", "mask_out", "figures", "report")
-"""Files of one study, which a batch has no place for."""
+OF_ONE = ("memory", "slab", "pieces", "neuroglancer")
+"""Options of one study that is worked on slab by slab."""
+SINGLE = ("labels_in", "points", "labels", "mask_out", "figures", "report", *OF_ONE)
+"""Options of one study, which a batch has no place for."""
 
 
 def reconstruct_each(chosen: Namespace, settings: Settings, work: Work) -> None:

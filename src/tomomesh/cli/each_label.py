@@ -16,7 +16,7 @@ from .. import io
 from ..errors import GeometryError, TomomeshError, UsageError
 from ..io.studies.naming import safe_name
 from .bars import bars_of
-from .batch import check_results, do_all, done, refuse_with
+from .batch import OF_ONE, check_results, do_all, done, refuse_with
 from .outputs.checks import check_archive
 from .outputs.write import write_surface
 from .records import COLUMNS, row_of_fault
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     Make = Callable[[int, Namespace, Settings], Surface]
 
 OPTION = "--each-label"
-SINGLE = ("each", "points", "labels", "mask_out", "figures", "report")
+SINGLE = ("each", "points", "labels", "mask_out", "figures", "report", *OF_ONE)
 """Options that have no place beside labels that are each a mesh."""
 
 

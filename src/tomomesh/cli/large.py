@@ -15,6 +15,7 @@ from ..memory.limit import bytes_of
 from ..settings import option_of
 from ..stage import Stage
 from .bars import bars_of
+from .batch import OF_ONE
 from .outputs.checks import check_folder, check_frame, check_outputs
 from .outputs.write import write_documents, write_surface
 from .sources import open_study, sources_of
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from .bars import Bars
 
-IN_SLABS = ("memory", "slab", "workers", "scheduler", "pieces", "neuroglancer")
+IN_SLABS = ("workers", "scheduler", *OF_ONE)
 """Options of one study by which it is worked on slab by slab."""
 WHOLE = ("points", "labels", "mask_out", "figures", "patient")
 """Results that need the study whole."""
