@@ -62,7 +62,10 @@ class TestSame:
         elif kind == "color":
             levels = np.stack([levels, np.roll(levels, 1, 0), levels], axis=3).clip(0, 255).astype(np.uint8)
         else:
-            asked |= {"gray": {"lower": 20}, "otsu": {}, "outer": {"lower": 20, "surface": "outer"}}[kind]
+            windows: dict[str, dict[str, Any]] = {
+                "gray": {"lower": 20}, "otsu": {}, "outer": {"lower": 20, "surface": "outer"},
+            }  # fmt: skip
+            asked |= windows[kind]
         study = Volume.from_stored(levels, np.diag([0.7, 0.8, 0.9, 1.0]))
         assert same(reconstruct_large(study, slab=slab, **asked), reconstruct(study, **asked))
 
