@@ -127,15 +127,15 @@ def reconstruct_large(
     (True, 3)
     """
     settings = settled(settings, changes)
-    slabs, most = _workers(client, memory)
-    cutting = Cutting(partial(_cuts, slab=slab, most=most, itemsize=volume.voxels.dtype.itemsize), slabs)
+    slabs, room = _workers(client, memory, slab)
+    cutting = Cutting(partial(_cuts, room=room, itemsize=volume.voxels.dtype.itemsize), slabs)
     progress("window", 0, 2)
     study = lay_out(volume, labels, settings, labelled=settings.window.select is not None, cutting=cutting)
     begun = begun_on(study, settings, changes, progress)
     if begun.way.name not in ("voxels", "contours"):
         return finished(begun, progress)
     require_slabs(begun.taken)
-    kept, cut = begun.kept, partial(_cuts_of, slab=slab, most=most)
+    kept, cut = begun.kept, partial(_cuts_of, room=room)
     if begun.way.name == "voxels":
         made = mesh_in_slabs(kept, begun.taken, slabs, cut(kept.study, kept.chosen.runs), progress)
         return _checked(begun, made, progress)
@@ -144,10 +144,30 @@ def reconstruct_large(
     return replace(_checked(begun, folded(surface, found), progress), neurons=neurons)
 
 
-def _cuts_of(volume: Volume, runs: RunMask, *, slab: int | None, most: float) -> Cuts:
-    """Cut a volume of which some voxels are kept."""
-    each = volume.layers * volume.voxels.dtype.itemsize
-    return Cuts(_cuts(volume.shape, slab=slab, most=most, itemsize=each, runs=runs))
+@dataclass(frozen=True)
+class _Room:
+    """How thick slabs may be.
+
+    Attributes
+    ----------
+    slab : int or None
+        So many slices, where that is asked for.
+    most : float
+        Bytes of each process.
+    workers : int
+        Which each want a slab at least.
+    """
+
+    slab: int | None
+    most: float
+    workers: int = 1
+
+
+def _cuts_of(volume: Volume, runs: RunMask, *, room: _Room) -> Cuts:
+    """Cut a volume of which some voxels are kept; where they are read, into whole chunks if one fits."""
+    each, parts = volume.layers * volume.voxels.dtype.itemsize, volume.in_parts
+    chunk = 1 if parts is None else parts.chunks[0]
+    return Cuts(_cuts(volume.shape, room=room, itemsize=each, runs=runs, chunk=chunk))
 
 
 def _checked(begun: Begun, made: Stage[Any], progress: Progress) -> LargeSurface:
@@ -160,36 +180,39 @@ def _checked(begun: Begun, made: Stage[Any], progress: Progress) -> LargeSurface
     return LargeSurface(patches, study, way=begun.way.name, settings=begun.settings, stages=stages)
 
 
-def _workers(client: Any, memory: float | None) -> tuple[Slabs, float]:
-    """Return who works on slabs, and what memory each may take."""
+def _workers(client: Any, memory: float | None, slab: int | None) -> tuple[Slabs, _Room]:
+    """Return who works on slabs, and how thick these may be."""
     if client is None:
-        return OnDisk(disk_folder()), memory or free_memory()
+        return OnDisk(disk_folder()), _Room(slab, memory or free_memory())
     limits = [one["memory_limit"] or math.inf for one in client.scheduler_info(n_workers=-1)["workers"].values()]
-    return OnClient(client), memory or min(min(limits, default=math.inf), free_memory() / max(len(limits), 1))
+    count = max(len(limits), 1)
+    most = memory or min(min(limits, default=math.inf), free_memory() / count)
+    return OnClient(client), _Room(slab, most, count)
 
 
 def _cuts(
-    shape: tuple[int, ...], *, slab: int | None, most: float, itemsize: int, runs: RunMask | None = None
+    shape: tuple[int, ...], *, room: _Room, itemsize: int, runs: RunMask | None = None, chunk: int = 1
 ) -> tuple[int, ...]:
-    """Cut a study into slabs of so many slices, or of as many as fit.
+    """Cut a study into slabs of so many slices, or of as many as fit and leave no worker without one.
 
     Raises
     ------
     ResourceError
         Where not even one slice does.
     """
-    if slab is not None:
-        return Cuts.every(shape[0], slab).places
+    if room.slab is not None:
+        return Cuts.every(shape[0], room.slab).places
     layer = math.prod(shape[1:3]) * (itemsize + A_VOXEL)
     layer += 0.0 if runs is None else A_CELL * CELLS_A_RUN * _most_runs(runs)
     halo = 0 if runs is None else 2 * HALO
-    fitting = int((most - BASE) / max(layer, 1.0)) - halo
+    fitting = int((room.most - BASE) / max(layer, 1.0)) - halo if room.most < math.inf else shape[0]
     if fitting < 1:
         raise ResourceError(
-            "the memory does not hold a slab of one slice", found=bytes_in_words(most),
+            "the memory does not hold a slab of one slice", found=bytes_in_words(room.most),
             expected=f"at least {bytes_in_words(BASE + (1 + halo) * layer)}",
         )  # fmt: skip
-    return Cuts.every(shape[0], min(fitting, shape[0])).places
+    thick = min(fitting, -(-shape[0] // room.workers))
+    return Cuts.every(shape[0], thick - thick % min(chunk, thick)).places
 
 
 def _most_runs(runs: RunMask) -> float:
