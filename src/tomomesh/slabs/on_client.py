@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,7 +46,9 @@ class OnClient:
         """
         rows = [list(entries) for entries in zip(*columns, strict=True)]
         try:
-            return [self.client.submit(_done, work, row, self._beside, pure=False) for row in rows]
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of masks that are sent along, each to one worker
+                return [self.client.submit(_done, work, row, self._beside, pure=False) for row in rows]
         except Exception as fault:
             raise _explained(fault) from None
 
