@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tomomesh.errors import FormatError, ResourceError, TomomeshError
-from tomomesh.slabs.keep import LARGE, InMemory, OnDisk
+from tomomesh.slabs.keep import LARGE, InMemory, OnDisk, mapped
 from tomomesh.slabs.on_client import OnClient
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class TestSameValues:
 
     def test_a_value_on_disk_goes_to_others_whole(self, tmp_path: Path) -> None:
         (kept,) = OnDisk(tmp_path).each(begin, [2])
-        sent = pickle.loads(pickle.dumps(kept))
+        sent = mapped(pickle.loads(pickle.dumps(kept)))
         assert told(sent) == told(begin(2))
 
 

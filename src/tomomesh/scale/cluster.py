@@ -214,6 +214,7 @@ def _configured(threads: int, folder: Path) -> Iterator[None]:
     settings = {
         "temporary-directory": str(folder),
         "distributed.scheduler.allowed-failures": AGAIN,
+        "distributed.scheduler.work-stealing": False,  # slabs stay where their neighbors' strips go to
         "distributed.scheduler.worker-saturation": 1.0,  # no task waits on a worker, and dies with it
         "distributed.scheduler.http.routes": [],
         "distributed.worker.http.routes": [],

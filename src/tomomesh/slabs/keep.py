@@ -5,6 +5,7 @@ from __future__ import annotations
 import mmap
 import tempfile
 from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -13,7 +14,6 @@ from ..errors import NO_ROOM, OutputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
 Kept = Any
 """What stands for a value that was made of a slab: handed in again, or fetched; nothing else is done with it."""
@@ -100,7 +100,7 @@ class _Far:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Let other processes have the array itself."""
-        return _itself, (self.mapped(),)
+        return _received, (self.mapped(),)
 
     def mapped(self) -> np.ndarray[Any, Any]:
         """Return it as memory that is its own: what is written there is never in the file."""
@@ -146,8 +146,9 @@ class File:
         return found
 
 
-def _itself(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    return array
+def _received(array: np.ndarray[Any, Any]) -> Any:
+    """Keep an array that another process sends on the disk here too."""
+    return File(Path(tempfile.gettempdir())).put(array)
 
 
 def put_away(value: Any, file: File) -> Any:
