@@ -117,6 +117,11 @@ class SlabSurface:
     stepped: bool
     trace: Trace
 
+    @property
+    def squares(self) -> int:
+        """Faces between voxels, each of two halves."""
+        return int(self.mesh.counts[:, 2].sum()) // 2
+
 
 def surface_in_slabs(
     asked: Asked, cuts: Cuts, settings: FitSettings, slabs: Slabs, *, threads: int = 1, progress: Progress = silent

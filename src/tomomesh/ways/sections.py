@@ -9,7 +9,7 @@ import numpy as np
 from ..model.points import BRIDGE, CAP, NEURON
 from ..model.sliced import areas_of
 from ..results import Enclosed
-from ..stage import Stage
+from ..stage import Stage, folded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -169,8 +169,8 @@ def boundary_found(found: Boundary, surface: VoxelSurface, *, labels: bool = Fal
 
     Gray levels that are a mask's are warned of, for there was more to know.
     """
-    trace, stepped = surface.net_fit.trace, found.crossings.stepped
-    steps = len(trace.speed)
+    stepped = found.crossings.stepped
+    rest = net_found(surface.net_fit.trace, of_mask=stepped and found.parts == 1 and not labels)
     stats: dict[str, dict[str, Any]] = {
         "voxels": {
             "added_for_composition": found.added,
@@ -186,16 +186,22 @@ def boundary_found(found: Boundary, surface: VoxelSurface, *, labels: bool = Fal
             "square_faces": len(found.net.quads),
             "enclosed_cubes": int(found.volumes.sum()),
         },
-        "fit": {"iterations": steps, "converged": trace.converged, "collapsed": 0},
     }
+    return folded(None, Stage(None, stats), rest)
+
+
+def net_found(trace: Trace, *, of_mask: bool) -> Stage[None]:
+    """Tell how a net came to rest, and of gray levels that are a mask's."""
+    steps = len(trace.speed)
+    fit: dict[str, Any] = {"iterations": steps, "converged": trace.converged, "collapsed": 0}
     if steps:
-        stats["fit"] |= {"speed": float(trace.speed[-1]), "acceleration": float(trace.acceleration[-1])}
+        fit |= {"speed": float(trace.speed[-1]), "acceleration": float(trace.acceleration[-1])}
     warnings: tuple[str, ...] = ()
-    if stepped and found.parts == 1 and not labels:
+    if of_mask:
         warnings = ("the gray levels are those of a mask: the surface is evened out between the voxels",)
     elif steps and not trace.converged:
         warnings = (f"the mesh had not come to rest after {steps} steps",)
-    return Stage(None, stats, warnings)
+    return Stage(None, {"fit": fit}, warnings)
 
 
 def unit_in_words(report: dict[str, Any]) -> str:

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, TypeVar
 from ...errors import FormatError, ResourceError, TomomeshError, UnreadableError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
 Reader = TypeVar("Reader")
+Read = TypeVar("Read")
 
 
 def suffix_of(path: str | Path) -> str:
@@ -90,11 +91,7 @@ def whole(path: str | Path) -> bytes:
     UnreadableError, FormatError
         As `existing_file`.
     """
-    path = existing_file(path)
-    try:
-        return path.read_bytes()
-    except OSError as fault:
-        raise UnreadableError("the file cannot be read", file=str(path), found=_reason(fault)) from None
+    return _read(path, Path.read_bytes)
 
 
 def stored(path: str | Path) -> memoryview:
@@ -107,9 +104,13 @@ def stored(path: str | Path) -> memoryview:
     """
     import numpy as np
 
+    return _read(path, lambda path: np.fromfile(path, np.uint8).data)
+
+
+def _read(path: str | Path, read: Callable[[Path], Read]) -> Read:
     path = existing_file(path)
     try:
-        return np.fromfile(path, np.uint8).data
+        return read(path)
     except OSError as fault:
         raise UnreadableError("the file cannot be read", file=str(path), found=_reason(fault)) from None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...slabs.surface import Asked, surface_in_slabs
-from ...stage import Stage, folded, measured
+from ...stage import folded, measured
 from ..contours import levels_of_rings, segment_by_contours
 from .voxels import told_of_slabs
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ...slabs.cuts import Cuts
     from ...slabs.keep import Slabs
     from ...slabs.surface import SlabSurface
+    from ...stage import Stage
 
 
 def contours_in_slabs(
@@ -52,6 +53,5 @@ def contours_in_slabs(
     made = measured(
         "fit", surface_in_slabs, asked, cuts(volume, inside), settings.fit, slabs, threads=threads, progress=progress
     )
-    stats, warnings = told_of_slabs(made.value, kept, labels=False)
-    told = Stage(None, {name: keys for name, keys in stats.items() if name != "points"}, warnings)
+    told = told_of_slabs(made.value, labels=False)
     return folded((made.value, found.value.points), found, levels, made, told)

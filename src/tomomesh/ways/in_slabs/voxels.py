@@ -13,7 +13,8 @@ from ...slabs.patches.patch import patches_of
 from ...slabs.patches.promise import check_patches
 from ...slabs.patches.report import assess_patches
 from ...slabs.surface import Asked, surface_in_slabs
-from ...stage import Stage, timed
+from ...stage import Stage, folded, timed
+from ..sections import net_found
 
 if TYPE_CHECKING:
     from ...progress import Progress
@@ -56,7 +57,9 @@ def mesh_in_slabs(
     """
     asked = _asked(kept.chosen, settings)
     made = surface_in_slabs(asked, cuts, settings.fit, slabs, threads=settings.run.threads, progress=progress)
-    return Stage(made, *told_of_slabs(made, kept, labels=settings.window.select is not None))
+    points = {"unit": "mm", "count": made.squares, "spacing_mm": max(kept.study.spacing_mm)}
+    told = told_of_slabs(made, labels=settings.window.select is not None)
+    return folded(made, Stage(None, {"points": points}), told)
 
 
 def _asked(chosen: Chosen, settings: Settings) -> Asked:
@@ -71,29 +74,19 @@ def _asked(chosen: Chosen, settings: Settings) -> Asked:
     )  # fmt: skip
 
 
-def told_of_slabs(
-    made: SlabSurface, kept: Selected, *, labels: bool
-) -> tuple[dict[str, dict[str, Any]], tuple[str, ...]]:
+def told_of_slabs(made: SlabSurface, *, labels: bool) -> Stage[None]:
     """Tell of the voxels, and how the net came to rest, as `tomomesh.ways.sections.boundary_found` does."""
-    steps, counts = len(made.trace.speed), made.mesh.counts.sum(axis=0)
-    squares = int(counts[2]) // 2
-    points = {"unit": "mm", "count": squares, "spacing_mm": max(kept.study.spacing_mm)}
-    voxels = {
-        "added_for_composition": made.added,
-        "interpolated": not made.stepped,
-        "divided_into": 1,
-        "split_in_four": int(counts[1]),
+    stats: dict[str, dict[str, Any]] = {
+        "voxels": {
+            "added_for_composition": made.added,
+            "interpolated": not made.stepped,
+            "divided_into": 1,
+            "split_in_four": int(made.mesh.counts[:, 1].sum()),
+        },
+        "surface": {"square_faces": made.squares},
+        "slabs": {"count": len(made.mesh.pieces)},
     }
-    fit: dict[str, Any] = {"iterations": steps, "converged": made.trace.converged, "collapsed": 0}
-    if steps:
-        fit |= {"speed": float(made.trace.speed[-1]), "acceleration": float(made.trace.acceleration[-1])}
-    warnings: tuple[str, ...] = ()
-    if made.stepped and not labels:
-        warnings = ("the gray levels are those of a mask: the surface is evened out between the voxels",)
-    elif steps and not made.trace.converged:
-        warnings = (f"the mesh had not come to rest after {steps} steps",)
-    surface, slabs = {"square_faces": squares}, {"count": len(made.mesh.pieces)}
-    return {"points": points, "voxels": voxels, "surface": surface, "fit": fit, "slabs": slabs}, warnings
+    return folded(None, Stage(None, stats), net_found(made.trace, of_mask=made.stepped and not labels))
 
 
 @timed("quality")
