@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    from .sliced import SlicedMask
+    from .sliced import Sliced
 
     Box = tuple[slice, slice, slice]
 
 
-def box_of(mask: NDArray[np.bool_] | SlicedMask, around: Box | None = None) -> Box:
+def box_of(mask: Sliced, around: Box | None = None) -> Box:
     """Return the box (K, J, I) of what is true in a mask; empty where nothing is.
 
     Parameters
@@ -29,7 +29,7 @@ def box_of(mask: NDArray[np.bool_] | SlicedMask, around: Box | None = None) -> B
     (slice(0, 1, None), slice(0, 1, None), slice(1, 3, None))
     """
     if not isinstance(mask, np.ndarray):
-        return mask.box
+        return mask.box  # type: ignore[attr-defined, no-any-return]
     if around is not None:
         return within(around, box_of(mask[around]))
     plane = np.asarray(mask.any(axis=0))

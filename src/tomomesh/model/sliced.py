@@ -12,8 +12,6 @@ from .lazy import in_memory
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .boxes import Box
-
 SOME, TOGETHER = 64, 2**24
 """Slices that are drawn or read together at most, and voxels: 64 MiB of 32-bit depths. Only memory and time depend on
 them: a file's chunks are often 64 slices thick, and half as many together have each of them read twice."""
@@ -42,17 +40,6 @@ def together(sliced: Sized) -> int:
     return max(min(SOME, TOGETHER // max(math.prod(sliced.shape[1:3]), 1)), 1)
 
 
-class SlicedMask(Sliced, Protocol):
-    """A mask in slices that knows what it holds, as a `RunMask` does."""
-
-    @property
-    def box(self) -> Box:
-        """The box of what is true in it."""
-
-    def areas(self) -> NDArray[np.int64]:
-        """Count its voxels on each slice, (K,)."""
-
-
 def ranges(start: int, stop: int, step: int) -> list[tuple[int, int]]:
     """Part slices into ranges.
 
@@ -79,8 +66,8 @@ def some_of(sliced: Sliced, start: int, stop: int) -> NDArray[Any]:
     return in_memory(sliced[start:stop])
 
 
-def areas_of(mask: NDArray[np.bool_] | SlicedMask) -> NDArray[np.int64]:
+def areas_of(mask: Sliced) -> NDArray[np.int64]:
     """Count the voxels of a mask on each slice, (K,)."""
     if not isinstance(mask, np.ndarray):
-        return mask.areas()
+        return np.asarray(mask.areas())  # type: ignore[attr-defined]
     return np.array([np.count_nonzero(plane) for plane in mask], np.int64)

@@ -222,7 +222,7 @@ def _of_planes(find: Callable[[NDArray[np.bool_]], int | tuple[int, int]], mask:
     found: list[int | tuple[int, int]] = []
     for start, stop in parts_of(mask):
         some = some_of(mask, start, stop)
-        found += in_order(lambda k, some=some: find(some[k]), stop - start, block=8, threads=threads)
+        found += in_order(lambda k: find(some[k]), stop - start, block=8, threads=threads)  # noqa: B023
     return np.array(found)
 
 
