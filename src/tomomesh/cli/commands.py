@@ -250,6 +250,12 @@ def _print(chosen: Namespace) -> None:
     _tell(chosen, report, summary.of_part(report["print"], chosen.output))
 
 
+def _view(chosen: Namespace) -> None:
+    from .view import view
+
+    view(chosen, settings_of(chosen), given_of(chosen))
+
+
 _COMMANDS = {
     "demo": _demo,
     "reconstruct": _reconstruct,
@@ -259,6 +265,7 @@ _COMMANDS = {
     "inspect": _inspect,
     "check": _check,
     "print": _print,
+    "view": _view,
 }
 
 

@@ -21,6 +21,7 @@ from .printing import PrintSettings
 from .read import ReadSettings
 from .run import RunSettings
 from .schema import object_of, schema_of
+from .spelled import differing, spelled
 from .window import WindowSettings
 
 __all__ = [
@@ -128,6 +129,18 @@ class Settings:
         if values:
             raise UsageError("there is no such parameter", found=", ".join(values), expected="a field of Settings")
         return Settings(**groups)
+
+    def words(self) -> list[str]:
+        """Return the options of a command line by which these settings differ from the defaults.
+
+        Examples
+        --------
+        >>> Settings().replace(lower=200.0, remesh=False).words()
+        ['--lower', '200', '--no-remesh']
+        """
+        values = {name: value for group in fields(self) for name, value in vars(getattr(self, group.name)).items()}
+        entries = {entry.name: entry for _, entry in parameters()}
+        return [word for entry, value in differing(entries, values) for word in spelled(entry, value)]
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
         """Return sections of values, those not set left out, as a TOML file holds them."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ...settings import Settings, option_of, parameters
+from ...settings import Settings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -35,9 +35,9 @@ def next_step(
     series : sequence of Series
         Those to choose from.
     """
-    given = list(_given(settings))
+    given = settings.words()
     if fault is None:
-        first = list(_given(Settings().replace(**first_try(found))))
+        first = Settings().replace(**first_try(found)).words()
         named = f"--labels-in {study}" if found["labels"] else study
         return " ".join(["tomomesh reconstruct", named, *first, *given, "-o mesh.stl"])
     if SELECT in fault.flags:
@@ -54,18 +54,6 @@ def first_try(found: dict[str, Any]) -> dict[str, Any]:
         return {"select": (int(max(labels, key=lambda label: labels[label])),)}
     bone = found["windows"].get("bone", {"share": 0})
     return {"preset": "bone"} if bone["share"] else {}
-
-
-def _given(settings: Settings) -> Iterator[str]:
-    """Yield the options that differ from their defaults."""
-    sections, defaults = settings.to_dict(), Settings().to_dict()
-    for section, entry in parameters():
-        value = sections[section].get(entry.name)
-        if value not in (None, defaults[section].get(entry.name)):
-            values = value if isinstance(value, list) else [] if value is True else [value]
-            yield " ".join(
-                [option_of(entry.name), *(f"{one:.10g}" if isinstance(one, float) else f"{one}" for one in values)]
-            )
 
 
 def _helping(fault: TomomeshError, series: Sequence[Series]) -> Iterator[str]:

@@ -42,7 +42,7 @@ SURFACE_ONLY = (
 
 def add_commands(commands: Any) -> None:
     """Add all commands, in the order in which the help lists them."""
-    for add in (_demo, _reconstruct, _segment, _surface, _network, _inspect, _check, _print, _completion, _man):
+    for add in (_demo, _reconstruct, _segment, _surface, _network, _inspect, _check, _print, _view, _completion, _man):
         add(commands)
 
 
@@ -148,6 +148,18 @@ def _print(commands: Any) -> None:
         part, ("printing", "run"), without=("seed", "print_check", *MESH_ONLY, *STUDY_ONLY),
         paper=False,
     )  # fmt: skip
+
+
+def _view(commands: Any) -> None:
+    view = _command(commands, "view", "a study, points or a mesh in the browser: windows, networks, surface")
+    view.add_argument("looked_at", metavar="STUDY|POINTS|MESH", nargs="?", help=f"{STUDY}; or {CLOUD}; or {CHECKED}")
+    view.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
+    view.add_argument("--port", type=int, default=0, metavar="N", help="where to listen (default: a free port)")
+    view.add_argument(
+        "--host", default="127.0.0.1", metavar="NAME", help="listen for other machines too; see docs/view.md"
+    )
+    view.add_argument("--i-know", metavar="WORDS", help="the words that --host asks for")
+    add_settings(view, (*STAGE_ONE, "cloud", *STAGE_TWO, "run"))
 
 
 def _completion(commands: Any) -> None:

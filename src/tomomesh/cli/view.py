@@ -1,0 +1,43 @@
+"""``tomomesh view``: the page in a browser."""
+
+from __future__ import annotations
+
+import sys
+import webbrowser
+from typing import TYPE_CHECKING
+
+from ..errors import UsageError
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from typing import Any
+
+    from ..settings import Settings
+
+ANYWHERE = "anybody-who-has-the-address-may-see-it"
+"""What ``--i-know`` wants to be told, for other hosts than this machine."""
+LOCAL = ("127.0.0.1", "localhost")
+
+
+def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
+    """Serve the page until Ctrl-C."""
+    if chosen.host not in LOCAL and chosen.i_know != ANYWHERE:
+        raise UsageError(
+            "whoever reaches this host and has the address sees the study", found=f"--host {chosen.host}",
+            expected=f"--i-know {ANYWHERE}, and TLS in front (docs/view.md)",
+        )  # fmt: skip
+    from ..view import require_view
+
+    require_view()
+    from ..view.opened import Opened, kind_of
+    from ..view.server import serve
+    from ..view.session import Session
+
+    opened = Opened() if chosen.looked_at is None else Opened(kind_of(chosen.looked_at), (chosen.looked_at,))
+
+    def started(address: str) -> None:
+        print(f"open {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
+        if not chosen.no_browser:
+            webbrowser.open(address)
+
+    serve(Session(opened, given), started, host="127.0.0.1" if chosen.host in LOCAL else chosen.host, port=chosen.port)

@@ -1,0 +1,10 @@
+/** Networks: not there yet. */
+export const title = "Networks";
+export const keys = [];
+export const applies = (kind) => kind === "study";
+
+/** @param {HTMLElement} panel */
+export function mount(panel) {
+  panel.textContent = "";
+  return { show() {}, hide() {}, key: () => false };
+}
