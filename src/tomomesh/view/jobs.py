@@ -108,15 +108,16 @@ class Jobs:
         self._tell({"job": job.number, "name": job.name, **told})
 
     def _progress(self, job: Job) -> Progress:
-        said = [0.0, ""]
+        said = 0.0
 
         def progress(stage: str, done: int, total: int) -> None:
+            nonlocal said
             if job.stopping.is_set():
                 raise Stopped
+            new, now = stage != job.stage, time.monotonic()
             job.stage, job.done, job.total = stage, done, total
-            now = time.monotonic()
-            if stage != said[1] or done == total or now - float(said[0]) > OFTEN:
-                said[:] = [now, stage]
+            if new or done == total or now - said > OFTEN:
+                said = now
                 self._tell({"event": "progress", **job.told})
 
         return progress

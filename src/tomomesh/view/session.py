@@ -10,10 +10,11 @@ from ..errors import UsageError
 from ..settings import Settings
 from .events import Events
 from .jobs import Jobs
-from .opened import Opened
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from .opened import Opened
 
 MOST = 200
 """Choices that can be taken back."""
