@@ -10,7 +10,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from ..settings import Settings
-from . import events
+from . import events, surfaces
 from .routes import get, post
 
 if TYPE_CHECKING:
@@ -23,6 +23,8 @@ TYPES = {
     ".svg": "image/svg+xml",
 }  # fmt: skip
 """What the page's files are, by their suffix; no other is handed out."""
+FOLDERS = ("view/page", "html/assets")
+"""Where they are: the page's own, and what it shares with the report in one file."""
 
 
 def application(session: Session) -> Starlette:
@@ -35,6 +37,7 @@ def application(session: Session) -> Starlette:
         post("/api/redo", lambda session, body: session.redo()),
         post("/api/cancel", _cancel),
         *events.ROUTES,
+        *surfaces.ROUTES,
         Route("/", _page),
         Route("/{name}", _page),
     ]
@@ -49,10 +52,10 @@ def _cancel(session: Session, body: Any) -> dict[str, Any]:
 
 
 async def _page(request: Request) -> Response:
-    """Hand out one of the page's own files: those of one folder, by their bare names."""
+    """Hand out one of the page's own files, by its bare name."""
     name = request.path_params.get("name", "index.html")
     kind = TYPES.get(name[name.rfind(".") :])
-    file = files(__package__) / "page" / name
-    if kind is None or "/" in name or "\\" in name or not file.is_file():
+    found = [file for folder in FOLDERS if (file := files("tomomesh") / folder / name).is_file()]
+    if kind is None or "/" in name or "\\" in name or not found:
         return Response("there is no such page\n", 404, media_type="text/plain")
-    return Response(file.read_bytes(), media_type=kind)
+    return Response(found[0].read_bytes(), media_type=kind)

@@ -49,7 +49,9 @@ def serve(session: Session, started: Callable[[str], None], *, host: str = HERE,
     bound = listening.getsockname()[1]
     names = {host, "localhost"} if host == HERE else {host}
     doors = Doors(application(session), {f"{name}:{bound}" for name in names})
-    config = uvicorn.Config(doors, log_level="critical", access_log=False, ws_max_size=1 << 16, lifespan="off")
+    config = uvicorn.Config(
+        doors, log_level="critical", access_log=False, ws_max_size=1 << 16, lifespan="off", timeout_graceful_shutdown=1
+    )
 
     def begun() -> None:
         started(f"http://{host}:{bound}/?token={doors.token}")

@@ -63,7 +63,7 @@ function hideWork() {
 
 function say(line, kind) {
   const closed = el("button", { type: "button", "aria-label": "Close", onclick: () => note.remove() }, "×");
-  const note = el("p", { class: `note ${kind}` }, line, closed);
+  const note = el("p", { class: `toast ${kind}` }, line, closed);
   byId("said").append(note);
   if (kind !== "fault") setTimeout(() => note.remove(), 6000);
   while (byId("said").children.length > 4) byId("said").firstElementChild.remove();

@@ -4,6 +4,7 @@ import { get, post } from "./api.js";
 /** @type {any} */
 export let state = null;
 const listeners = new Map();
+const ENDS = ["done", "failed", "stopped"];
 
 /**
  * Be told of events: "state", "progress", "done", "failed", "stopped", "epoch", "fault", "away", "back".
@@ -73,6 +74,7 @@ function listen(wait) {
     const told = JSON.parse(message.data);
     if (told.event === "state") take(told.state);
     else tell(told.event, told);
+    if (ENDS.includes(told.event) && state) take({ ...state, job: null });
   };
   socket.onclose = () => {
     tell("away");

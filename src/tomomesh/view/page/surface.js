@@ -1,10 +1,178 @@
-/** Surface: not there yet. */
+/** The surface: from points to mesh in steps, in 3-D, cut where a slice lies, and what was measured of it. */
+import { get, numbers, post } from "./api.js";
+import { el, fill, eachFrame } from "./dom.js";
+import { on, state, trying } from "./store.js";
+import { problemList, reportTable } from "./report.js";
+import { sliceWithOutline } from "./outline.js";
+
 export const title = "Surface";
-export const keys = [];
-export const applies = (kind) => kind === "study";
+export const keys = [
+  ["M", "make the surface"], ["[ and ]", "the step before, and after"], ["W, F", "edges; all of it (in the 3-D view)"],
+  ["C", "cut at the slice"],
+];
+export const applies = (kind) => kind !== "nothing";
+
+const NAMES = { points: "Points", cuberille: "Cuberille", triangulated: "Triangulated", smoothed: "Smoothed", fitted: "Fitted" };
+const COLORS = { "": "none", distance: "distance to the points", thickness: "thickness", filled: "filled, not measured" };
+const AXES = { axial: [2, "S", "I"], coronal: [1, "P", "A"], sagittal: [0, "L", "R"] };
 
 /** @param {HTMLElement} panel */
 export function mount(panel) {
-  panel.textContent = "";
-  return { show() {}, hide() {}, key: () => false };
+  const part = new SurfacePart(panel);
+  return { show: () => part.show(), hide: () => {}, key: (event) => part.key(event) };
+}
+
+class SurfacePart {
+  constructor(panel) {
+    this.stages = [];
+    this.made = 0;
+    this.viewer = null;
+    this.build(panel);
+    on("state", () => this.update());
+    on("done", ({ name }) => { if (name === "reconstruct") this.load(); });
+    on("theme", () => this.viewer?.setDark(isDark()));
+    this.cut = eachFrame(() => this.cutNow());
+  }
+
+  build(panel) {
+    panel.classList.add("surface");
+    this.make = el("button", { type: "button", class: "first", onclick: () => this.begin() }, "Make the surface");
+    this.hint = el("p", { class: "muted" });
+    this.step = el("input", { type: "range", min: 0, max: 0, step: 1, "aria-label": "Step", oninput: () => this.showStage() });
+    this.steps = el("div", { class: "steps", "aria-hidden": "true" });
+    this.color = el("select", { onchange: () => this.showStage() }, ...Object.entries(COLORS).map(([name, text]) => el("option", { value: name }, text)));
+    this.wire = el("input", { type: "checkbox", onchange: () => this.viewer?.setWire(this.wire.checked) });
+    this.plane = el("select", { onchange: () => this.cut() }, ...Object.keys(AXES).map((name) => el("option", { value: name }, name)));
+    this.slice = el("input", { type: "range", min: 0, max: 0, step: 1, "aria-label": "Slice of the cut", oninput: () => this.cut() });
+    this.cuts = el("input", { type: "checkbox", onchange: () => this.cut() });
+    this.beside = sliceWithOutline();
+    this.told = el("div", { class: "told" });
+    this.view = el("div", { class: "view" });
+    this.empty = el("p", { class: "empty" }, "No surface yet.");
+    const looks = el("div", { class: "row" }, el("label", {}, "Color ", this.color), el("label", {}, this.wire, " edges"));
+    this.cutting = el("fieldset", {}, el("legend", {}, "Cut"), el("div", { class: "row" }, el("label", {}, this.cuts, " cut at the slice"), this.plane), this.slice, this.beside.element);
+    const side = el("div", { class: "side" }, this.make, this.hint, el("fieldset", {}, el("legend", {}, "Step"), this.step, this.steps), looks, this.cutting, this.told);
+    fill(panel, el("div", { class: "stage" }, this.view, this.empty), side);
+  }
+
+  show() {
+    this.viewer?.redraw();
+    this.update();
+    if (!this.stages.length) this.load();
+  }
+
+  key(event) {
+    const name = event.key.toLowerCase();
+    if (name === "m" && !this.make.hidden && !this.make.disabled) this.begin();
+    else if (name === "[" || name === "]") {
+      this.step.value = Number(this.step.value) + (name === "]" ? 1 : -1);
+      this.showStage();
+    } else if (name === "c" && !this.cutting.hidden) {
+      this.cuts.checked = !this.cuts.checked;
+      this.cut();
+    } else return false;
+    return true;
+  }
+
+  begin() {
+    trying(post("/api/reconstruct"));
+  }
+
+  update() {
+    const { opened, made, job } = state;
+    this.make.hidden = opened.kind === "mesh";
+    this.make.disabled = Boolean(job) || !opened.ready;
+    this.make.textContent = "reconstruct" in made ? "Make it again" : "Make the surface";
+    const stale = made.reconstruct === false;
+    this.hint.textContent = stale ? "Choices have changed since this surface was made." : this.size || "";
+    this.cutting.hidden = opened.kind !== "study";
+    if (!("reconstruct" in made) && opened.kind !== "mesh" && this.stages.length) this.clear();
+  }
+
+  clear() {
+    this.stages = [];
+    this.viewer?.dispose();
+    this.viewer = null;
+    this.empty.hidden = false;
+    fill(this.told);
+  }
+
+  async load() {
+    const known = state && ("reconstruct" in state.made || (state.opened.kind === "mesh" && state.opened.ready));
+    const found = known && (await trying(get("/api/report")));
+    if (!found) return;
+    this.stages = found.stages;
+    this.step.max = this.stages.length - 1;
+    this.step.value = this.step.max;
+    fill(this.steps, ...this.stages.map(({ name }) => el("span", {}, NAMES[name])));
+    fill(this.told, problemList(found.problems, (one) => this.fly(one)), reportTable(found.report));
+    if (state.opened.kind === "study") await this.measureSlices();
+    await this.showStage();
+  }
+
+  async measureSlices() {
+    this.sizes = (await trying(get("/api/study")))?.slices_rows_columns || [1, 1, 1];
+    const [k, j, i] = this.sizes;
+    this.counts = { axial: k, coronal: j, sagittal: i };
+  }
+
+  async showStage() {
+    const stage = this.stages[Number(this.step.value)];
+    if (!stage) return;
+    for (const [n, span] of [...this.steps.children].entries()) span.classList.toggle("now", n === Number(this.step.value));
+    const color = stage.name === "fitted" ? this.color.value : "";
+    const asked = (this.made += 1);
+    const answer = await trying(fetch(`/mesh/${stage.name}?color=${color}`).then(bytesOf));
+    if (!answer || asked !== this.made) return;
+    this.empty.hidden = true;
+    this.viewer ||= window.tomomeshViewer?.createViewer(this.view, { dark: isDark(), wheel: "always" });
+    if (!this.viewer) {
+      this.empty.hidden = false;
+      this.empty.textContent = "This browser draws nothing in 3-D (no WebGL). The report and the files are there all the same.";
+      return;
+    }
+    const scene = window.tomomeshViewer.decodeScene(answer);
+    this.viewer.show(scene, { keep: true });
+    const told = scene.header.values[0];
+    this.viewer.setColors(told ? scene.values[told.name] : null, told);
+    this.viewer.setWire(this.wire.checked);
+    this.tellSize(stage, scene);
+    this.cut();
+  }
+
+  tellSize(stage, scene) {
+    const unit = stage.name === "points" ? "points" : stage.name === "cuberille" ? "squares" : "triangles";
+    const fewer = scene.header.of_faces > scene.header.faces ? `, drawn as ${scene.header.faces.toLocaleString("en")}` : "";
+    this.view.setAttribute("aria-label", `${NAMES[stage.name]}: ${stage.faces} ${unit}`);
+    this.size = `${stage.faces.toLocaleString("en")} ${unit}${fewer}`;
+    this.update();
+  }
+
+  async cutNow() {
+    if (!this.viewer || this.cutting.hidden || !this.counts) return;
+    const plane = this.plane.value;
+    this.slice.max = this.counts[plane] - 1;
+    if (!this.slice.dataset.touched) this.slice.value = Math.round((this.counts[plane] - 1) / 2);
+    this.slice.dataset.touched = "yes";
+    const k = Number(this.slice.value);
+    const outline = await trying(numbers(`/outline/${plane}/${k}`));
+    if (!outline || k !== Number(this.slice.value)) return;
+    this.beside.show(plane, k, outline.values);
+    const at = await trying(get(`/api/place/${plane}/${k}`));
+    if (at) this.viewer.clip(this.cuts.checked ? at : null);
+  }
+
+  fly(problem) {
+    if (problem.place) this.viewer?.fly(problem.place, problem.radius);
+  }
+}
+
+async function bytesOf(answer) {
+  if (answer.ok) return answer.arrayBuffer();
+  throw new Error((await answer.json()).error);
+}
+
+function isDark() {
+  const asked = document.documentElement.dataset.theme;
+  return asked === "dark" || (asked !== "light" && matchMedia("(prefers-color-scheme: dark)").matches);
 }

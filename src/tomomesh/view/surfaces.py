@@ -1,0 +1,166 @@
+"""The surface: made as the command line makes it, and shown stage by stage, beside what was measured of it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from starlette.responses import Response
+
+from ..errors import UsageError
+from ..html.places import problems_of
+from ..html.scene import Scene, scene_of_mesh, scene_of_points, scene_of_quads
+from ..html.three import three_js
+from ..measure.report import assess
+from ..measure.section import section
+from ..model.mesh import TriMesh
+from ..model.volume import AXES
+from ..pipeline import reconstruct, reconstruct_points
+from ..results import Surface
+from ..settings import Settings
+from . import coloring
+from .routes import get, levels, post
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from ..progress import Progress
+    from .session import Session
+
+WORK = "reconstruct"
+MOST = 2_500_000
+"""Faces that are drawn at most; of a larger mesh fewer are, and the page says so. Two million are drawn at 3 frames a
+second without a graphics card."""
+STAGES: dict[str, Callable[[Surface], Any]] = {
+    "points": lambda surface: scene_of_points(surface.points.positions),
+    "cuberille": lambda surface: scene_of_quads(surface.cuberille),
+    "triangulated": lambda surface: surface.cuberille.triangulated(),
+    "smoothed": lambda surface: surface.smoothed,
+    "fitted": lambda surface: surface.mesh,
+}
+"""The steps from points to a mesh, in their order, each as a scene or as the mesh that is drawn."""
+
+
+def _reconstruct(session: Session, body: Any) -> dict[str, Any]:
+    """Make the surface of what is looked at, with all that was chosen."""
+    if session.opened.kind not in ("study", "points") or not session.opened.ready:
+        raise UsageError("there is nothing to make a surface of", expected="a study or points that have been read")
+    session.jobs.start(WORK, partial(_made, session))
+    return session.state
+
+
+def _made(session: Session, progress: Progress) -> dict[str, Any]:
+    opened, choices = session.opened, session.choices.values
+    settings = Settings().replace(**choices)
+    if opened.points is not None:
+        made = reconstruct_points(opened.points, settings, progress=progress, **choices)
+    else:
+        assert opened.volume is not None
+        made = reconstruct(opened.volume, settings, labels=opened.labels, progress=progress, **choices)
+    progress("measure", 0, 1)
+    quality = made.report["quality"]
+    progress("measure", 1, 1)
+    session.keep(WORK, made, choices)
+    return {"faces": len(made.mesh.faces), "closed": quality.get("closed")}
+
+
+def surface_of(session: Session) -> Surface:
+    """Return the surface that was made last.
+
+    Raises
+    ------
+    UsageError
+        Where there is none yet.
+    """
+    if WORK not in session.made:
+        raise UsageError("there is no surface yet", hint="Make the surface")
+    found = session.made[WORK].value
+    assert isinstance(found, Surface)
+    return found
+
+
+def mesh_of(session: Session) -> TriMesh:
+    """Return the mesh that was opened, or that of the surface that was made last."""
+    return surface_of(session).mesh if session.opened.mesh is None else session.opened.mesh
+
+
+def _report(session: Session) -> dict[str, Any]:
+    """Tell what was measured, and what of it a user should know first, with its places."""
+    opened = session.opened.mesh
+    report: Mapping[str, Any] = surface_of(session).report if opened is None else {"quality": assess(opened)}
+    crossing = None if opened is not None else surface_of(session).crossing
+    mesh = mesh_of(session)
+    problems = problems_of(report, mesh, crossing if crossing is None or len(crossing) == len(mesh.faces) else None)
+    return {"report": report, "problems": [asdict(one) for one in problems], "stages": _stages(session)}
+
+
+def _stages(session: Session) -> list[dict[str, Any]]:
+    """List the steps that there are of this surface, and how much is in each."""
+    if session.opened.mesh is not None:
+        return [{"name": "fitted", "faces": len(session.opened.mesh.faces)}]
+    surface = surface_of(session)
+    counts = {
+        "points": len(surface.points), "cuberille": len(surface.cuberille.quads),
+        "triangulated": 2 * len(surface.cuberille.quads), "smoothed": len(surface.smoothed.faces),
+        "fitted": len(surface.mesh.faces),
+    }  # fmt: skip
+    if surface.smoothed is surface.mesh:
+        del counts["smoothed"]
+    return [{"name": name, "faces": count} for name, count in counts.items() if count]
+
+
+def _mesh(session: Session, stage: str, color: str = "") -> Response:
+    """Send a stage as the viewer reads it, with the numbers that color it."""
+    if session.opened.mesh is not None:
+        shown: Any = session.opened.mesh
+    elif stage in STAGES:
+        shown = STAGES[stage](surface_of(session))
+    else:
+        raise UsageError("there is no such stage", found=stage, expected=" | ".join(STAGES))
+    if isinstance(shown, TriMesh):
+        values = coloring.values_of(session, shown, color) if color and stage == "fitted" else {}
+        shown = scene_of_mesh(shown, most=MOST, values=values)
+    assert isinstance(shown, Scene)
+    return Response(shown.packed(), media_type="application/octet-stream")
+
+
+def _outline(session: Session, plane: str, k: str) -> Response:
+    """Send where the mesh cuts a slice: ends (s, 2, 2) of segments, in the slice's own columns and rows."""
+    volume = session.opened.volume
+    if volume is None:
+        raise UsageError("there are no slices")
+    axis = AXES.index(plane)
+    across = [n for n in range(3) if n != axis]
+    mesh = mesh_of(session)
+    places = volume.to_indices(mesh.vertices)[:, [*across, axis]]
+    return levels(section(mesh.moved(places), float(int(k))).astype(np.float32))
+
+
+def _place(session: Session, plane: str, k: str) -> dict[str, Any]:
+    """Tell where a slice lies: the normal of its plane, the way its numbers rise, and how far along that it is."""
+    volume = session.opened.volume
+    if volume is None:
+        raise UsageError("there are no slices")
+    axis = AXES.index(plane)
+    index = np.eye(3)[axis] * int(k)
+    one, other = (volume.affine[:3, n] for n in range(3) if n != axis)
+    normal = np.cross(one, other)
+    normal *= np.sign(normal @ volume.affine[:3, axis]) / np.linalg.norm(normal)
+    place = volume.affine[:3, :3] @ index + volume.affine[:3, 3]
+    return {"normal": normal.tolist(), "offset": float(normal @ place)}
+
+
+def _three(session: Session) -> Response:
+    return Response(three_js(), media_type="text/javascript; charset=utf-8")
+
+
+ROUTES = [
+    post("/api/reconstruct", _reconstruct),
+    get("/api/report", _report),
+    get("/mesh/{stage}", _mesh),
+    get("/outline/{plane}/{k:int}", _outline),
+    get("/api/place/{plane}/{k:int}", _place),
+    get("/three.js", _three),
+]
