@@ -32,6 +32,7 @@ def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
     from ..view.opened import Opened, kind_of
     from ..view.server import serve
     from ..view.session import Session
+    from .outputs.write import write_one
 
     opened = Opened() if chosen.looked_at is None else Opened(kind_of(chosen.looked_at), (chosen.looked_at,))
 
@@ -40,4 +41,9 @@ def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
         if not chosen.no_browser:
             webbrowser.open(address)
 
-    serve(Session(opened, given), started, host="127.0.0.1" if chosen.host in LOCAL else chosen.host, port=chosen.port)
+    serve(
+        Session(opened, write_one, given),
+        started,
+        host="127.0.0.1" if chosen.host in LOCAL else chosen.host,
+        port=chosen.port,
+    )

@@ -10,7 +10,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from ..settings import Settings
-from . import events, surfaces
+from . import events, saving, surfaces
 from .routes import get, post
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def application(session: Session) -> Starlette:
         post("/api/cancel", _cancel),
         *events.ROUTES,
         *surfaces.ROUTES,
+        *saving.ROUTES,
         Route("/", _page),
         Route("/{name}", _page),
     ]

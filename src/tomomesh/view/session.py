@@ -12,9 +12,13 @@ from .events import Events
 from .jobs import Jobs
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
 
+    from ..results import Surface
     from .opened import Opened
+
+    Write = Callable[[str, Surface, Settings, Path], None]
 
 MOST = 200
 """Choices that can be taken back."""
@@ -70,10 +74,12 @@ class Session:
         What was made of it, by the name of the work (``segment``, ``reconstruct``), each with the choices of that time.
     jobs : Jobs
     events : Events
+    write : callable
+        Writes a file of a surface as the command line does: what of it, the surface, its settings, the path.
     """
 
-    def __init__(self, opened: Opened, choices: Mapping[str, Any] | None = None) -> None:
-        self.opened = opened
+    def __init__(self, opened: Opened, write: Write, choices: Mapping[str, Any] | None = None) -> None:
+        self.opened, self.write = opened, write
         self.choices = Choices().then(choices or {})
         self.made: dict[str, Made] = {}
         self.events = Events()
@@ -102,6 +108,7 @@ class Session:
             "command": self.command,
             "made": {name: made.choices == self.choices.values for name, made in self.made.items()},
             "job": None if job is None else job.told,
+            "fault": self.jobs.fault,
         }
 
     def choose(self, changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,8 +16,6 @@ from .checks import make_folder
 from .parts import frame_of_part
 
 if TYPE_CHECKING:
-    from argparse import Namespace
-
     from numpy.typing import NDArray
 
     from ...model.points import PointSet
@@ -45,6 +44,22 @@ def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progr
     write_documents(chosen, surface.report, settings)
     draw(chosen.figures, stage_one, surface, settings, progress)
     return surface
+
+
+def write_one(what: str, surface: Surface, settings: Settings, path: Path) -> None:
+    """Write one file of a surface by itself: its mesh, points, labels, mask or report."""
+    if what == "mesh":
+        chosen = Namespace(output=path, patient=False)
+        _write_mesh(chosen, surface, _frame_asked(surface, path, settings), settings)
+    elif what == "points":
+        write_points(surface.points, surface.segmentation, path, settings, surface.place)
+    elif what == "mask":
+        _write_mask(surface, path, settings)
+    elif what == "report":
+        io.write_document(surface.report, path)
+    else:
+        assert surface.segmentation is not None
+        io.write_labels(surface.segmentation.labels, surface.segmentation.volume, path)
 
 
 def _write_mesh(chosen: Namespace, surface: Surface, frame: io.Frame, settings: Settings) -> io.Frame:

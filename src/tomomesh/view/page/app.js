@@ -44,6 +44,8 @@ function showState(now) {
   if (!current || shown.get(current).tab.hidden) open([...shown.keys()].find((name) => !shown.get(name).tab.hidden));
   if (now.job) showWork(now.job);
   else hideWork();
+  byId("fault").hidden = !now.fault || now.opened.ready;
+  byId("fault").textContent = now.fault;
 }
 
 function showWork(job) {
