@@ -45,15 +45,15 @@ THICK = 5
 """Pixels that slices may be apart without a remark. Only a remark depends on it: steps are then seen in a mesh."""
 
 
-def survey(volume: Volume, bars: int = BARS) -> dict[str, Any]:
+def survey(volume: Volume, bars: int | None = None) -> dict[str, Any]:
     """Describe a study without any patient data.
 
     Parameters
     ----------
     volume : Volume
         In memory; it is looked at slab by slab, and nothing of its size is made.
-    bars : int
-        Of the histogram.
+    bars : int, optional
+        The most that the histogram may have, each as many levels wide where these are whole; 32 where not given.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def survey(volume: Volume, bars: int = BARS) -> dict[str, Any]:
         "gray_unit": volume.unit,
         "lowest": lowest,
         "highest": highest,
-        "histogram": measured.histogram(low, high, bars).tolist() if high > low else [measured.size],
+        "histogram": measured.histogram(low, high, _bars(volume, high - low, bars)).tolist() if high > low else [measured.size],
         "histogram_from": low,
         "histogram_to": high,
         "windows": _windows(volume, cut, measured, padded),
@@ -106,6 +106,12 @@ def _drawn_from(measured: Levels) -> tuple[float, float]:
     reach = REACH * (last - first)
     first, last = max(low, first - reach), min(high, last + reach)
     return (first, last) if 0 < FAR * (last - first) < high - low else (low, high)
+
+
+def _bars(volume: Volume, reach: float, most: int | None) -> int:
+    """Return how many bars a histogram has."""
+    whole = volume.voxels.dtype.kind in "bui" and reach > 1
+    return BARS if most is None else int(reach // math.ceil(reach / most)) if whole else most
 
 
 def _windows(volume: Volume, cut: Cut, measured: Levels, padded: Padding | None) -> dict[str, dict[str, Any]]:
