@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import TomomeshError
 from ..isosurface.runs import Runs
 from ..model.volume import AXES, order_along
 from ..segmentation.study import select_study
@@ -174,8 +175,12 @@ def kept(session: Session) -> tuple[str, Kept]:
 
 
 def _kept(session: Session) -> dict[str, Any]:
-    """Tell what the choices keep, component by component."""
-    key, found = kept(session)
+    """Tell what the choices keep, component by component; or why they keep nothing, which is no fault of the page."""
+    opened_volume(session)
+    try:
+        key, found = kept(session)
+    except TomomeshError as fault:
+        return {"refused": str(fault), "flags": list(fault.flags)}
     return {"key": key, **found.told, "components": found.listed(), "count": len(found.largest)}
 
 

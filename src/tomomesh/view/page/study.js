@@ -58,7 +58,7 @@ export function mount(panel) {
   const side = el("aside", { class: "side" }, ...Object.values(parts).map((one) => one.element));
   const study = el("div", { class: "study", hidden: true }, views, side);
   panel.append(study, opening.element);
-  const page = { study, opening, planes, parts, turn: -1, choices: "", listing: false };
+  const page = { study, opening, planes, parts, showOpening, turn: -1, choices: "", listing: false };
   showOpening.onclick = () => { page.listing = !page.listing; showAll(page); };
   on("state", () => follow(page));
   if (state) follow(page);
@@ -143,6 +143,7 @@ async function begin(page) {
   looked.survey = survey;
   if (!looked.kept) settleWindow();
   showAll(page);
+  if (isLabels() && !state.choices.select) await keep(page);
   await kept;
 }
 
@@ -155,25 +156,29 @@ async function keep(page) {
   settleWindow();
   looked.moving = true;
   showAll(page);
+  if (isLabels() && !state.choices.select) return page.parts.keeping.say("Choose labels here, or with the tool Pick in a slice.");
   page.parts.keeping.say("Finding what is kept ...", "busy");
-  try {
-    const kept = await get("/api/kept", {}, page.abort.signal);
-    if (asked !== page.choices) return;
-    keeps.restart({ key: kept.key });
-    Object.assign(looked, { kept, moving: false });
-    settleWindow();
-    showAll(page);
-    tell("at");
-  } catch (fault) {
-    if (fault.name === "AbortError" || asked !== page.choices) return;
-    looked.moving = false;
-    page.parts.keeping.say(fault.message, "fault");
-  }
+  const kept = await trying(get("/api/kept", {}, page.abort.signal));
+  if (kept && asked === page.choices) take(page, kept);
+  return undefined;
+}
+
+function take(page, kept) {
+  looked.moving = false;
+  if (kept.refused) return page.parts.keeping.say(kept.refused, "fault");
+  keeps.restart({ key: kept.key });
+  looked.kept = kept;
+  settleWindow();
+  showAll(page);
+  tell("at");
+  return undefined;
 }
 
 function showAll(page) {
   const there = Boolean(looked.geometry) && !page.listing;
   page.study.hidden = !there;
+  page.showOpening.hidden = !(state.opened.browses || "series" in state.choices);
+  page.study.classList.toggle("labels", isLabels());
   page.opening.element.hidden = there || state.opened.kind === "study" && !state.opened.ready && !state.opened.refused;
   if (!page.opening.element.hidden) page.opening.show();
   if (!looked.geometry) return;

@@ -63,12 +63,12 @@ export function makeWindowing() {
   const joined = chooser("layers", { all: "in all layers", any: "in any layer" }, "In how many layers a voxel lies in the window");
   const layer = el("select", { "aria-label": "Layer whose bounds are moved", onchange: () => { looked.layer = Number(layer.value); look(); show(); } });
   const units = el("span", {});
-  const element = el("section", { class: "part" }, el("h2", {}, "Window"), suggestions,
+  const element = el("section", { class: "part for-gray" }, el("h2", {}, "Window"), suggestions,
     el("div", { class: "fields" }, "over", numbers[0], "up to", numbers[1], units),
     el("div", { class: "fields" }, layer, joined, el("label", {}, "keep ", keep)));
   const showNumbers = () => numbers.forEach((input, n) => {
     const level = boundsOf(n)[looked.layer];
-    if (document.activeElement !== input) input.value = Number.isFinite(level) ? short(level, 6) : "";
+    if (document.activeElement !== input) input.value = Number.isFinite(level) ? short(level, 5) : "";
   });
   const show = () => {
     fill(suggestions, ...suggested());
