@@ -125,7 +125,7 @@ def _windows(volume: Volume, cut: Cut, measured: Levels, padded: Padding | None)
     ct = may_be_ct(volume, cut.ends[0]) and (volume.unit == "HU" or measured.bulk()[0] < AIR)
     windows |= PRESETS_HU if ct else {}
     taken = _taken(volume, cut, [*windows.values()])
-    planes = {LETTERS[axis][end]: volume.voxels.take(end, 2 - axis) for axis in (2, 1, 0) for end in (0, -1)}
+    planes = {LETTERS[axis][end]: np.moveaxis(volume.voxels, 2 - axis, 0)[end] for axis in (2, 1, 0) for end in (0, -1)}
     pairs = zip(windows.items(), taken, strict=True)
     return {name: _window(planes, *bounds, share) for (name, bounds), share in pairs}
 

@@ -89,7 +89,8 @@ def _ends_of(direction: NDArray[np.float64]) -> tuple[str, str]:
 def _slice(session: Session, plane: str, k: str) -> Response:
     """Return the gray levels of a slice (rows, columns[, layers]), none but these copied."""
     voxels = opened_volume(session).voxels
-    found = voxels.take(_number(k, voxels.shape[axis_of(plane)]), axis_of(plane))
+    across = np.moveaxis(voxels, axis_of(plane), 0)  # a view; `take` would copy all voxels where an axis is flipped
+    found = across[_number(k, len(across))]
     kind = found.dtype
     return levels(found.astype(TYPES.get(kind.kind, TYPES.get(f"{kind.kind}{kind.itemsize}", kind)), copy=False))
 

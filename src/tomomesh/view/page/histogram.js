@@ -65,7 +65,7 @@ function moveTo(n, level) {
   const gap = looked.geometry.whole ? 1 : (to - from) / 1000;
   const free = n === 0 ? Math.min(level, upper - gap) : Math.max(level, lower + gap);
   boundsOf(n)[looked.layer] = n === 0 && free <= from ? -Infinity : n === 1 && free >= to ? Infinity : free;
-  looked.moving = true;
+  looked.moving = looked.held = true;
   look();
   tell("window");
 }

@@ -5,13 +5,13 @@ import { tell } from "./store.js";
  * - geometry, survey, kept: the answers of /api/planes, /api/study and /api/kept, null before they have come
  * - at: the voxel (K, J, I) of the crosshair
  * - contrast: which gray levels are drawn from black to white
- * - window: the bounds of each layer; moving, while they are not what is kept yet
+ * - window: the bounds of each layer; moving, while they are not what is kept yet; held, while a hand holds them
  * - tool: what a click does: cross, pick or box
  * @type {any}
  */
 export const looked = {
   geometry: null, survey: null, kept: null, at: [0, 0, 0], contrast: { center: 0, width: 1 },
-  window: { lower: [-Infinity], upper: [Infinity] }, moving: false, opacity: 0.5, tool: "cross", layer: 0,
+  window: { lower: [-Infinity], upper: [Infinity] }, moving: false, held: false, opacity: 0.5, tool: "cross", layer: 0,
 };
 
 /** Have all planes drawn again. */

@@ -4,7 +4,7 @@ import { goTo, inPatient, isLabels, look, looked, unit } from "./looked.js";
 import { LINES, drawBox, drawCross, drawLetters, drawScale, placed, pointOf, under } from "./marks.js";
 import { paint } from "./painting.js";
 import { chooseBox, outsideOf } from "./region.js";
-import { on, tell } from "./store.js";
+import { on, state, tell } from "./store.js";
 
 const AHEAD = 4;
 const MOST_ZOOM = 16;
@@ -172,6 +172,10 @@ export class Plane {
     }
     slice.indices ??= this.indices(slice.values);
     const kept = looked.kept && !looked.moving ? this.keeps.have(this.name, this.k)?.values : null;
+    const { roi, slice_range: range } = state.choices;
+    const now = [slice, kept, this.tables(), String(roi), String(range)];
+    if (now.every((one, n) => one === this.painted?.[n])) return;
+    this.painted = now;
     const having = { indices: slice.indices, layers: looked.geometry.layers };
     paint(new Uint32Array(this.image.data.buffer), having, kept || null, outsideOf(this.plane, this.k), this.tables());
     this.drawn.getContext("2d").putImageData(this.image, 0, 0);

@@ -116,7 +116,7 @@ async function follow(page) {
 async function opened(page) {
   page.turn = state.opened.turn;
   page.choices = JSON.stringify(state.choices);
-  Object.assign(looked, { geometry: null, survey: null, kept: null, layer: 0, moving: false });
+  Object.assign(looked, { geometry: null, survey: null, kept: null, layer: 0, moving: false, held: false });
   scale = null;
   grays.restart();
   keeps.restart();
@@ -164,7 +164,7 @@ async function keep(page) {
 }
 
 function take(page, kept) {
-  looked.moving = false;
+  looked.moving = looked.held;
   if (kept.refused) return page.parts.keeping.say(kept.refused, "fault");
   keeps.restart({ key: kept.key });
   looked.kept = kept;

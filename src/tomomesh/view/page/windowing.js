@@ -13,6 +13,7 @@ export const boundsOf = (n) => looked.window[NAMES[n]];
 
 /** Choose the bounds as they are drawn. */
 export function chooseBounds() {
+  looked.held = false;
   const { lower, upper } = looked.window;
   const none = lower.every((one) => one === -Infinity) && upper.every((one) => one === Infinity);
   const below = Math.floor(looked.survey.lowest) - 1;
@@ -30,8 +31,9 @@ function sent(bounds, none, far) {
   return finite.every((one) => one === finite[0]) ? finite[0] : finite;
 }
 
-/** Take the bounds from what was kept, else from what was chosen, else from what is suggested. */
+/** Take the bounds from what was kept, else from what was chosen, else from what is suggested; not while a hand holds them. */
 export function settleWindow() {
+  if (looked.held) return;
   const { choices } = state;
   const layers = looked.geometry?.layers || 1;
   const suggested = looked.survey?.windows[choices.preset || "otsu"] || {};
