@@ -135,7 +135,7 @@ def test_a_broken_study_is_one_line(tmp_path: Path) -> None:
         while page.state()["job"] is not None:
             pass
         state = page.state()
-        assert state["opened"] == {"kind": "study", "name": "broken.nii", "ready": False}
-        assert "broken.nii" in state["fault"]
-        assert state["fault"].count("\n") == 0
+        assert state["opened"]["ready"] is False
+        assert "broken.nii" in state["opened"]["refused"]
+        assert state["opened"]["refused"].count("\n") == 0
         assert page.ask("/api/reconstruct", {})[0] == 400

@@ -10,7 +10,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from ..settings import Settings
-from . import events, saving, surfaces
+from . import events, saving, slices, studies, surfaces, windows
 from .routes import get, post
 
 if TYPE_CHECKING:
@@ -37,6 +37,9 @@ def application(session: Session) -> Starlette:
         post("/api/redo", lambda session, body: session.redo()),
         post("/api/cancel", _cancel),
         *events.ROUTES,
+        *studies.ROUTES,
+        *slices.ROUTES,
+        *windows.ROUTES,
         *surfaces.ROUTES,
         *saving.ROUTES,
         Route("/", _page),

@@ -69,8 +69,6 @@ class Jobs:
         self._lock = threading.Lock()
         self._count = 0
         self.now: Job | None = None
-        self.fault = ""
-        """What the last work has failed by, in a line; empty where it has not."""
 
     def start(self, name: str, work: Work) -> Job:
         """Begin some work, unless work is underway: a second click is no second run.
@@ -91,7 +89,6 @@ class Jobs:
                 return self.now
             self._count += 1
             job = self.now = Job(self._count, name)
-            self.fault = ""
         job.thread = threading.Thread(target=self._run, args=(job, work), daemon=True)
         job.thread.start()
         return job
@@ -107,7 +104,7 @@ class Jobs:
         self._tell({"event": "progress", **job.told})
         told = _outcome(work, self._progress(job))
         with self._lock:
-            self.now, self.fault = None, told.get("error", "")
+            self.now = None
         self._tell({"job": job.number, "name": job.name, **told})
 
     def _progress(self, job: Job) -> Progress:
