@@ -79,15 +79,15 @@ def children_of(process: subprocess.Popen[str]) -> list[Any]:
 
 
 class SchedulerAndWorker:
-    """A scheduler and a worker of its own, in processes that can be killed."""
+    """A scheduler, and a worker of its own unless none is wanted, in processes that can be killed."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, worker: bool = True) -> None:
         self._file, self._env = folder / "scheduler.json", {**os.environ, "TMPDIR": str(folder)}
         common = ["--scheduler-file", str(self._file), "--no-dashboard"]
         self._lines = (
             ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", *common],
             ["distributed.cli.dask_worker", "--host", "127.0.0.1", "--nthreads", "1", "--no-nanny", *common],
-        )  # fmt: skip
+        )[: 1 + worker]  # fmt: skip
 
     def __enter__(self) -> tuple[subprocess.Popen[bytes], Path]:
         self._processes = []
