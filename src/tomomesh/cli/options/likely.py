@@ -82,7 +82,11 @@ def likely_option(word: str, known: Collection[str]) -> str:
 
 def likely_instead(word: str, known: Collection[str]) -> str:
     """Return what a command has in place of an option of another's, given all that it has; "" where it has nothing."""
-    return "--memory SIZE, as 4GB: one process takes the cloud" if word.partition("=")[0] in SEVERAL and "--memory" in known else ""
+    return (
+        "--memory SIZE, as 4GB: one process takes the cloud"
+        if word.partition("=")[0] in SEVERAL and "--memory" in known
+        else ""
+    )
 
 
 def likely_output(words: Collection[str]) -> str:
