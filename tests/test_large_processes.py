@@ -120,7 +120,7 @@ class TestNoWorker:
     """A scheduler that waits for its first."""
 
     @pytest.fixture
-    def waiting(self, line: list[str], tmp_path: Path) -> Iterator[tuple[Process, Process]]:
+    def waiting(self, line: list[str], tmp_path: Path) -> Iterator[tuple[Process, subprocess.Popen[bytes]]]:
         with SchedulerAndWorker(tmp_path, worker=False) as (scheduler, file):
             ours = [sys.executable, "-m", "tomomesh", *line, "--scheduler", str(file)]
             usual = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
@@ -129,13 +129,13 @@ class TestNoWorker:
                 yield process, scheduler
                 process.kill()
 
-    def test_stopped(self, waiting: tuple[Process, Process], folder: Path) -> None:
+    def test_stopped(self, waiting: tuple[Process, Any], folder: Path) -> None:
         waiting[0].send_signal(signal.SIGINT)
         assert waiting[0].communicate(timeout=WAIT_S)[1].splitlines()[-1] == STOPPED
         assert waiting[0].returncode == 130
         assert not any(folder.iterdir())
 
-    def test_whose_scheduler_goes_away(self, waiting: tuple[Process, Process], folder: Path) -> None:
+    def test_whose_scheduler_goes_away(self, waiting: tuple[Process, Any], folder: Path) -> None:
         waiting[1].kill()
         (said,) = waiting[0].communicate(timeout=WAIT_S)[1].splitlines()
         assert said.startswith(("error: the scheduler is gone.", "error: no scheduler answers there."))

@@ -137,7 +137,7 @@ def _full(full: bool) -> None:
 def _blind(name: str) -> None:
     """Let there be no file of a name, as where a folder is not mounted."""
 
-    def stat(path: Path, **how: Any) -> os.stat_result:
+    def stat(path: Path, **how: Any) -> Any:
         if path.name == name:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
         return before(path, **how)
