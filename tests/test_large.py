@@ -1,12 +1,9 @@
-"""Studies slab by slab: the bytes, the report and the errors of the run in memory, here and on workers."""
+"""Studies slab by slab: the bytes, the report and the errors of the run in memory."""
 
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import signal
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,40 +12,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds
+from slab_studies import MEMORY, blobs, same
 from studies import write_nifti
 from tomomesh import Volume, read_mesh, reconstruct
 from tomomesh.cli import main
-from tomomesh.large import LargeSurface, reconstruct_large
-from tomomesh.slabs import rest, surface
+from tomomesh.large import reconstruct_large
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
-    from tomomesh.results import Surface
-
-MEMORY: dict[str, Any] = {"remesh": False, "divide": False}
-"""What the run in memory leaves out for the same bytes."""
 LEFT_OUT = {"timings", "settings", "versions", "written", "slabs"}
 APART = {"points_to_surface", "vertices_to_points"}
 """What is not measured of a mesh that is never whole begins with one of these."""
-
-
-def blobs(seed: int, shape: tuple[int, int, int] = (22, 16, 18)) -> NDArray[np.int16]:
-    """Return smooth noise on background."""
-    levels = np.random.default_rng(seed).normal(size=shape)
-    for axis in range(3):
-        levels = levels + np.roll(levels, 1, axis) + np.roll(levels, -1, axis)
-    return np.round(40 * levels).astype(np.int16)
-
-
-def same(large: LargeSurface | Surface, whole: Surface) -> bool:
-    mesh = large.joined() if isinstance(large, LargeSurface) else large.mesh
-    return (mesh.vertices.tobytes(), mesh.faces.tobytes()) == (
-        whole.mesh.vertices.tobytes(),
-        whole.mesh.faces.tobytes(),
-    )
 
 
 class TestSame:
@@ -106,48 +81,6 @@ class TestSame:
         assert len(np.unique(places, axis=0)) == len(whole.vertices)
         told = json.loads((folder / "r.json").read_text())["written"]["files"]
         assert told == ["part-001.ply", "part-002.ply", "part-003.ply", "part-pieces.json"]
-
-
-STAGES = [
-    *((surface, name) for name in ("ground", "squares_from", "region", "chosen", "piece")),
-    *((rest, name) for name in ("begun", "returned", "stepped")),
-]
-"""What is done to a slab, by the function that does it and the module that asks for it."""
-
-
-def killed_once(*given: Any, work: Any, marker: Path, **named: Any) -> Any:
-    if not marker.exists():
-        marker.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return work(*given, **named)
-
-
-class TestWorkers:
-    @pytest.fixture
-    def study(self, tmp_path: Path) -> Path:
-        write_nifti(tmp_path / "labels.nii", np.pad((blobs(5) > 20).astype(np.uint8), 1), np.eye(4))
-        return tmp_path / "labels.nii"
-
-    def line(self, study: Path, name: str) -> list[str]:
-        return ["reconstruct", str(study), "--select", "1", "--quiet", "-o", str(study.parent / name)]
-
-    def test_the_same_bytes(self, study: Path, here: Any) -> None:
-        on = ["--scheduler", here.scheduler_address, "--slab", "6"]
-        assert main([*self.line(study, "workers.ply"), *on]) == 0
-        assert main([*self.line(study, "whole.ply"), "--no-remesh"]) == 0
-        assert (study.parent / "workers.ply").read_bytes() == (study.parent / "whole.ply").read_bytes()
-
-    @pytest.mark.parametrize(("module", "stage"), STAGES)
-    def test_a_worker_killed_in_any_stage(
-        self, module: Any, stage: str, study: Path, here: Any, client: Any, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        marker = study.parent / "marker"
-        monkeypatch.setattr(module, stage, partial(killed_once, work=getattr(module, stage), marker=marker))
-        monkeypatch.setattr(here.scheduler, "allowed_failures", 1)
-        labels = Volume.from_stored((blobs(5) > 20).astype(np.uint8), np.eye(4))
-        found = reconstruct_large(labels, client=client, slab=6, select=(1,))
-        assert marker.exists()
-        assert same(found, reconstruct(labels, select=(1,), remesh=False))
 
 
 class TestFaults:

@@ -146,9 +146,22 @@ class File:
         return found
 
 
+class _Unkept:
+    """An array that another process has sent, and that could not be kept here: who looks at it is told.
+
+    What is raised where it is received is seen by nobody: Dask would fetch it again and again.
+    """
+
+    def __init__(self, fault: OutputError) -> None:
+        self.fault = fault
+
+
 def _received(array: np.ndarray[Any, Any]) -> Any:
     """Keep an array that another process sends on the disk here too."""
-    return File(Path(tempfile.gettempdir())).put(array)
+    try:
+        return File(Path(tempfile.gettempdir())).put(array)
+    except OutputError as fault:
+        return _Unkept(fault)
 
 
 def put_away(value: Any, file: File) -> Any:
@@ -157,11 +170,19 @@ def put_away(value: Any, file: File) -> Any:
 
 
 def mapped(value: Any, *, own: bool = False) -> Any:
-    """Return a value whose arrays can all be worked on, if asked for those too that another process has sent."""
+    """Return a value whose arrays can all be worked on, if asked for those too that another process has sent.
+
+    Raises
+    ------
+    OutputError
+        For one that it has sent and that could not be kept.
+    """
 
     def looked_at(part: Any) -> Any:
         if isinstance(part, _Far):
             return part.mapped()
+        if isinstance(part, _Unkept):
+            raise part.fault
         return part.copy() if own and isinstance(part, np.ndarray) and not part.flags.behaved else part
 
     return _changed(value, looked_at)

@@ -27,11 +27,16 @@ if TYPE_CHECKING:
     from ..bars import Bars
 
 
-def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> Surface:
-    """Write the mesh, and whatever else was asked for; return the surface, whose report tells of it."""
+def write_surface(
+    chosen: Namespace, surface: Surface, settings: Settings, progress: Bars, *, fits: bool | None = None
+) -> Surface:
+    """Write the mesh, and whatever else was asked for; return the surface, whose report tells of it.
+
+    See `tomomesh.io.write_mesh` for `fits`.
+    """
     stage_one, part = surface.segmentation, surface.part
-    frame = _frame_asked(surface, chosen.output, settings)
-    in_file = _write_mesh(chosen, surface, frame, settings)
+    frame = frame_asked(surface, chosen.output, settings)
+    in_file = _write_mesh(chosen, surface, frame, settings, fits)
     told: dict[str, dict[str, Any]] = {"written": {"unit": in_file.unit, "frame": in_file.name}}
     if getattr(chosen, "points", None):
         write_points(surface.points, stage_one, chosen.points, settings, surface.place)
@@ -47,7 +52,9 @@ def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progr
     return surface
 
 
-def _write_mesh(chosen: Namespace, surface: Surface, frame: io.Frame, settings: Settings) -> io.Frame:
+def _write_mesh(
+    chosen: Namespace, surface: Surface, frame: io.Frame, settings: Settings, fits: bool | None
+) -> io.Frame:
     """Write the mesh in a frame, or its part to print; return that of the numbers in the file."""
     stage_one, part, output = surface.segmentation, surface.part, chosen.output
     at_vertices, on_faces = _fields(surface, output)
@@ -59,7 +66,7 @@ def _write_mesh(chosen: Namespace, surface: Surface, frame: io.Frame, settings: 
     else:
         io.write_mesh(
             mesh, output, **named, vertex_fields=at_vertices, face_fields=on_faces, z_up=part is not None,
-            precision=settings.run.precision,
+            precision=settings.run.precision, fits=fits,
         )  # fmt: skip
     return io.frame_in_file(output, **named)
 
@@ -71,7 +78,7 @@ def _tell_cavities(report: dict[str, Any], frame: io.Frame, in_file: io.Frame) -
         report["written"]["cavity_places"] = in_file.place(frame.place(np.array(places))).tolist()
 
 
-def _frame_asked(surface: Surface, output: str | Path, settings: Settings) -> io.Frame:
+def frame_asked(surface: Surface, output: str | Path, settings: Settings) -> io.Frame:
     """Return the frame of the mesh that is written: a cloud's own, or that which was asked for, or the format has."""
     stage_one = surface.segmentation
     if stage_one is None:
