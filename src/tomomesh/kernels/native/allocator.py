@@ -130,10 +130,11 @@ def leave(state: Any, more: int) -> None:
 
 @_compiled
 def watch(state: Any) -> None:
-    """Let pages go whenever there are too many, until that is over."""
+    """Let pages go whenever there are too many, until that is over, and once more."""
     while state[DONE] == 0:
         leave(state, 0)
         usleep(state[LOOK])
+    leave(state, 0)
 
 
 @_compiled
@@ -143,7 +144,7 @@ def take(state: Any, size: int, zero: bool) -> int:
     if at == len(state):
         return int(calloc(1, size) if zero else malloc(size))
     kept = size <= state[ROOM]
-    leave(state, size // PAGE)
+    leave(state, min(size // PAGE, state[FULL] // 3))  # what is larger is not filled before the next look
     place = (calloc(1, size) if zero else malloc(size)) if kept else map_file(state, size)
     if place:
         lock(state)
