@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     Marks = NDArray[np.bool_]
 
 NOTHING = Part(0, (np.zeros(0, np.bool_),))
-PART = 200_000
+PART = 50_000
 """Squares whose levels are looked at together. No result depends on it."""
 
 
