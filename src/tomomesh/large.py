@@ -11,9 +11,9 @@ import numpy as np
 
 from .begin import begun_on, settled
 from .errors import ResourceError
-from .memory.limit import disk_folder
+from .memory.limit import disk_folder, limit_here
 from .model.mesh import TriMesh
-from .pipeline import finished
+from .pipeline import made_within, segmented, surfaced
 from .pointcloud.forecast import bytes_in_words, free_memory
 from .progress import Progress, silent
 from .report import Reported
@@ -45,6 +45,9 @@ A_VOXEL = 4.0
 2.5 of a ball of gray levels, and 215 to 250."""
 A_CELL = 300.0
 """Bytes for each vertex of a slab and its halo."""
+A_POINT = 800.0
+"""Bytes for each neuron and cap of a network a slice, of what is made around them. Measured: 780 of 230,000 on
+512 slices."""
 CELLS_A_RUN = 6.0
 """Vertices for each run of a mask: a run has two sides across its row, and faces are as many along other axes."""
 
@@ -99,7 +102,8 @@ def reconstruct_large(
     client : distributed.Client, optional
         Whose workers work on slabs side by side; without one, one slab follows the other here.
     memory : float, optional
-        Bytes that each process may take, by default what is free over the processes; slabs are as thick as it holds.
+        Bytes that each process may take, by default what is free over the processes; slabs are as thick as it holds,
+        and where a network a slice is taken, large arrays of its mesh lie on the disk (Linux, 400 MiB or more).
     slab : int, optional
         Slices of a slab, in place of that.
     progress : callable
@@ -110,7 +114,7 @@ def reconstruct_large(
     -------
     LargeSurface, or Surface
         The latter where a network a slice is taken, whose neurons and mesh fit into the memory where the study does
-        not.
+        not; it is that of `tomomesh.pipeline.reconstruct_once`.
 
     Raises
     ------
@@ -133,7 +137,7 @@ def reconstruct_large(
     study = lay_out(volume, labels, settings, labelled=settings.window.select is not None, cutting=cutting)
     begun = begun_on(study, settings, changes, progress)
     if begun.way.name not in ("voxels", "contours"):
-        return finished(begun, progress)
+        return _of_networks(begun, memory, progress)
     require_slabs(begun.taken)
     kept, cut = begun.kept, partial(_cuts_of, room=room)
     if begun.way.name == "voxels":
@@ -142,6 +146,18 @@ def reconstruct_large(
     found = contours_in_slabs(kept, begun.taken, slabs, cut, progress)
     surface, neurons = found.value
     return replace(_checked(begun, folded(surface, found), progress), neurons=neurons)
+
+
+def limit_for(memory: float | None, points: PointSet) -> float | None:
+    """Return the limit within which a mesh is made around the neurons of a network a slice; None where it fits."""
+    return limit_here(memory) if memory and BASE + A_POINT * len(points) > memory else None
+
+
+def _of_networks(begun: Begun, memory: float | None, progress: Progress) -> Surface:
+    """Take a study with a network a slice to a surface, whose large arrays lie on the disk where it does not fit."""
+    found = segmented(begun, progress)
+    limit = limit_for(memory, found.points)
+    return made_within(limit, lambda: surfaced(found, begun.way, begun.taken, begun.settings, progress, kept=False))
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import ctypes
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from .begin import begin, begun_on, laid_out, settled
 from .finish import compare_with, finish
+from .memory.heap import give_back
 from .memory.limit import memory_limit
 from .model.points import PointSet
 from .progress import Progress, silent
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from .segmentation.study import LaidOut
     from .settings import Settings
     from .stage import Later
+    from .ways.way import Way
 
 
 def reconstruct(
@@ -124,7 +124,7 @@ def segment(
     settings = settled(settings, changes)
     progress("window", 0, 2)
     study = lay_out(volume, labels, settings, labelled=settings.window.select is not None)
-    return _segmented(begun_on(study, settings, changes, progress), progress)
+    return segmented(begun_on(study, settings, changes, progress), progress)
 
 
 def reconstruct_points(
@@ -164,8 +164,13 @@ def reconstruct_points(
     1.0
     """
     settings = settled(settings, changes)
+    return made_within(memory, lambda: _of_points(points, settings, changes, progress))
+
+
+def made_within(memory: str | float | None, make: Callable[[], Surface]) -> Surface:
+    """Make a surface, and later its report, within a limit of memory if there is one; see `memory_limit`."""
     with memory_limit(memory):
-        made = _of_points(points, settings, changes, progress)
+        made = make()
     if memory is None:
         return made
     stages = (one if isinstance(one, Stage) else partial(_limited, memory, one) for one in made.stages)
@@ -183,7 +188,7 @@ def _of_points(
     settings = replace(settings, printing=turned(settings.printing, cloud.frame))
     begun = begin(settings, given, input=taken.value.input)
     made = begun.value.surface(taken.value, settings, progress)
-    _give_back()
+    give_back()
     done, later = finish(replace(made.value, place=taken.value.place), settings, progress)
     return replace(done.value, way=begun.value.name, settings=settings, stages=(taken, begun, made, done, *later))
 
@@ -218,31 +223,33 @@ def reconstructed(
 def finished(begun: Begun, progress: Progress, *, truth: TriMesh | None = None, kept: bool = True) -> Surface:
     """Take a study whose way is known to a surface; see `reconstructed`."""
     way, settings, taken = begun.way, begun.settings, begun.taken
-    found = _segmented(begun, progress)
+    found = segmented(begun, progress)
     del begun
     found = found if kept else found.without_voxels()
-    _give_back()
+    return surfaced(found, way, taken, settings, progress, truth=truth, kept=kept)
+
+
+def surfaced(
+    found: Segmentation[Any], way: Way, taken: Settings, settings: Settings, progress: Progress,
+    *, truth: TriMesh | None = None, kept: bool = True,
+) -> Surface:  # fmt: skip
+    """Take a study after stage one to a surface; see `reconstructed`."""
+    give_back()
     made = way.surface(found, taken, progress)
     surface, told = made.value if kept else made.value.bare(), folded(None, made)
     del made
     found = found if kept else found.bare()
-    _give_back()
+    give_back()
     done, later = finish(replace(surface, segmentation=found), settings, progress)
     known = () if truth is None else (compare_with(done.value, truth),)
     return replace(done.value, way=found.way, settings=settings, stages=(*found.stages, told, done, *known, *later))
-
-
-def _give_back() -> None:
-    """Hand what was let go back to the system: glibc keeps arrays below 32 MiB, half of a run's memory, to itself."""
-    with suppress(OSError, AttributeError, TypeError):  # other systems give it back themselves
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _laid_out(volume: Volume, labels: Volume | None, settings: Settings, progress: Progress) -> LaidOut:
     return laid_out(volume, labels, settings, progress, labelled=settings.window.select is not None)
 
 
-def _segmented(begun: Begun, progress: Progress) -> Segmentation[Any]:
+def segmented(begun: Begun, progress: Progress) -> Segmentation[Any]:
     """Run stage one."""
     way = begun.way
     assert way.segment is not None

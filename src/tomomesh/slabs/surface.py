@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..isosurface.crossings import EVENED, Levels, sampled
+from ..isosurface.run_mask import RunMask
 from ..isosurface.settle import Springs
 from ..model.boxes import box_of
 from ..progress import Progress, silent
@@ -41,7 +42,6 @@ from .triangles import chosen, piece
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..isosurface.run_mask import RunMask
     from ..model.boxes import Box
     from ..model.trace import Trace
     from ..settings import FitSettings
@@ -198,7 +198,7 @@ def _grounded(asked: Asked, frame: MaskFrame, layers: Cuts, slabs: Slabs, thread
     found = slabs.each(joins, *columns, [()] * len(layers), nothing)
     while any(one.unfinished for one in slabs.fetch(slabs.each(told_of, found))):
         found = slabs.each(joins, *columns, bits(), nothing)
-    joined = _mask_of(found, frame, slabs)
+    joined = _mask_of(found, asked, frame, slabs)
     if asked.surface != "outer":
         return found, joined
     whole = filled(joined)
@@ -206,8 +206,10 @@ def _grounded(asked: Asked, frame: MaskFrame, layers: Cuts, slabs: Slabs, thread
     return slabs.each(partial(work, rounds=0), *columns, bits(), solid), whole
 
 
-def _mask_of(found: list[Kept], frame: MaskFrame, slabs: Slabs) -> RunMask:
-    """Return the whole mask as it is now, in the frame."""
+def _mask_of(found: list[Kept], asked: Asked, frame: MaskFrame, slabs: Slabs) -> RunMask:
+    """Return the whole mask as it is now, in the frame: where no voxel was added, the one that was asked for."""
+    if isinstance(asked.mask, RunMask) and not any(one.added for one in slabs.fetch(slabs.each(told_of, found))):
+        return frame.framed(asked.mask)
     return whole_of(slabs.fetch(slabs.each(partial(runs_of, shape=frame.shape[1:]), found)))
 
 

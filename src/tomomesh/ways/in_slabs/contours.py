@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ...memory.heap import give_back
 from ...slabs.surface import Asked, surface_in_slabs
 from ...stage import folded, measured
 from ..contours import levels_of_rings, segment_by_contours
@@ -47,8 +48,10 @@ def contours_in_slabs(
     """
     threads, surface = settings.run.threads, "outer" if settings.cubes.surface == "outer" else "all"
     found = segment_by_contours(kept, settings, progress)
+    give_back()
     levels = measured("contours", levels_of_rings, found.value, threads)
     volume, inside = levels.value
+    give_back()
     asked = Asked(inside, volume.voxels, volume.affine, lower=0.0, surface=surface)
     made = measured(
         "fit", surface_in_slabs, asked, cuts(volume, inside), settings.fit, slabs, threads=threads, progress=progress
