@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 DIED = "KilledWorker"
 """Dask's name for what becomes of a task that has lost as many workers as it may."""
+OPENED = Path("/proc/self/fd")
+"""Where Linux lists what a process has open, for processes of the same user alone."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class OnClient:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of masks that are sent along, each to one worker
-                return [self.client.submit(_done, work, row, self._beside, pure=False) for row in rows]
+                return [self.client.submit(_done, work, row, self._beside, self._near, pure=False) for row in rows]
         except Exception as fault:
             raise _explained(fault) from None
 
@@ -79,6 +81,16 @@ class OnClient:
             at_once[one["host"]] += one["nthreads"]
         return max(at_once.values(), default=1)
 
+    @cached_property
+    def _near(self) -> bool:
+        """Whether this process has started the workers, which then can open each other's files: none of them is sent."""
+        cluster = getattr(self.client, "cluster", None)
+        if cluster is None or not OPENED.is_dir():
+            return False
+        from distributed import LocalCluster
+
+        return isinstance(cluster, LocalCluster)
+
 
 @dataclass(frozen=True)
 class _AtWorker:
@@ -98,10 +110,10 @@ def _values(kept: Any) -> Any:
     return mapped(kept.value, own=True) if isinstance(kept, _AtWorker) else kept
 
 
-def _done(work: Callable[..., Any], row: list[Any], beside: int) -> _AtWorker:
+def _done(work: Callable[..., Any], row: list[Any], beside: int, near: bool) -> _AtWorker:
     """Do a slab's work on a worker, with the cores that others on its machine leave to it."""
     share_cores(max((os.cpu_count() or 1) // beside, 1))
-    return _AtWorker(put_away(work(*_values(row)), File(Path(tempfile.gettempdir()))))
+    return _AtWorker(put_away(work(*_values(row)), File(Path(tempfile.gettempdir()), lent=near)))
 
 
 def _explained(fault: Exception) -> TomomeshError:
