@@ -102,7 +102,9 @@ class _Far:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Let other processes have the array itself, or its place in a file that is lent to them."""
-        return (_Far, (self.file, self.offset, self.dtype, self.shape)) if self.file.lent else (_received, (self.mapped(),))
+        if self.file.lent:
+            return _Far, (self.file, self.offset, self.dtype, self.shape)
+        return _received, (self.mapped(),)
 
     def mapped(self) -> np.ndarray[Any, Any]:
         """Return it as memory that is its own: what is written there is never in the file."""
@@ -176,7 +178,7 @@ def _borrowed(folder: Path, place: str, identity: tuple[int, int]) -> File:
         Where that has ended.
     """
     found = File(folder, lent=True)
-    found.handle = Path(place).open("rb", buffering=0)
+    found.handle = Path(place).open("rb", buffering=0)  # noqa: SIM115 - closed with its last user
     if os.fstat(found.handle.fileno())[1:3] != identity:
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), place)
     return found

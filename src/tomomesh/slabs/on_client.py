@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 DIED = "KilledWorker"
 """Dask's name for what becomes of a task that has lost as many workers as it may."""
-OPENED = Path("/proc/self/fd")
-"""Where Linux lists what a process has open, for processes of the same user alone."""
 
 
 @dataclass(frozen=True)
@@ -67,11 +65,17 @@ class OnClient:
             Where the scheduler is gone.
         """
         try:
-            return list(_values(self.client.gather(list(kept))))
+            return list(_values(self._gathered(list(kept))))
         except TomomeshError:
             raise
         except Exception as fault:
             raise _explained(fault) from None
+
+    def _gathered(self, kept: list[Kept]) -> Any:
+        try:
+            return self.client.gather(kept)
+        except FileNotFoundError:  # a worker has died since it told where its arrays are: others make them again
+            return self.client.gather(kept)
 
     @cached_property
     def _beside(self) -> int:
@@ -83,13 +87,14 @@ class OnClient:
 
     @cached_property
     def _near(self) -> bool:
-        """Whether this process has started the workers, which then can open each other's files: none of them is sent."""
+        """Whether the workers are this process's own, and can open each other's files: then no array is sent."""
         cluster = getattr(self.client, "cluster", None)
-        if cluster is None or not OPENED.is_dir():
+        if cluster is None:
             return False
         from distributed import LocalCluster
 
-        return isinstance(cluster, LocalCluster)
+        worker = isinstance(cluster, LocalCluster) and self.client.submit(os.getpid, pure=False).result()
+        return bool(worker) and os.access(f"/proc/{worker}/cwd", os.R_OK)  # Linux asks for the same right as for files
 
 
 @dataclass(frozen=True)
