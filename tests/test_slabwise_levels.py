@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,8 +53,20 @@ class TestSources:
         mask = np.random.default_rng(seed).random((7, 6, 5)) < 0.5
         drawn = LazyVoxels.of(MaskVoxels(RunMask.of([mask])))
         np.testing.assert_array_equal(drawn[at].read(), mask[at].view(np.uint8))
+        for view, expected in (
+            (drawn[at], mask[at]),
+            (drawn[::-1].transpose((2, 0, 1)), mask[::-1].transpose(2, 0, 1)),
+        ):
+            sent = pickle.loads(pickle.dumps(view))
+            np.testing.assert_array_equal(sent.read(), expected)
+            np.testing.assert_array_equal(sent[1:].read(), expected[1:])
         made = Cutting(whole).of(drawn).made(numbered, np.int64).voxels
         np.testing.assert_array_equal(made[at].read(), np.indices(mask.shape).sum(axis=0)[at] + mask[at])
+
+    def test_no_more_of_a_mask_is_sent_than_is_viewed(self) -> None:
+        """Each worker would have all of it as often as it has slabs."""
+        drawn = LazyVoxels.of(MaskVoxels(RunMask.of([np.random.default_rng(0).random((64, 64, 64)) < 0.5])))
+        assert len(pickle.dumps(drawn[8:12])) < len(pickle.dumps(drawn)) / 12
 
 
 def numbered(levels: NDArray[Any], box: tuple[slice, ...]) -> NDArray[np.int64]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import mmap
+import os
 import tempfile
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
@@ -99,7 +101,9 @@ class _Far:
         return self.dtype.itemsize * int(np.prod(self.shape))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let other processes have the array itself."""
+        """Let other processes have the array itself, or its place in a file that is lent to them."""
+        if self.file.lent:
+            return _Far, (self.file, self.offset, self.dtype, self.shape)
         return _received, (self.mapped(),)
 
     def mapped(self) -> np.ndarray[Any, Any]:
@@ -109,10 +113,19 @@ class _Far:
 
 
 class File:
-    """A file without a name that arrays are put into one behind the other."""
+    """A file without a name that arrays are put into one behind the other.
 
-    def __init__(self, folder: Path) -> None:
+    Attributes
+    ----------
+    folder : path
+        Where it is.
+    lent : bool
+        Whether it is pickled as what other processes of this user on this machine may open, while it is open here.
+    """
+
+    def __init__(self, folder: Path, *, lent: bool = False) -> None:
         self.folder = folder
+        self.lent = lent
         self.end = 0
         self.handle: Any = None
 
@@ -120,6 +133,11 @@ class File:
         """Close the file with the last value that is kept in it; maps of it stay."""
         if self.handle is not None:
             self.handle.close()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let other processes open it: where its name would be there is nothing, so by the process that has it open."""
+        handle = self.handle.fileno()
+        return _borrowed, (self.folder, f"/proc/{os.getpid()}/fd/{handle}", os.fstat(handle)[1:3])
 
     def put(self, array: Any) -> Any:
         """Write an array; one that is small, and what is no array, stays as it is."""
@@ -162,6 +180,21 @@ def _received(array: np.ndarray[Any, Any]) -> Any:
         return File(Path(tempfile.gettempdir())).put(array)
     except OutputError as fault:
         return _Unkept(fault)
+
+
+def _borrowed(folder: Path, place: str, identity: tuple[int, int]) -> File:
+    """Open a file that another process has lent.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where that has ended.
+    """
+    found = File(folder, lent=True)
+    found.handle = Path(place).open("rb", buffering=0)  # noqa: SIM115 - closed with its last user
+    if os.fstat(found.handle.fileno())[1:3] != identity:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), place)
+    return found
 
 
 def put_away(value: Any, file: File) -> Any:

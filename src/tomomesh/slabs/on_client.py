@@ -68,16 +68,21 @@ class OnClient:
             Where the scheduler is gone.
         """
         try:
-            found = self.client.gather(list(kept))
+            return list(_values(self._gathered(list(kept))))
         except Exception as fault:
             failed = any(one.status == "error" for one in kept)
             raise (_of_work(fault) if failed else _gone()) from None
-        return list(_values(found))
 
     @cached_property
     def _done(self) -> Callable[..., _AtWorker]:
-        """What a worker is given: how many it works beside, and which version it must be of."""
-        return partial(_done, beside=self._beside, made_by=version("tomomesh"))
+        """What a worker is told: how many it works beside, who may open its files, and of which version it must be."""
+        return partial(_done, beside=self._beside, near=self._near, made_by=version("tomomesh"))
+
+    def _gathered(self, kept: list[Kept]) -> Any:
+        try:
+            return self.client.gather(kept)
+        except FileNotFoundError:  # a worker has died since it told where its arrays are: others make them again
+            return self.client.gather(kept)
 
     @cached_property
     def _beside(self) -> int:
@@ -86,6 +91,17 @@ class OnClient:
         for one in self.client.scheduler_info(n_workers=-1)["workers"].values():
             at_once[one["host"]] += one["nthreads"]
         return max(at_once.values(), default=1)
+
+    @cached_property
+    def _near(self) -> bool:
+        """Whether the workers are this process's own, and can open each other's files: then no array is sent."""
+        cluster = getattr(self.client, "cluster", None)
+        if cluster is None:
+            return False
+        from distributed import LocalCluster
+
+        worker = isinstance(cluster, LocalCluster) and self.client.submit(os.getpid, pure=False).result()
+        return bool(worker) and os.access(f"/proc/{worker}/cwd", os.R_OK)  # Linux asks for the same right as for files
 
 
 @dataclass(frozen=True)
@@ -106,12 +122,12 @@ def _values(kept: Any) -> Any:
     return mapped(kept.value, own=True) if isinstance(kept, _AtWorker) else kept
 
 
-def _done(work: Callable[..., Any], row: list[Any], *, beside: int, made_by: str) -> _AtWorker:
+def _done(work: Callable[..., Any], row: list[Any], *, beside: int, near: bool, made_by: str) -> _AtWorker:
     """Do a slab's work on a worker of the same version, with the cores that others on its machine leave to it."""
     if version("tomomesh") != made_by:
         raise ResourceError("a worker is of another version", found=version("tomomesh"), expected=f"tomomesh {made_by}")
     share_cores(max((os.cpu_count() or 1) // beside, 1))
-    return _AtWorker(put_away(work(*_values(row)), File(Path(tempfile.gettempdir()))))
+    return _AtWorker(put_away(work(*_values(row)), File(Path(tempfile.gettempdir()), lent=near)))
 
 
 def _of_work(fault: Exception) -> Exception:
