@@ -94,6 +94,19 @@ class TestSame:
             assert main([*line, *plain, *options, "-o", str(tmp_path / "slabs.ply")]) == 0
             assert (tmp_path / "slabs.ply").read_bytes() == (tmp_path / "whole.ply").read_bytes()
 
+    @pytest.mark.parametrize("way", ["contours", "voxels"])
+    def test_files_of_a_study_that_is_cut_off(self, way: str, tmp_path: Path) -> None:
+        """Of which faces are marked as filled, as far as its way has any."""
+        write_nifti(tmp_path / "a.nii", blobs(2), np.diag([-0.7, 0.8, 0.9, 1.0]))
+        line = ["reconstruct", str(tmp_path / "a.nii"), "--lower", "20", "--way", way, "--quiet"]
+        plain = ["--no-remesh", "--no-divide"]
+        assert main([*line, *plain, "-o", str(tmp_path / "whole.ply")]) == 0
+        whole = (tmp_path / "whole.ply").read_bytes()
+        assert (b"property uchar filled" in whole) == (way == "voxels")
+        for slab in ("1", "5", "30"):
+            assert main([*line, "--slab", slab, "-o", str(tmp_path / "slabs.ply")]) == 0
+            assert (tmp_path / "slabs.ply").read_bytes() == whole
+
     def test_files_that_weld(self, tmp_path: Path, folder: Path) -> None:
         write_nifti(tmp_path / "a.nii", blobs(1), np.eye(4))
         line = ["reconstruct", str(tmp_path / "a.nii"), "--lower", "20", "--way", "voxels", "--quiet", "--slab", "4"]

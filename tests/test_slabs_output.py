@@ -16,7 +16,7 @@ from tomomesh.io import write_pieces
 from tomomesh.measure.topology import topology
 from tomomesh.slabs.keep import InMemory
 from tomomesh.slabs.mesh import SlabMesh
-from tomomesh.slabs.patches.patch import patches_of
+from tomomesh.slabs.patches.patch import in_one_patch, patches_of
 from tomomesh.slabs.patches.promise import check_patches
 from tomomesh.slabs.patches.report import assess_patches
 
@@ -31,7 +31,9 @@ class TestOutput:
         self, tmp_path_factory: Any, study: Study, data: st.DataObject, seed: int
     ) -> None:
         folder: Path = tmp_path_factory.mktemp("m")
-        mesh, cavities = study.in_memory()[1].mesh, study.in_memory()[0].cavities
+        bounded, surface = study.in_memory()
+        mesh, cavities, cut_off = surface.mesh, bounded.cavities, surface.cut_off
+        fields = {"filled": cut_off} if cut_off.any() else None
         made = study.in_slabs(cuts_of(data, len(study.mask)), InMemory()).mesh
         found = patches_of(SlabMesh.of(made.pieces, Sent(seed)))
         whole = check_patches(found, cavities=cavities)
@@ -39,7 +41,10 @@ class TestOutput:
         assert assess_patches(found, whole, cavities=cavities) == wanted(mesh, cavities)
         for suffix in (".ply", ".stl", ".obj"):
             for name, one in (("whole", mesh), ("slabs", found)):
-                write_mesh(one, folder / f"{name}{suffix}")
+                write_mesh(one, folder / f"{name}{suffix}", face_fields=fields if one is mesh else None)
             assert (folder / f"whole{suffix}").read_bytes() == (folder / f"slabs{suffix}").read_bytes()
-        files = [write_pieces(one, folder / f"{name}.ply", 3) for name, one in (("whole", mesh), ("slabs", found))]
+        files = [
+            write_pieces(one, folder / f"{name}.ply", 3)
+            for name, one in (("whole", in_one_patch(mesh, cut_off)), ("slabs", found))
+        ]
         assert [path.read_bytes() for path in files[0][:3]] == [path.read_bytes() for path in files[1][:3]]

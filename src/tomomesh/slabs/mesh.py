@@ -31,12 +31,15 @@ class Piece:
         Two triangles a square.
     quarters : (2 c, 3) int64 array
         The other two of those that are split into four.
+    cut_off : (2 q + 2 c,) bool array
+        Which of these faces the study is cut off over.
     """
 
     vertices: NDArray[np.float64]
     centers: NDArray[np.float64]
     halves: NDArray[np.int64]
     quarters: NDArray[np.int64]
+    cut_off: NDArray[np.bool_]
 
     @property
     def counts(self) -> tuple[int, int, int, int]:

@@ -160,7 +160,7 @@ def surface_in_slabs(
     del found, cells  # they would take the disk
     thin = any(one.thin for one in told)
     state, rest, trace = Settling(net, regions, squares, thin, springs, settings, slabs, progress).reached()
-    mesh = _meshed(net, regions, squares, state, rest, asked.affine, slabs)
+    mesh = _meshed(net, regions, squares, state, rest, asked, slabs)
     added = sum(one.added for one in told)
     return SlabSurface(mesh, added, solid.count, cavities_in(solid), even, trace)
 
@@ -232,13 +232,13 @@ def _meshed(
     squares: list[tuple[Kept, ...]],
     state: list[Kept],
     rest: slice,
-    affine: NDArray[np.float64],
+    asked: Asked,
     slabs: Slabs,
 ) -> SlabMesh:
     """Split the squares into triangles, and give the centers their numbers."""
-    work = partial(chosen, rest=rest, affine=affine)
+    work = partial(chosen, rest=rest, affine=asked.affine)
     choice = slabs.each(work, net.places, regions, squares, net.exchanged(state))
     fours = np.array(told_by(slabs, choice), np.int64)
     first = (int(net.vertices[-1]) + np.cumsum(fours) - fours).tolist()
-    last = partial(piece, rest=rest, affine=affine)
+    last = partial(piece, rest=rest, affine=asked.affine, shape=tuple(asked.mask.shape))
     return SlabMesh.of(slabs.each(last, net.places, regions, squares, state, choice, first), slabs)
