@@ -18,8 +18,12 @@ from conftest import law, seeds
 from studies import write_nifti
 from tomomesh import Volume, read_mesh, reconstruct
 from tomomesh.cli import main
+from tomomesh.errors import UsageError
 from tomomesh.large import LargeSurface, reconstruct_large
+from tomomesh.segmentation.study import lay_out, select_in
+from tomomesh.settings import Settings
 from tomomesh.slabs import rest, surface
+from tomomesh.ways.choice import known_way, take_way
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -163,6 +167,17 @@ class TestWorkers:
         assert same(found, reconstruct(labels, select=(1,), remesh=False))
 
 
+@pytest.fixture
+def unread(monkeypatch: pytest.MonkeyPatch) -> Volume:
+    """Return a study of which nothing can be read."""
+
+    def read(*args: Any, **named: Any) -> None:
+        raise AssertionError("the study was read")
+
+    monkeypatch.setattr("tomomesh.large.lay_out", read)
+    return Volume.from_stored(blobs(0), np.eye(4))
+
+
 class TestFaults:
     @pytest.mark.parametrize(
         ("options", "code", "said"),
@@ -188,6 +203,43 @@ class TestFaults:
         (told,) = capsys.readouterr().err.splitlines()
         assert said in told
         assert not any(folder.iterdir())
+
+    @pytest.mark.parametrize(
+        "asked",
+        [
+            {"way": "voxels", "smooth": 2.0}, {"network": "none", "edge": 2.0}, {"contours": "loops", "edge": 2.0},
+            {"select": (1,), "target_faces": 100}, {"select": (1,), "neurons": 30, "hollow": 1.0},
+            {"space": "volume", "network": "grid"},
+        ],
+    )  # fmt: skip
+    def test_settings_are_refused_before_anything_is_read(self, asked: dict[str, Any], unread: Volume) -> None:
+        with pytest.raises(UsageError, match="whole mesh at once|has no faces"):
+            reconstruct_large(unread, slab=4, **asked)
+
+    @pytest.mark.parametrize("asked", [{"lower": 20.0, "smooth": 2.0}, {"way": "ring", "smooth": 2.0, "lower": 20.0}])
+    def test_settings_are_not_refused_that_the_window_may_allow(self, asked: dict[str, Any], unread: Volume) -> None:
+        with pytest.raises(AssertionError, match="read"):
+            reconstruct_large(unread, slab=4, **asked)
+
+    @pytest.mark.parametrize(
+        "asked", [{"select": (1,)}, {"select": (1,), "neurons": 30}, {"way": "ring", "lower": 0}, {"network": "sphere"}]
+    )
+    def test_what_settings_alone_tell_is_the_way_that_is_taken(self, asked: dict[str, Any]) -> None:
+        settings = Settings().replace(**asked)
+        study = lay_out(
+            Volume.from_stored((blobs(5) > 20).astype(np.uint8), np.eye(4)), None, settings, labelled="select" in asked
+        )
+        known = known_way(settings)
+        assert known is not None
+        assert known.way == take_way(select_in(study, settings).value, settings).value.network.way
+
+    def test_workers_are_not_waited_for_where_settings_are_refused(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))
+        line = ["reconstruct", str(tmp_path / "a.nii"), "--way", "voxels", "--smooth", "2", "--lower", "20"]
+        assert main([*line, "--scheduler", "tcp://127.0.0.1:1", "-o", str(tmp_path / "a.ply")]) == 2
+        assert "this needs the whole mesh at once" in capsys.readouterr().err
 
     def test_a_format_that_is_not_written_in_parts(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))
