@@ -26,10 +26,18 @@ from .slabs.place import HALO
 from .stage import folded
 from .ways.choice import known_way
 from .ways.in_slabs.contours import contours_in_slabs
-from .ways.in_slabs.voxels import checked_in_slabs, measured_in_slabs, mesh_in_slabs, require_slabs
+from .ways.in_slabs.voxels import (
+    checked_in_slabs,
+    followed_by,
+    followed_in_slabs,
+    measured_in_slabs,
+    mesh_in_slabs,
+    require_slabs,
+)
 
 if TYPE_CHECKING:
     from .begin import Begun
+    from .followed import Followed
     from .isosurface.run_mask import RunMask
     from .model.points import PointSet
     from .model.volume import Volume
@@ -142,10 +150,10 @@ def reconstruct_large(
     kept, cut = begun.kept, partial(_cuts_of, room=room)
     if begun.way.name == "voxels":
         made = mesh_in_slabs(kept, begun.taken, slabs, cut(kept.study, kept.chosen.runs), progress)
-        return _checked(begun, made, progress)
+        return _checked(begun, made, followed_by(made.value, kept.study.affine), progress)
     found = contours_in_slabs(kept, begun.taken, slabs, cut, progress)
-    surface, neurons = found.value
-    return replace(_checked(begun, folded(surface, found), progress), neurons=neurons)
+    surface, neurons, follows = found.value
+    return replace(_checked(begun, folded(surface, found), follows, progress), neurons=neurons)
 
 
 def require_large(settings: Settings) -> None:
@@ -187,13 +195,13 @@ def _cuts_of(volume: Volume, runs: RunMask, *, room: _Room) -> Cuts:
     return Cuts(_cuts(volume.shape, room=room, itemsize=each, runs=runs, chunk=chunk))
 
 
-def _checked(begun: Begun, made: Stage[Any], progress: Progress) -> LargeSurface:
-    """Check a surface in pieces across its seams; it is measured once the report is read."""
+def _checked(begun: Begun, made: Stage[Any], follows: Followed, progress: Progress) -> LargeSurface:
+    """Check a surface in pieces across its seams, and that it follows its window; the rest is measured later."""
     kept, study = begun.kept, begun.kept.study
     checked = checked_in_slabs(made.value, kept, progress)
     patches = checked.value[0]
-    later = partial(measured_in_slabs, *checked.value)
-    stages = (begun.told, made, checked, later)
+    near = followed_in_slabs(patches, follows, begun.taken)
+    stages = (begun.told, made, checked, near, partial(measured_in_slabs, *checked.value))
     return LargeSurface(patches, study, way=begun.way.name, settings=begun.settings, stages=stages)
 
 

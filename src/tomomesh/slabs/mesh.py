@@ -83,6 +83,11 @@ class SlabMesh:
         return np.asarray(before)
 
     @property
+    def squares(self) -> NDArray[np.int64]:
+        """How many squares lie before each piece, and in all, (s + 1,): each has two halves."""
+        return np.append(0, np.cumsum(self.counts[:, 2])) // 2
+
+    @property
     def vertex_count(self) -> int:
         """Vertices of the whole."""
         return int(self.counts[:, :2].sum())

@@ -28,6 +28,7 @@ from ..isosurface.settle import Springs
 from ..model.boxes import box_of
 from ..progress import Progress, silent
 from .contacts import AROUND, ROUNDS, cavities_in, filled, whole_of
+from .crossed import SlabCrossings, crossed
 from .cuts import Cuts
 from .frame import MaskFrame
 from .ground import bits_of, cells_from, ground, runs_of, sample, squares_from, told_of
@@ -106,6 +107,7 @@ class SlabSurface:
         Voxels that lie inside, and components of the others that the outside does not reach.
     stepped : bool
         Whether the levels are those of a mask.
+    crossings : SlabCrossings
     trace : Trace
         In voxels; the energies, `distance_mm`, `clamped` and `unattracted` are not measured.
     """
@@ -115,12 +117,13 @@ class SlabSurface:
     enclosed: int
     cavities: int
     stepped: bool
+    crossings: SlabCrossings
     trace: Trace
 
     @property
     def squares(self) -> int:
         """Faces between voxels, each of two halves."""
-        return int(self.mesh.counts[:, 2].sum()) // 2
+        return int(self.mesh.squares[-1])
 
 
 def surface_in_slabs(
@@ -162,7 +165,8 @@ def surface_in_slabs(
     state, rest, trace = Settling(net, regions, squares, thin, springs, settings, slabs, progress).reached()
     mesh = _meshed(net, regions, squares, state, rest, asked, slabs)
     added = sum(one.added for one in told)
-    return SlabSurface(mesh, added, solid.count, cavities_in(solid), even, trace)
+    crossings = SlabCrossings(slabs, slabs.each(crossed, net.places, regions, squares), mesh.squares)
+    return SlabSurface(mesh, added, solid.count, cavities_in(solid), even, crossings, trace)
 
 
 def _layers(cuts: Cuts, frame: MaskFrame) -> Cuts:

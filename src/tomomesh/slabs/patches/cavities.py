@@ -8,10 +8,9 @@ import numpy as np
 
 from ...measure.links import Links
 from ...measure.shape import unfolded
-from ...measure.tree import Tree
 from ...measure.winding import LiningFaces, places_before, winding_number
-from ...model.columns import for_kernels
 from ...model.mesh import TriMesh
+from .nearest import PatchTrees
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,12 +31,8 @@ def places_in(patches: Patches, whole: Gathered, cavities: int) -> Floats:
     """
     if not cavities:
         return np.empty((0, 3))
-    volumes, trees = unfolded(whole.table.volumes), patches.each(_tree)
-
-    def reach(places: Floats) -> Floats:
-        return np.asarray(np.min(patches.told(_reach, trees, [places]), axis=0))
-
-    found = places_before(_linings(patches, whole, volumes < 0), volumes, reach)
+    volumes = unfolded(whole.table.volumes)
+    found = places_before(_linings(patches, whole, volumes < 0), volumes, PatchTrees.of(patches).reach)
     if len(found) == cavities:
         return found
     return found[[abs(sum(patches.told(_around, [place]))) < 0.5 for place in found]]
@@ -64,17 +59,6 @@ def _lining(
     found = LiningFaces.of(_mesh(patch), Links(patch).face_pieces, inward[numbers])
     begin = np.where(found.numbers < patch.halves, first[0], first[1] - patch.halves)
     return found._replace(pieces=numbers[found.pieces], numbers=begin + found.numbers)
-
-
-def _tree(patch: MeshPatch) -> Tree | None:
-    return Tree.of_faces(_mesh(patch)) if len(patch.faces) else None
-
-
-def _reach(_patch: MeshPatch, tree: Tree | None, places: Floats) -> Floats:
-    if tree is None:
-        return np.full(len(places), np.inf)
-    simplices, boxes = for_kernels(tree.simplices, np.int32), for_kernels(tree.boxes, np.float64)  # as sent, read-only
-    return Tree(for_kernels(tree.vertices, np.float64), simplices, tree.order, boxes).nearest(places)[0]
 
 
 def _around(patch: MeshPatch, place: Floats) -> float:

@@ -111,9 +111,13 @@ class Patches:
 
     def carried(self, matrix: Floats) -> Patches:
         """Return the mesh in another frame, at positions times a matrix (4, 4); a mirror turns the faces over."""
-        kept, along = self.each(_carried, [matrix]), np.array(self.along) @ np.linalg.inv(matrix[:3, :3])
-        extent = _extent(self.slabs, kept, self.face_count)
-        return replace(self, kept=kept, extent=extent, along=tuple(along.tolist()))
+        along = np.array(self.along) @ np.linalg.inv(matrix[:3, :3])
+        return replace(self.moved(_carried, matrix), along=tuple(along.tolist()))
+
+    def moved(self, work: Callable[..., MeshPatch], given: Any) -> Patches:
+        """Return the mesh with what some work makes of each patch."""
+        kept = self.each(work, [given])
+        return replace(self, kept=kept, extent=_extent(self.slabs, kept, self.face_count))
 
     @property
     def face_count(self) -> int:
