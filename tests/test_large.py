@@ -19,6 +19,7 @@ from studies import write_nifti
 from tomomesh import Volume, read_mesh, reconstruct
 from tomomesh.cli import main
 from tomomesh.errors import UsageError
+from tomomesh.judgement import LIMITS, Limits
 from tomomesh.large import LargeSurface, reconstruct_large
 from tomomesh.segmentation.study import lay_out, select_in
 from tomomesh.settings import Settings
@@ -85,6 +86,14 @@ class TestSame:
         assert missing == {"per_component"}
         assert large["points"].items() <= whole["points"].items()
         assert large["slabs"] == {"count": 5}
+
+    @pytest.mark.parametrize("contours", ["loops", "components"])
+    def test_how_far_rings_are_from_their_window(self, contours: str) -> None:
+        study = Volume.from_stored(blobs(7), np.eye(4))
+        large = reconstruct_large(study, slab=6, lower=20, contours=contours, **MEMORY)
+        whole = reconstruct(study, lower=20, contours=contours, **MEMORY)
+        assert isinstance(large, LargeSurface)
+        assert large.report["quality"]["follows"] == whole.report["quality"]["follows"]
 
     @pytest.mark.parametrize("way", ["ring", "contours", "voxels"])
     def test_files_of_every_way_read_slab_by_slab(self, way: str, tmp_path: Path) -> None:
@@ -240,6 +249,17 @@ class TestFaults:
         line = ["reconstruct", str(tmp_path / "a.nii"), "--way", "voxels", "--smooth", "2", "--lower", "20"]
         assert main([*line, "--scheduler", "tcp://127.0.0.1:1", "-o", str(tmp_path / "a.ply")]) == 2
         assert "this needs the whole mesh at once" in capsys.readouterr().err
+
+    def test_a_mesh_that_is_far_from_its_window(
+        self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setitem(LIMITS, "voxels", Limits(1.0, 1e-9, 1e-9))
+        write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))
+        line = ["reconstruct", str(tmp_path / "a.nii"), "--way", "voxels", "--lower", "20", "--quiet", "--slab", "4"]
+        assert main([*line, "-o", str(folder / "a.ply")]) == 5
+        assert "the mesh does not follow its window" in capsys.readouterr().err
+        assert not any(folder.iterdir())
+        assert main([*line, "-o", str(folder / "a.ply"), "--allow-far"]) == 0
 
     def test_a_format_that_is_not_written_in_parts(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))

@@ -163,7 +163,8 @@ class Followed:
 
 def in_voxels(places: Floats, affine: Floats) -> Floats:
     """Return places in patient millimeters (n, 3) as indices."""
-    return carried(places - affine[:3, 3], np.linalg.inv(affine[:3, :3]).T, np.zeros(3))
+    turn = np.asarray(np.linalg.inv(affine[:3, :3]).T, np.float64)
+    return carried(places - affine[:3, 3], turn, np.zeros(3))
 
 
 def _distances(places: Floats | Places, samples: Floats, threads: int) -> Floats:

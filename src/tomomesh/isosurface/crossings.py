@@ -232,7 +232,7 @@ def kinds_of(added: NDArray[np.bool_], beyond: NDArray[np.bool_]) -> NDArray[np.
 def beyond_border(inner: NDArray[np.int32], steps: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """Tell which faces (q,) a volume of a shape (K, J, I) is cut off over: their neighbors outside lie beyond it."""
     outer, most = inner + steps, np.array(shape[2::-1], np.int32)
-    return any_of((outer < 0) | (outer >= most))
+    return any_of(np.asarray((outer < 0) | (outer >= most)))
 
 
 def crossings(

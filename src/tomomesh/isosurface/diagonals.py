@@ -147,7 +147,7 @@ def split(
     return halves.reshape(-1, 3), quarters[:, 2:].reshape(-1, 3)
 
 
-def of_triangles(values: NDArray[Any], fours: NDArray[np.int32]) -> NDArray[Any]:
+def of_triangles(values: NDArray[Any], fours: NDArray[np.integer[Any]]) -> NDArray[Any]:
     """Return for each triangle, halves before quarters, the value (q,) of its square; see `split` and `fours_of`."""
     return np.concatenate([np.repeat(values, 2), np.repeat(values[fours], 2)])
 

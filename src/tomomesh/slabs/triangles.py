@@ -57,5 +57,5 @@ def piece(
     centers = crossings_of(net, shares, start + fours)
     halves += shift
     beyond = beyond_border(net.inner[start:stop], steps_of(net.directions[start:stop]), shape)
-    places = (placed(indices, affine, threads) for indices in (*part.arrays[rest], centers))
-    return Piece(*places, halves, quarters + shift, of_triangles(beyond, fours))
+    vertices, middles = (placed(indices, affine, threads) for indices in (*part.arrays[rest], centers))
+    return Piece(vertices, middles, halves, quarters + shift, of_triangles(beyond, fours))

@@ -171,8 +171,7 @@ def ply_parts(mesh: Parts, path: str | Path, beside: MeshAttributes) -> Iterator
     at, on = ({name: _storable(values) for name, values in one.items()} for one in _fields(beside))
     vertices = _numbered((dict(zip(AXES, some.astype(kind).T, strict=True)) for some in mesh.vertices()), at)
     filled = mesh.filled()
-    faces = ({"count": _threes(some), "corners": some.astype(np.int32)} for some in mesh.faces())
-    faces = _numbered(_marked(faces, filled), on)
+    faces = _numbered(_marked(_corners(mesh), filled), on)
     lines = _element("vertex", mesh.vertex_count, {**dict.fromkeys(AXES, np.empty(0, kind)), **at})
     lines += [f"element face {mesh.face_count}", "property list uchar int vertex_indices"]
     lines += _properties({} if filled is None else {FILLED: np.empty(0, np.uint8)}) + _properties(on)
@@ -186,6 +185,10 @@ def _fields(beside: MeshAttributes) -> tuple[Fields, Fields]:
 
 def _threes(faces: NDArray[np.int64]) -> NDArray[np.uint8]:
     return np.full(len(faces), 3, np.uint8)
+
+
+def _corners(mesh: Parts) -> Iterator[Fields]:
+    return ({"count": _threes(some), "corners": some.astype(np.int32)} for some in mesh.faces())
 
 
 def _marked(parts: Iterator[Fields], filled: Iterator[NDArray[np.bool_]] | None) -> Iterator[Fields]:

@@ -85,8 +85,7 @@ def _between(patch: MeshPatch, lowest: Ints, start: int, stop: int) -> _Some:
     """Return the faces of a patch whose lowest vertex lies in a range."""
     some = (lowest >= start) & (lowest < stop)
     used = np.unique(patch.faces[some])
-    faces, cut_off = (
-        [values[part][some[part]] for part in (slice(patch.halves), slice(patch.halves, None))]
-        for values in (patch.faces, patch.cut_off)
-    )
-    return _Some([patch.numbers[one] for one in faces], cut_off, patch.numbers[used], patch.vertices[used])
+    parts = (slice(patch.halves), slice(patch.halves, None))
+    faces = [patch.numbers[patch.faces[part][some[part]]] for part in parts]
+    cut_off = [patch.cut_off[part][some[part]] for part in parts]
+    return _Some(faces, cut_off, patch.numbers[used], patch.vertices[used])
