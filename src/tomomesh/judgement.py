@@ -136,15 +136,15 @@ def follow(made: Surface, settings: Settings, *, finer: Surface | None = None) -
     if not found:
         return Stage(None)
     coarse = finer is not None and bool(_beyond(found, LIMITS[kind])) and not _is_far(finer, settings.run.threads)
-    return _held_to(kind, found, settings, coarse=coarse)
+    return _limited(kind, found, settings, coarse=coarse)
 
 
 def follow_apart(followed: Followed, apart: Apart, settings: Settings) -> Stage[None]:
     """Refuse a mesh of which it was measured how far it is from what it is to follow; see `follow`."""
-    return _held_to(followed.what, _keys(apart, followed.unit), settings)
+    return _limited(followed.what, _keys(apart, followed.unit), settings)
 
 
-def _held_to(kind: str, found: dict[str, float], settings: Settings, *, coarse: bool = False) -> Stage[None]:
+def _limited(kind: str, found: dict[str, float], settings: Settings, *, coarse: bool = False) -> Stage[None]:
     limits = LIMITS[kind]
     far, near = _beyond(found, limits), _beyond(found, limits.part(TOLD))
     what = "slices" if kind == "slices" else "window"

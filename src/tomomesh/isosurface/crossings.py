@@ -221,7 +221,7 @@ class LevelCrossings:
     @property
     def cut_off(self) -> NDArray[np.bool_]:
         """Which faces (q,) the volume is cut off over."""
-        return self.kinds == BORDER
+        return np.asarray(self.kinds == BORDER)
 
 
 def kinds_of(added: NDArray[np.bool_], beyond: NDArray[np.bool_]) -> NDArray[np.uint8]:
