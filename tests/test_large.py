@@ -17,8 +17,13 @@ from slab_studies import MEMORY, blobs, same
 from studies import write_nifti
 from tomomesh import Volume, large, read_mesh, reconstruct
 from tomomesh.cli import main
-from tomomesh.large import reconstruct_large
+from tomomesh.errors import UsageError
+from tomomesh.judgement import LIMITS, Limits
+from tomomesh.large import LargeSurface, reconstruct_large
 from tomomesh.memory.limit import free_disk
+from tomomesh.segmentation.study import lay_out, select_in
+from tomomesh.settings import Settings
+from tomomesh.ways.choice import known_way, take_way
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -55,9 +60,17 @@ class TestSame:
         quality = {name: value for name, value in large["quality"].items() if name != "per_component"}
         assert quality.items() <= whole["quality"].items()
         missing = {name for name in whole["quality"].keys() - quality.keys() if not name.startswith((*APART,))}
-        assert missing == {"per_component", "follows", "cavity_places_mm"}
+        assert missing == {"per_component"}
         assert large["points"].items() <= whole["points"].items()
         assert large["slabs"] == {"count": 5}
+
+    @pytest.mark.parametrize("contours", ["loops", "components"])
+    def test_how_far_rings_are_from_their_window(self, contours: str) -> None:
+        study = Volume.from_stored(blobs(7), np.eye(4))
+        large = reconstruct_large(study, slab=6, lower=20, contours=contours, **MEMORY)
+        whole = reconstruct(study, lower=20, contours=contours, **MEMORY)
+        assert isinstance(large, LargeSurface)
+        assert large.report["quality"]["follows"] == whole.report["quality"]["follows"]
 
     @pytest.mark.parametrize("way", ["ring", "contours", "voxels"])
     def test_files_of_every_way_read_slab_by_slab(self, way: str, tmp_path: Path) -> None:
@@ -71,6 +84,19 @@ class TestSame:
             assert main([*line, *plain, *options, "-o", str(tmp_path / "slabs.ply")]) == 0
             assert (tmp_path / "slabs.ply").read_bytes() == (tmp_path / "whole.ply").read_bytes()
 
+    @pytest.mark.parametrize("way", ["contours", "voxels"])
+    def test_files_of_a_study_that_is_cut_off(self, way: str, tmp_path: Path) -> None:
+        """Of which faces are marked as filled, as far as its way has any."""
+        write_nifti(tmp_path / "a.nii", blobs(2), np.diag([-0.7, 0.8, 0.9, 1.0]))
+        line = ["reconstruct", str(tmp_path / "a.nii"), "--lower", "20", "--way", way, "--quiet"]
+        plain = ["--no-remesh", "--no-divide"]
+        assert main([*line, *plain, "-o", str(tmp_path / "whole.ply")]) == 0
+        whole = (tmp_path / "whole.ply").read_bytes()
+        assert (b"property uchar filled" in whole) == (way == "voxels")
+        for slab in ("1", "5", "30"):
+            assert main([*line, "--slab", slab, "-o", str(tmp_path / "slabs.ply")]) == 0
+            assert (tmp_path / "slabs.ply").read_bytes() == whole
+
     def test_files_that_weld(self, tmp_path: Path, folder: Path) -> None:
         write_nifti(tmp_path / "a.nii", blobs(1), np.eye(4))
         line = ["reconstruct", str(tmp_path / "a.nii"), "--lower", "20", "--way", "voxels", "--quiet", "--slab", "4"]
@@ -83,6 +109,17 @@ class TestSame:
         assert len(np.unique(places, axis=0)) == len(whole.vertices)
         told = json.loads((folder / "r.json").read_text())["written"]["files"]
         assert told == ["part-001.ply", "part-002.ply", "part-003.ply", "part-pieces.json"]
+
+
+@pytest.fixture
+def unread(monkeypatch: pytest.MonkeyPatch) -> Volume:
+    """Return a study of which nothing can be read."""
+
+    def read(*args: Any, **named: Any) -> None:
+        raise AssertionError("the study was read")
+
+    monkeypatch.setattr("tomomesh.large.lay_out", read)
+    return Volume.from_stored(blobs(0), np.eye(4))
 
 
 class TestFaults:
@@ -110,6 +147,54 @@ class TestFaults:
         (told,) = capsys.readouterr().err.splitlines()
         assert said in told
         assert not any(folder.iterdir())
+
+    @pytest.mark.parametrize(
+        "asked",
+        [
+            {"way": "voxels", "smooth": 2.0}, {"network": "none", "edge": 2.0}, {"contours": "loops", "edge": 2.0},
+            {"select": (1,), "target_faces": 100}, {"select": (1,), "neurons": 30, "hollow": 1.0},
+            {"space": "volume", "network": "grid"},
+        ],
+    )  # fmt: skip
+    def test_settings_are_refused_before_anything_is_read(self, asked: dict[str, Any], unread: Volume) -> None:
+        with pytest.raises(UsageError, match=r"whole mesh at once|has no faces"):
+            reconstruct_large(unread, slab=4, **asked)
+
+    @pytest.mark.parametrize("asked", [{"lower": 20.0, "smooth": 2.0}, {"way": "ring", "smooth": 2.0, "lower": 20.0}])
+    def test_settings_are_not_refused_that_the_window_may_allow(self, asked: dict[str, Any], unread: Volume) -> None:
+        with pytest.raises(AssertionError, match="read"):
+            reconstruct_large(unread, slab=4, **asked)
+
+    @pytest.mark.parametrize(
+        "asked", [{"select": (1,)}, {"select": (1,), "neurons": 30}, {"way": "ring", "lower": 0}, {"network": "sphere"}]
+    )
+    def test_what_settings_alone_tell_is_the_way_that_is_taken(self, asked: dict[str, Any]) -> None:
+        settings = Settings().replace(**asked)
+        study = lay_out(
+            Volume.from_stored((blobs(5) > 20).astype(np.uint8), np.eye(4)), None, settings, labelled="select" in asked
+        )
+        known = known_way(settings)
+        assert known is not None
+        assert known.way == take_way(select_in(study, settings).value, settings).value.network.way
+
+    def test_workers_are_not_waited_for_where_settings_are_refused(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))
+        line = ["reconstruct", str(tmp_path / "a.nii"), "--way", "voxels", "--smooth", "2", "--lower", "20"]
+        assert main([*line, "--scheduler", "tcp://127.0.0.1:1", "-o", str(tmp_path / "a.ply")]) == 2
+        assert "this needs the whole mesh at once" in capsys.readouterr().err
+
+    def test_a_mesh_that_is_far_from_its_window(
+        self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setitem(LIMITS, "voxels", Limits(1.0, 1e-9, 1e-9))
+        write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))
+        line = ["reconstruct", str(tmp_path / "a.nii"), "--way", "voxels", "--lower", "20", "--quiet", "--slab", "4"]
+        assert main([*line, "-o", str(folder / "a.ply")]) == 5
+        assert "the mesh does not follow its window" in capsys.readouterr().err
+        assert not any(folder.iterdir())
+        assert main([*line, "-o", str(folder / "a.ply"), "--allow-far"]) == 0
 
     def test_a_format_that_is_not_written_in_parts(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))

@@ -224,8 +224,8 @@ class LevelCrossings:
     positions : (q, 3) float array
         As voxel indices (x, y, z).
     kinds : (q,) uint8 array
-        ``CROSSING`` where gray levels were interpolated, ``BORDER`` on the border of the volume, ``ADDED`` beside a
-        voxel that is not in the window.
+        ``CROSSING`` where gray levels were interpolated, ``BORDER`` on the border of the volume, ``ADDED`` elsewhere
+        beside a voxel that is not in the window.
     stepped : bool
         Whether the gray levels are those of a mask.
     bending : float
@@ -240,6 +240,22 @@ class LevelCrossings:
     stepped: bool
     bending: float = 0.0
     thin: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
+
+    @property
+    def cut_off(self) -> NDArray[np.bool_]:
+        """Which faces (q,) the volume is cut off over."""
+        return np.asarray(self.kinds == BORDER)
+
+
+def kinds_of(added: NDArray[np.bool_], beyond: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return what crossings are, by which lie beside a voxel that is not in the window, and which beyond the border."""
+    return np.where(beyond, BORDER, np.where(added, ADDED, CROSSING)).astype(np.uint8)
+
+
+def beyond_border(inner: NDArray[np.int32], steps: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Tell which faces (q,) a volume of a shape (K, J, I) is cut off over: their neighbors outside lie beyond it."""
+    outer, most = inner + steps, np.array(shape[2::-1], np.int32)
+    return any_of(np.asarray((outer < 0) | (outer >= most)))
 
 
 def crossings(
@@ -267,8 +283,7 @@ def crossings(
     """
     outer, even = inner + steps, thin is None and levels.stepped(inner, steps)
     share = np.full(len(inner), 0.5) if even else np.where(added, BARELY, levels.crossed(inner, outer, threads))
-    beyond = any_of(levels.nearest(outer) != outer)
-    kinds = np.where(added, ADDED, np.where(beyond, BORDER, CROSSING)).astype(np.uint8)
+    kinds = kinds_of(added, beyond_border(inner, steps, levels.voxels.shape))
     positions = inner + share[:, None] * steps
     if thin is None:
         return LevelCrossings(positions, kinds, even, EVENED if even else 0.0)

@@ -65,7 +65,7 @@ def surface_by_contours(found: Segmentation[Contours], settings: Settings, progr
         Where the rings enclose the middle of no pixel, or are on one slice alone.
     """
     run = settings.run
-    follows = measured("quality", _followed, found, run.threads)  # before there is a net, which takes as much
+    follows = measured("quality", followed_by, found, run.threads)  # before there is a net, which takes as much
     bounded = measured(
         "contours", boundary_of_rings, found, surface=settings.cubes.surface, threads=run.threads, progress=progress
     )
@@ -80,7 +80,7 @@ def surface_by_contours(found: Segmentation[Contours], settings: Settings, progr
     return folded(surface, bounded, meshed, follows, boundary_found(made, rest))
 
 
-def _followed(found: Segmentation[Contours], threads: int) -> Followed:
+def followed_by(found: Segmentation[Contours], threads: int) -> Followed:
     """Return what of the window the contours are to follow."""
     if found.source.kind != "components":
         return boundary_followed(found.runs, found.volume)
