@@ -25,6 +25,8 @@ DIED = "KilledWorker"
 """Dask's name for what becomes of a task that has lost as many workers as it may."""
 OWN = (TomomeshError, MemoryError, OSError)
 """What work raises on a worker that is raised here as it would be without one."""
+LOCAL = "distributed.deploy.local"
+"""Dask's module of what starts workers on its own machine."""
 
 
 @dataclass(frozen=True)
@@ -95,13 +97,10 @@ class OnClient:
     @cached_property
     def _near(self) -> bool:
         """Whether the workers are this process's own, and can open each other's files: then no array is sent."""
-        cluster = getattr(self.client, "cluster", None)
-        if cluster is None:
+        if type(getattr(self.client, "cluster", None)).__module__ != LOCAL:
             return False
-        from distributed import LocalCluster
-
-        worker = isinstance(cluster, LocalCluster) and self.client.submit(os.getpid, pure=False).result()
-        return bool(worker) and os.access(f"/proc/{worker}/cwd", os.R_OK)  # Linux asks for the same right as for files
+        worker = self.client.submit(os.getpid, pure=False).result()
+        return os.access(f"/proc/{worker}/cwd", os.R_OK)  # Linux asks for the same right as for files
 
 
 @dataclass(frozen=True)
