@@ -64,7 +64,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def within(cloud: PointSet, box: NDArray[np.float64]) -> NDArray[np.bool_]:
     low, high = box.reshape(3, 2).T
-    return np.all((cloud.positions >= low) & (cloud.positions <= high), axis=1)
+    return np.asarray(((cloud.positions >= low) & (cloud.positions <= high)).all(axis=1))
 
 
 def assert_is_part(found: PointSet, whole: PointSet, kept: NDArray[np.bool_]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,15 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conftest import COMPILED, law, seeds
+from conftest import law, seeds
 from slab_studies import MEMORY, blobs, same
 from studies import write_nifti
-from tomomesh import Volume, large, read_mesh, reconstruct
+from tomomesh import Volume, read_mesh, reconstruct
 from tomomesh.cli import main
 from tomomesh.errors import UsageError
 from tomomesh.judgement import LIMITS, Limits
 from tomomesh.large import LargeSurface, reconstruct_large
-from tomomesh.memory.limit import free_disk
 from tomomesh.segmentation.study import lay_out, select_in
 from tomomesh.settings import Settings
 from tomomesh.ways.choice import known_way, take_way
@@ -211,29 +209,6 @@ class TestFaults:
         (told,) = capsys.readouterr().err.splitlines()
         assert told.startswith("error: chunks of the array are missing")
         assert not any(folder.iterdir())
-
-    @pytest.mark.skipif(not COMPILED or sys.platform != "linux", reason="memory is limited on Linux, with kernels")
-    @pytest.mark.parametrize("fits", [True, False])
-    def test_a_network_a_slice_keeps_to_the_limit_where_its_mesh_does_not_fit(
-        self, monkeypatch: pytest.MonkeyPatch, fits: bool
-    ) -> None:
-        """The same bytes, and its arrays on the disk while its mesh and its report are made."""
-        asked: dict[str, Any] = {"way": "ring", "lower": 0, "remesh": False}
-        k, j, i = np.ogrid[-1:1:12j, -1:1:30j, -1:1:30j]
-        study = Volume.from_stored(np.round(100 * (0.8 - np.sqrt(k**2 + j**2 + i**2))).astype(np.int16), np.eye(4))
-        limited = set()
-
-        def progress(stage: str, done: int, total: int) -> None:
-            limited.add((stage, free_disk() is not None))
-
-        whole = reconstruct(study, **asked)
-        monkeypatch.setattr(large, "A_POINT", 0.0 if fits else 1e12)
-        found = reconstruct_large(study, memory=float(1 << 30), slab=4, progress=progress, **asked)
-        assert same(found, whole)
-        assert found.report["quality"] == whole.report["quality"]
-        assert ("networks", False) in limited
-        assert ("fit", not fits) in limited
-        assert ("fit", fits) not in limited
 
     def test_a_memory_that_holds_no_slab(self) -> None:
         """Which no mesh depends on is only how much of it there is."""

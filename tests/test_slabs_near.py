@@ -69,5 +69,5 @@ def test_levels_in_line_are_those_at_their_places(seed: int, kind: str, layers: 
     found = held.lines(inner, directions)
     assert found.shape == (count, 4, *(layers or (1,)))
     for n, times in enumerate(IN_LINE):
-        expected = Levels(held, 0.0, 1.0).at(inner + times * steps)  # type: ignore[arg-type]
+        expected = Levels(held, 0.0, 1.0).at(inner + times * steps)
         np.testing.assert_array_equal(found[:, n].astype(np.float64), expected)

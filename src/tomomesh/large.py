@@ -11,9 +11,9 @@ import numpy as np
 
 from .begin import begun_on, require_way, settled
 from .errors import ResourceError
-from .memory.limit import disk_folder, limit_here
+from .memory.limit import disk_folder
 from .model.mesh import TriMesh
-from .pipeline import made_within, segmented, surfaced
+from .pipeline import finished
 from .pointcloud.forecast import bytes_in_words, free_memory
 from .progress import Progress, silent
 from .report import Reported
@@ -54,9 +54,6 @@ A_VOXEL = 4.0
 2.5 of a ball of gray levels, and 215 to 250."""
 A_CELL = 300.0
 """Bytes for each vertex of a slab and its halo."""
-A_POINT = 800.0
-"""Bytes for each neuron and cap of a network a slice, of what is made around them. Measured: 780 of 230,000 on
-512 slices."""
 CELLS_A_RUN = 6.0
 """Vertices for each run of a mask: a run has two sides across its row, and faces are as many along other axes."""
 IN_SLABS = ("voxels", "contours")
@@ -113,8 +110,7 @@ def reconstruct_large(
     client : distributed.Client, optional
         Whose workers work on slabs side by side; without one, one slab follows the other here.
     memory : float, optional
-        Bytes that each process may take, by default what is free over the processes; slabs are as thick as it holds,
-        and where a network a slice is taken, large arrays of its mesh lie on the disk (Linux, 400 MiB or more).
+        Bytes that each process may take, by default what is free over the processes; slabs are as thick as it holds.
     slab : int, optional
         Slices of a slab, in place of that.
     progress : callable
@@ -125,7 +121,7 @@ def reconstruct_large(
     -------
     LargeSurface, or Surface
         The latter where a network a slice is taken, whose neurons and mesh fit into the memory where the study does
-        not; it is that of `tomomesh.pipeline.reconstruct_once`.
+        not.
 
     Raises
     ------
@@ -149,7 +145,7 @@ def reconstruct_large(
     study = lay_out(volume, labels, settings, labelled=settings.window.select is not None, cutting=cutting)
     begun = begun_on(study, settings, changes, progress)
     if begun.way.name not in IN_SLABS:
-        return _of_networks(begun, memory, progress)
+        return finished(begun, progress)
     require_slabs(begun.taken)
     kept, cut = begun.kept, partial(_cuts_of, room=room)
     if begun.way.name == "voxels":
@@ -171,18 +167,6 @@ def require_large(settings: Settings) -> None:
     known = known_way(settings)
     if known is not None and known.way in IN_SLABS:
         require_slabs(settings)
-
-
-def limit_for(memory: float | None, points: PointSet) -> float | None:
-    """Return the limit within which a mesh is made around the neurons of a network a slice; None where it fits."""
-    return limit_here(memory) if memory and BASE + A_POINT * len(points) > memory else None
-
-
-def _of_networks(begun: Begun, memory: float | None, progress: Progress) -> Surface:
-    """Take a study with a network a slice to a surface, whose large arrays lie on the disk where it does not fit."""
-    found = segmented(begun, progress)
-    limit = limit_for(memory, found.points)
-    return made_within(limit, lambda: surfaced(found, begun.way, begun.taken, begun.settings, progress, kept=False))
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from .segmentation.study import LaidOut
     from .settings import Settings
     from .stage import Later
-    from .ways.way import Way
 
 
 def reconstruct(
@@ -124,7 +123,7 @@ def segment(
     settings = settled(settings, changes)
     progress("window", 0, 2)
     study = lay_out(volume, labels, settings, labelled=settings.window.select is not None)
-    return segmented(begun_on(study, settings, changes, progress), progress)
+    return _segmented(begun_on(study, settings, changes, progress), progress)
 
 
 def reconstruct_points(
@@ -164,13 +163,8 @@ def reconstruct_points(
     1.0
     """
     settings = settled(settings, changes)
-    return made_within(memory, lambda: _of_points(points, settings, changes, progress))
-
-
-def made_within(memory: str | float | None, make: Callable[[], Surface]) -> Surface:
-    """Make a surface, and later its report, within a limit of memory if there is one; see `memory_limit`."""
     with memory_limit(memory):
-        made = make()
+        made = _of_points(points, settings, changes, progress)
     if memory is None:
         return made
     stages = (one if isinstance(one, Stage) else partial(_limited, memory, one) for one in made.stages)
@@ -223,17 +217,9 @@ def reconstructed(
 def finished(begun: Begun, progress: Progress, *, truth: TriMesh | None = None, kept: bool = True) -> Surface:
     """Take a study whose way is known to a surface; see `reconstructed`."""
     way, settings, taken = begun.way, begun.settings, begun.taken
-    found = segmented(begun, progress)
+    found = _segmented(begun, progress)
     del begun
     found = found if kept else found.without_voxels()
-    return surfaced(found, way, taken, settings, progress, truth=truth, kept=kept)
-
-
-def surfaced(
-    found: Segmentation[Any], way: Way, taken: Settings, settings: Settings, progress: Progress,
-    *, truth: TriMesh | None = None, kept: bool = True,
-) -> Surface:  # fmt: skip
-    """Take a study after stage one to a surface; see `reconstructed`."""
     give_back()
     made = way.surface(found, taken, progress)
     surface, told = made.value if kept else made.value.bare(), folded(None, made)
@@ -249,7 +235,7 @@ def _laid_out(volume: Volume, labels: Volume | None, settings: Settings, progres
     return laid_out(volume, labels, settings, progress, labelled=settings.window.select is not None)
 
 
-def segmented(begun: Begun, progress: Progress) -> Segmentation[Any]:
+def _segmented(begun: Begun, progress: Progress) -> Segmentation[Any]:
     """Run stage one."""
     way = begun.way
     assert way.segment is not None

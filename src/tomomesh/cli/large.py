@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import io
 from ..errors import UsageError
-from ..memory.limit import bytes_of, memory_limit
+from ..memory.limit import bytes_of
 from ..settings import option_of
 from ..stage import Stage
 from .bars import bars_of
@@ -49,7 +49,7 @@ def reconstruct_in_slabs(chosen: Namespace, settings: Settings, given: Mapping[s
     TomomeshError
     """
     _check(chosen, settings)
-    from ..large import LargeSurface, limit_for, reconstruct_large, require_large
+    from ..large import LargeSurface, reconstruct_large, require_large
 
     require_large(settings)
     memory = None if chosen.memory is None else bytes_of(chosen.memory)
@@ -60,8 +60,7 @@ def reconstruct_in_slabs(chosen: Namespace, settings: Settings, given: Mapping[s
         )
         if isinstance(found, LargeSurface):
             return _write(chosen, found, settings, progress)
-        with memory_limit(limit_for(memory, found.points)):
-            return write_surface(chosen, found, settings, progress)
+        return write_surface(chosen, found, settings, progress)
 
 
 def _check(chosen: Namespace, settings: Settings) -> None:

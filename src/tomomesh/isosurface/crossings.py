@@ -73,9 +73,9 @@ class Stretch:
             From each to its neighbor outside.
         threads : int
         """
-        sizes = (np.array(one[2::-1], np.int64) for one in (self.low, self.stored.shape, self.shape))
+        low, held, whole = (np.array(one[2::-1], np.int64) for one in (self.low, self.stored.shape, self.shape))
         places, beyond = np.empty((3, len(inner), 4), np.int64), np.empty((len(inner), 4), np.bool_)
-        work = partial(list_lines, inner, directions, *sizes, places, beyond)
+        work = partial(list_lines, inner, directions, low, held, whole, places, beyond)
         in_blocks(work, len(inner), block=BLOCK, threads=threads)
         holds_nan = np.promote_types(self.stored.dtype, np.float16)
         layers = self.stored.shape[3:] or (1,)

@@ -105,12 +105,6 @@ def memory_limit(limit: str | float | None) -> Iterator[None]:
         raise _full(folder, made.fault) from None
 
 
-def limit_here(limit: float | None) -> float | None:
-    """Return a limit that `memory_limit` can keep here; None where it cannot, or there is none."""
-    kept = limit is not None and limit >= LEAST and COMPILED and sys.platform.startswith("linux")
-    return limit if kept else None
-
-
 def free_disk() -> float | None:
     """Return how many bytes more may lie on the disk, where the memory is limited here; else None."""
     folder = _folder.get()

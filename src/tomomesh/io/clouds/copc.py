@@ -124,4 +124,5 @@ def _meets(nodes: NDArray[Any], info: Any, header: Any, box: Box) -> NDArray[np.
     """Tell which nodes' cubes meet a box that is a step larger: coordinates are rounded to steps."""
     sides = np.ldexp(2 * info.halfsize, -nodes["level"])[:, None]
     low = info.center - info.halfsize + nodes["place"] * sides - header.scales
-    return np.all((low <= box[1::2]) & (box[::2] <= low + sides + 2 * header.scales), axis=1)
+    meets = (low <= box[1::2]) & (box[::2] <= low + sides + 2 * header.scales)
+    return np.asarray(meets.all(axis=1))
