@@ -6,6 +6,8 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..files.extras import required
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
@@ -62,9 +64,7 @@ def unpacked(path: Path, header: Any, nodes: NDArray[Any], *, at_once: int) -> I
     ------
     laspy.ScaleAwarePointRecord
     """
-    import laspy
-    import lazrs
-
+    laspy, lazrs = (required(package, file=str(path)) for package in ("laspy", "lazrs"))
     parts = np.cumsum(nodes["count"], dtype=np.int64) // at_once
     record, fields = header.vlrs.get("LasZipVlr")[0].record_data, laspy.DecompressionSelection.all().to_lazrs()
     with path.open("rb") as file:
@@ -124,5 +124,4 @@ def _meets(nodes: NDArray[Any], info: Any, header: Any, box: Box) -> NDArray[np.
     """Tell which nodes' cubes meet a box that is a step larger: coordinates are rounded to steps."""
     sides = np.ldexp(2 * info.halfsize, -nodes["level"])[:, None]
     low = info.center - info.halfsize + nodes["place"] * sides - header.scales
-    meets = (low <= box[1::2]) & (box[::2] <= low + sides + 2 * header.scales)
-    return np.asarray(meets.all(axis=1))
+    return np.asarray(np.all((low <= box[1::2]) & (box[::2] <= low + sides + 2 * header.scales), axis=1))
