@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import threading
+import time
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
@@ -76,9 +77,11 @@ class Arrays:
         places, state = _places(), self._state
         watcher = threading.Thread(target=self._watch, args=(state.ctypes.data,), daemon=True)
         with Path("/proc/self/statm").open("rb", buffering=0) as statm:
-            state[[places.FULL, places.LOOK, places.DONE]] = full // places.PAGE, LOOK_US, 0
+            state[[places.FULL, places.LOOK, places.DONE]] = full // places.PAGE, LOOK_US, 1
             state[places.STATM] = statm.fileno()
             watcher.start()
+            while state[places.DONE]:  # else a call that holds the interpreter's lock could keep it from beginning
+                time.sleep(LOOK_US / 1e6)
             try:
                 yield
             finally:

@@ -26,7 +26,7 @@ FULL = 0.8
 """Share of the limit from which pages are let go of. The rest is for what comes before that is seen, which is late
 where all cores are busy: at ten million points within 1 GiB 260 MiB came once, and the peak was 1,102 MiB with .95,
 beside eight other processes; with .75 it was 945 MiB beside fourteen, but a million within 500 MiB took a tenth more
-time than with .8."""
+time than with .8, which peaked at 1,442 MiB beside twenty to twenty-seven: there no share would do."""
 LEAST = 400 << 20
 """Smallest limit: Python, NumPy, SciPy and Numba take half of it."""
 UNITS = {"": 1, **{f"{k}{b}": (1024 if b else 1000) ** n for n, k in enumerate("KMGT", 1) for b in ("", "I")}}

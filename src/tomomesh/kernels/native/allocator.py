@@ -131,6 +131,7 @@ def leave(state: Any, more: int) -> None:
 @_compiled
 def watch(state: Any) -> None:
     """Let pages go whenever there are too many, until that is over, and once more."""
+    state[DONE] = 0
     while state[DONE] == 0:
         leave(state, 0)
         usleep(state[LOOK])
