@@ -36,6 +36,9 @@ AGAIN = 1
 LOGGERS = ("distributed", "distributed.client", "tornado", "tornado.application")
 """Those that Dask gives handlers of their own."""
 
+QUIET = logging.NullHandler()
+"""With it a logger prints nothing by itself, and whoever listens to logs hears it as before."""
+
 UNWATCHED = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
@@ -242,6 +245,7 @@ def _configured(threads: int, folder: Path) -> Iterator[None]:
 @contextmanager
 def _unheard() -> Iterator[None]:
     """Keep what Dask logs from stderr: what matters of it is told in our own words."""
+    logging.getLogger("asyncio").addHandler(QUIET)  # for good: of what an interrupt leaves it tells when that is freed
     handlers = [handler for name in LOGGERS for handler in logging.getLogger(name).handlers]
     before = [handler.level for handler in handlers]
     for handler in handlers:

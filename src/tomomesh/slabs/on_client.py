@@ -70,10 +70,11 @@ class OnClient:
             Where the scheduler is gone.
         """
         try:
-            return list(_values(self._gathered(list(kept))))
+            found = self._gathered(list(kept))
         except Exception as fault:
             failed = any(one.status == "error" for one in kept)
             raise (_of_work(fault) if failed else _gone()) from None
+        return list(_values(found))
 
     @cached_property
     def _done(self) -> Callable[..., _AtWorker]:
