@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
+import os
+import subprocess
+import sys
 import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
 
 from tomomesh.cli import main
 
@@ -66,3 +70,35 @@ def until(true: Callable[[], Any]) -> None:
             return
         time.sleep(0.05)
     raise AssertionError("it did not come about")
+
+
+def children_of(process: subprocess.Popen[str]) -> list[Any]:
+    """Return a process's children, and theirs."""
+    psutil = pytest.importorskip("psutil", reason="it comes with distributed")
+    return list(psutil.Process(process.pid).children(recursive=True))
+
+
+class SchedulerAndWorker:
+    """A scheduler, and a worker of its own unless none is wanted, in processes that can be killed."""
+
+    def __init__(self, folder: Path, *, worker: bool = True) -> None:
+        self._file, self._env = folder / "scheduler.json", {**os.environ, "TMPDIR": str(folder)}
+        common = ["--scheduler-file", str(self._file), "--no-dashboard"]
+        self._lines = (
+            ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", *common],
+            ["distributed.cli.dask_worker", "--host", "127.0.0.1", "--nthreads", "1", "--no-nanny", *common],
+        )[: 1 + worker]  # fmt: skip
+
+    def __enter__(self) -> tuple[subprocess.Popen[bytes], Path]:
+        self._processes = []
+        for module, *options in self._lines:
+            line = [sys.executable, "-m", module, *options]
+            nowhere = subprocess.DEVNULL
+            self._processes.append(subprocess.Popen(line, env=self._env, stdout=nowhere, stderr=nowhere))
+            until(self._file.exists)
+        return self._processes[0], self._file
+
+    def __exit__(self, *fault: object) -> None:
+        for process in self._processes:
+            process.kill()
+            process.wait()

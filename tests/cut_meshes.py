@@ -14,8 +14,17 @@ from tomomesh.slabs.mesh import Piece, SlabMesh
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from numpy.typing import NDArray
+
     from tomomesh import TriMesh
     from tomomesh.slabs.keep import Kept, Slabs
+
+
+def cut_off_in(mesh: SlabMesh) -> NDArray[np.bool_]:
+    """Return over which faces (m,) of the whole the study is cut off."""
+    ends = [len(one.halves) for one in mesh]
+    halves = [one.cut_off[:end] for one, end in zip(mesh, ends, strict=True)]
+    return np.concatenate([*halves, *(one.cut_off[end:] for one, end in zip(mesh, ends, strict=True))])
 
 
 def cut(
@@ -25,10 +34,12 @@ def cut(
     quarters: int = 0,
     seed: int | None = None,
     slabs: Slabs | None = None,
+    cut_off: NDArray[np.bool_] | None = None,
 ) -> SlabMesh:
     """Cut a mesh before some of its vertices; a face goes to the piece of its lowest vertex, or to any by a seed.
 
-    The last `centers` vertices are centers, which are shared out evenly, and the last `quarters` faces quarters.
+    The last `centers` vertices are centers, which are shared out evenly, and the last `quarters` faces quarters. The
+    study is cut off over some of the faces (m,), or none.
     """
     own, halves = len(mesh.vertices) - centers, len(mesh.faces) - quarters
     ends = np.array([0, *sorted(min(one, own) for one in at), own])
@@ -37,10 +48,12 @@ def cut(
     if seed is not None:
         piece = np.random.default_rng(seed).integers(len(ends) - 1, size=len(piece))
     half = np.arange(len(mesh.faces)) < halves
+    marks = np.zeros(len(mesh.faces), np.bool_) if cut_off is None else cut_off
     pieces = [
         Piece(
             mesh.vertices[ends[n] : ends[n + 1]], mesh.vertices[middle[n] : middle[n + 1]],
             mesh.faces[half & (piece == n)], mesh.faces[~half & (piece == n)],
+            np.concatenate([marks[some & (piece == n)] for some in (half, ~half)]),
         )
         for n in range(len(ends) - 1)
     ]  # fmt: skip

@@ -1,12 +1,9 @@
-"""Studies slab by slab: the bytes, the report and the errors of the run in memory, here and on workers."""
+"""Studies slab by slab: the bytes, the report and the errors of the run in memory."""
 
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import signal
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,40 +12,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds
+from slab_studies import MEMORY, blobs, same
 from studies import write_nifti
 from tomomesh import Volume, read_mesh, reconstruct
 from tomomesh.cli import main
+from tomomesh.errors import UsageError
+from tomomesh.judgement import LIMITS, Limits
 from tomomesh.large import LargeSurface, reconstruct_large
-from tomomesh.slabs import rest, surface
+from tomomesh.segmentation.study import lay_out, select_in
+from tomomesh.settings import Settings
+from tomomesh.ways.choice import known_way, take_way
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
-    from tomomesh.results import Surface
-
-MEMORY: dict[str, Any] = {"remesh": False, "divide": False}
-"""What the run in memory leaves out for the same bytes."""
 LEFT_OUT = {"timings", "settings", "versions", "written", "slabs"}
 APART = {"points_to_surface", "vertices_to_points"}
 """What is not measured of a mesh that is never whole begins with one of these."""
-
-
-def blobs(seed: int, shape: tuple[int, int, int] = (22, 16, 18)) -> NDArray[np.int16]:
-    """Return smooth noise on background."""
-    levels = np.random.default_rng(seed).normal(size=shape)
-    for axis in range(3):
-        levels = levels + np.roll(levels, 1, axis) + np.roll(levels, -1, axis)
-    return np.round(40 * levels).astype(np.int16)
-
-
-def same(large: LargeSurface | Surface, whole: Surface) -> bool:
-    mesh = large.joined() if isinstance(large, LargeSurface) else large.mesh
-    return (mesh.vertices.tobytes(), mesh.faces.tobytes()) == (
-        whole.mesh.vertices.tobytes(),
-        whole.mesh.faces.tobytes(),
-    )
 
 
 class TestSame:
@@ -78,9 +58,17 @@ class TestSame:
         quality = {name: value for name, value in large["quality"].items() if name != "per_component"}
         assert quality.items() <= whole["quality"].items()
         missing = {name for name in whole["quality"].keys() - quality.keys() if not name.startswith((*APART,))}
-        assert missing == {"per_component", "follows", "cavity_places_mm"}
+        assert missing == {"per_component"}
         assert large["points"].items() <= whole["points"].items()
         assert large["slabs"] == {"count": 5}
+
+    @pytest.mark.parametrize("contours", ["loops", "components"])
+    def test_how_far_rings_are_from_their_window(self, contours: str) -> None:
+        study = Volume.from_stored(blobs(7), np.eye(4))
+        large = reconstruct_large(study, slab=6, lower=20, contours=contours, **MEMORY)
+        whole = reconstruct(study, lower=20, contours=contours, **MEMORY)
+        assert isinstance(large, LargeSurface)
+        assert large.report["quality"]["follows"] == whole.report["quality"]["follows"]
 
     @pytest.mark.parametrize("way", ["ring", "contours", "voxels"])
     def test_files_of_every_way_read_slab_by_slab(self, way: str, tmp_path: Path) -> None:
@@ -93,6 +81,19 @@ class TestSame:
         for options in (["--slab", "5"], ["--memory", "1GB"]):
             assert main([*line, *plain, *options, "-o", str(tmp_path / "slabs.ply")]) == 0
             assert (tmp_path / "slabs.ply").read_bytes() == (tmp_path / "whole.ply").read_bytes()
+
+    @pytest.mark.parametrize("way", ["contours", "voxels"])
+    def test_files_of_a_study_that_is_cut_off(self, way: str, tmp_path: Path) -> None:
+        """Of which faces are marked as filled, as far as its way has any."""
+        write_nifti(tmp_path / "a.nii", blobs(2), np.diag([-0.7, 0.8, 0.9, 1.0]))
+        line = ["reconstruct", str(tmp_path / "a.nii"), "--lower", "20", "--way", way, "--quiet"]
+        plain = ["--no-remesh", "--no-divide"]
+        assert main([*line, *plain, "-o", str(tmp_path / "whole.ply")]) == 0
+        whole = (tmp_path / "whole.ply").read_bytes()
+        assert (b"property uchar filled" in whole) == (way == "voxels")
+        for slab in ("1", "5", "30"):
+            assert main([*line, "--slab", slab, "-o", str(tmp_path / "slabs.ply")]) == 0
+            assert (tmp_path / "slabs.ply").read_bytes() == whole
 
     def test_files_that_weld(self, tmp_path: Path, folder: Path) -> None:
         write_nifti(tmp_path / "a.nii", blobs(1), np.eye(4))
@@ -108,46 +109,15 @@ class TestSame:
         assert told == ["part-001.ply", "part-002.ply", "part-003.ply", "part-pieces.json"]
 
 
-STAGES = [
-    *((surface, name) for name in ("ground", "squares_from", "region", "chosen", "piece")),
-    *((rest, name) for name in ("begun", "returned", "stepped")),
-]
-"""What is done to a slab, by the function that does it and the module that asks for it."""
+@pytest.fixture
+def unread(monkeypatch: pytest.MonkeyPatch) -> Volume:
+    """Return a study of which nothing can be read."""
 
+    def read(*args: Any, **named: Any) -> None:
+        raise AssertionError("the study was read")
 
-def killed_once(*given: Any, work: Any, marker: Path, **named: Any) -> Any:
-    if not marker.exists():
-        marker.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return work(*given, **named)
-
-
-class TestWorkers:
-    @pytest.fixture
-    def study(self, tmp_path: Path) -> Path:
-        write_nifti(tmp_path / "labels.nii", np.pad((blobs(5) > 20).astype(np.uint8), 1), np.eye(4))
-        return tmp_path / "labels.nii"
-
-    def line(self, study: Path, name: str) -> list[str]:
-        return ["reconstruct", str(study), "--select", "1", "--quiet", "-o", str(study.parent / name)]
-
-    def test_the_same_bytes(self, study: Path, here: Any) -> None:
-        on = ["--scheduler", here.scheduler_address, "--slab", "6"]
-        assert main([*self.line(study, "workers.ply"), *on]) == 0
-        assert main([*self.line(study, "whole.ply"), "--no-remesh"]) == 0
-        assert (study.parent / "workers.ply").read_bytes() == (study.parent / "whole.ply").read_bytes()
-
-    @pytest.mark.parametrize(("module", "stage"), STAGES)
-    def test_a_worker_killed_in_any_stage(
-        self, module: Any, stage: str, study: Path, here: Any, client: Any, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        marker = study.parent / "marker"
-        monkeypatch.setattr(module, stage, partial(killed_once, work=getattr(module, stage), marker=marker))
-        monkeypatch.setattr(here.scheduler, "allowed_failures", 1)
-        labels = Volume.from_stored((blobs(5) > 20).astype(np.uint8), np.eye(4))
-        found = reconstruct_large(labels, client=client, slab=6, select=(1,))
-        assert marker.exists()
-        assert same(found, reconstruct(labels, select=(1,), remesh=False))
+    monkeypatch.setattr("tomomesh.large.lay_out", read)
+    return Volume.from_stored(blobs(0), np.eye(4))
 
 
 class TestFaults:
@@ -175,6 +145,54 @@ class TestFaults:
         (told,) = capsys.readouterr().err.splitlines()
         assert said in told
         assert not any(folder.iterdir())
+
+    @pytest.mark.parametrize(
+        "asked",
+        [
+            {"way": "voxels", "smooth": 2.0}, {"network": "none", "edge": 2.0}, {"contours": "loops", "edge": 2.0},
+            {"select": (1,), "target_faces": 100}, {"select": (1,), "neurons": 30, "hollow": 1.0},
+            {"space": "volume", "network": "grid"},
+        ],
+    )  # fmt: skip
+    def test_settings_are_refused_before_anything_is_read(self, asked: dict[str, Any], unread: Volume) -> None:
+        with pytest.raises(UsageError, match=r"whole mesh at once|has no faces"):
+            reconstruct_large(unread, slab=4, **asked)
+
+    @pytest.mark.parametrize("asked", [{"lower": 20.0, "smooth": 2.0}, {"way": "ring", "smooth": 2.0, "lower": 20.0}])
+    def test_settings_are_not_refused_that_the_window_may_allow(self, asked: dict[str, Any], unread: Volume) -> None:
+        with pytest.raises(AssertionError, match="read"):
+            reconstruct_large(unread, slab=4, **asked)
+
+    @pytest.mark.parametrize(
+        "asked", [{"select": (1,)}, {"select": (1,), "neurons": 30}, {"way": "ring", "lower": 0}, {"network": "sphere"}]
+    )
+    def test_what_settings_alone_tell_is_the_way_that_is_taken(self, asked: dict[str, Any]) -> None:
+        settings = Settings().replace(**asked)
+        study = lay_out(
+            Volume.from_stored((blobs(5) > 20).astype(np.uint8), np.eye(4)), None, settings, labelled="select" in asked
+        )
+        known = known_way(settings)
+        assert known is not None
+        assert known.way == take_way(select_in(study, settings).value, settings).value.network.way
+
+    def test_workers_are_not_waited_for_where_settings_are_refused(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))
+        line = ["reconstruct", str(tmp_path / "a.nii"), "--way", "voxels", "--smooth", "2", "--lower", "20"]
+        assert main([*line, "--scheduler", "tcp://127.0.0.1:1", "-o", str(tmp_path / "a.ply")]) == 2
+        assert "this needs the whole mesh at once" in capsys.readouterr().err
+
+    def test_a_mesh_that_is_far_from_its_window(
+        self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setitem(LIMITS, "voxels", Limits(1.0, 1e-9, 1e-9))
+        write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))
+        line = ["reconstruct", str(tmp_path / "a.nii"), "--way", "voxels", "--lower", "20", "--quiet", "--slab", "4"]
+        assert main([*line, "-o", str(folder / "a.ply")]) == 5
+        assert "the mesh does not follow its window" in capsys.readouterr().err
+        assert not any(folder.iterdir())
+        assert main([*line, "-o", str(folder / "a.ply"), "--allow-far"]) == 0
 
     def test_a_format_that_is_not_written_in_parts(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         write_nifti(tmp_path / "a.nii", blobs(0), np.eye(4))

@@ -113,6 +113,12 @@ class TestOption:
         """Nor one that only shares letters with it, as --json with --iso."""
         assert said(f"surface a.xyz -o m.stl {option}", 2, capsys).endswith("Try: `tomomesh surface --help`.")
 
+    @pytest.mark.parametrize("option", ["--workers 2", "--scheduler=tcp://127.0.0.1:1", "--slab 5"])
+    def test_of_large_studies_has_another_for_clouds(self, option: str, capsys: pytest.CaptureFixture[str]) -> None:
+        told = said(f"surface a.las -o m.stl {option}", 2, capsys)
+        assert told.endswith("Try: --memory SIZE, as 4GB: one process takes the cloud.")
+        assert said(f"check m.stl {option}", 2, capsys).endswith("Try: `tomomesh check --help`.")
+
     @pytest.mark.parametrize(
         ("line", "hint"),
         [

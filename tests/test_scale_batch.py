@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from batches import OPTIONS, as_alone, ball, batch, codes, results, table, until
+from batches import OPTIONS, SchedulerAndWorker, as_alone, ball, batch, codes, results, table
 from studies import write_nifti
 from tomomesh.cli import main
 
@@ -200,32 +199,6 @@ def _blind(name: str) -> None:
         return existing(Path(path).with_name("nowhere") if Path(path).name == name else path)
 
     vars(found)["existing"] = seen
-
-
-class SchedulerAndWorker:
-    """A scheduler and a worker of its own, in processes that can be killed."""
-
-    def __init__(self, folder: Path) -> None:
-        self._file, self._env = folder / "scheduler.json", {**os.environ, "TMPDIR": str(folder)}
-        common = ["--scheduler-file", str(self._file), "--no-dashboard"]
-        self._lines = (
-            ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", *common],
-            ["distributed.cli.dask_worker", "--host", "127.0.0.1", "--nthreads", "1", "--no-nanny", *common],
-        )  # fmt: skip
-
-    def __enter__(self) -> tuple[subprocess.Popen[bytes], Path]:
-        self._processes = []
-        for module, *options in self._lines:
-            line = [sys.executable, "-m", module, *options]
-            nowhere = subprocess.DEVNULL
-            self._processes.append(subprocess.Popen(line, env=self._env, stdout=nowhere, stderr=nowhere))
-            until(self._file.exists)
-        return self._processes[0], self._file
-
-    def __exit__(self, *fault: object) -> None:
-        for process in self._processes:
-            process.kill()
-            process.wait()
 
 
 class TestUsage:

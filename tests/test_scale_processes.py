@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from batches import OPTIONS, WAIT_S, as_alone, ball, batch, codes, table, until
+from batches import OPTIONS, WAIT_S, as_alone, ball, batch, children_of, codes, table, until
 from studies import write_nifti
 
 if TYPE_CHECKING:
@@ -24,10 +24,6 @@ pytest.importorskip("distributed", reason="the extra `scale` is not installed")
 pytest.importorskip("cryptography", reason="the extra `scale` is not installed")
 psutil = pytest.importorskip("psutil", reason="it comes with distributed")
 pytest.importorskip("resource", reason="workers are killed by signals, which this system lacks")
-
-
-def children_of(process: subprocess.Popen[str]) -> list[Any]:
-    return list(psutil.Process(process.pid).children(recursive=True))
 
 
 def line_of(process: Any) -> str:

@@ -46,12 +46,16 @@ def trained(planes: Sequence[Mask], kind: str, *, threads: int = 1, **options: o
     return train_contours(np.stack(planes), NetworkSettings(contours=kind, **options), threads=threads)  # type: ignore[arg-type]
 
 
+def blot(seed: int, wide: float, above: float) -> Mask:
+    """Return a slice of smooth blots with holes: the width of the smoothing, and the threshold, deviations."""
+    smooth = ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=(40, 44)), wide)
+    return np.asarray(smooth > above * smooth.std())
+
+
 @st.composite
 def blots(draw: st.DrawFn) -> Mask:
     """Draw a slice of smooth blots with holes."""
-    rng = np.random.default_rng(draw(seeds))
-    smooth = ndimage.gaussian_filter(rng.normal(size=(40, 44)), draw(st.floats(1.0, 4.0)))
-    return np.asarray(smooth > draw(st.floats(-0.5, 1.0)) * smooth.std())
+    return blot(draw(seeds), draw(st.floats(1.0, 4.0)), draw(st.floats(-0.5, 1.0)))
 
 
 class TestTrace:

@@ -18,6 +18,8 @@ from tomomesh import segment as stage_one
 from tomomesh.cli import main
 from tomomesh.errors import UsageError
 from tomomesh.io import read_mesh
+from tomomesh.io.meshes.attributes import fits_single
+from tomomesh.io.meshes.pieces.parts import InOnePiece
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,8 +39,8 @@ def organs() -> NDArray[np.uint8]:
     return voxels.astype(np.uint8)
 
 
-def each(folder: Path, out: str, *options: str) -> int:
-    path = write_nifti(folder / "map.nii", organs(), AFFINE)
+def each(folder: Path, out: str, *options: str, affine: NDArray[np.float64] = AFFINE) -> int:
+    path = write_nifti(folder / "map.nii", organs(), affine)
     return main(["reconstruct", str(path), "--each-label", "--shared-walls", "-o", str(folder / out), *options])
 
 
@@ -74,6 +76,26 @@ class TestFiles:
             assert sum(report["walls"]["neighbors"].values()) == report["walls"]["shared_faces"]
             beside = {2: ["5", "7"], 5: ["2", "7"], 7: ["2", "5"], 9: []}
             assert sorted(report["walls"]["neighbors"]) == beside[number]
+
+    @pytest.mark.parametrize(("scale", "kind"), [(1.2, "double"), (1.3, "float")])
+    @pytest.mark.parametrize("suffix", ["ply", "vtp"])
+    def test_the_map_decides_how_many_bits_they_have(
+        self, tmp_path: Path, scale: float, kind: str, suffix: str
+    ) -> None:
+        """So far from 0 that 32 bits hold some of its meshes alone, and others not."""
+        far = AFFINE * [[scale, scale, scale, 1.0]]
+        far[0, 3] = 6e5
+        alone = reconstruct_labels(Volume.from_stored(organs(), far), shared_walls=True)
+        assert len({fits_single(InOnePiece(surface.mesh)) for surface in alone.values()}) == 2
+        assert each(tmp_path, "out", "--quiet", "--format", suffix, "--precision", "32", affine=far) == 0
+        heads = [path.read_bytes()[:2000] for path in (tmp_path / "out").glob(f"*.{suffix}")]
+        named = (
+            {"float": b"Float32", "double": b"Float64"}[kind] if suffix == "vtp" else b"property %b x" % kind.encode()
+        )
+        assert [named in head for head in heads] == [True] * 4
+        found = meshes(tmp_path / "out", suffix)
+        for number in (5, 7):
+            assert (triangles(found[2]) & triangles(found[number], turned=True)).total() > 100
 
     def test_other_programs_find_closed_meshes_and_all_of_the_volume(self, tmp_path: Path) -> None:
         assert each(tmp_path, "out", "--quiet") == 0

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from conftest import law, seeds, size
+from cut_meshes import cut_off_in
 from isosurfaces import volume_of
 from test_voxels import LEFT_HANDED, SHEARED
 from tomomesh.isosurface.run_mask import RunMask
@@ -97,11 +98,12 @@ def cuts_of(data: st.DataObject, slices: int) -> Cuts:
 
 
 def assert_same(found: Any, study: Study) -> None:
-    """The mesh, what it encloses, what was added to the mask and how the net came to rest are as in memory."""
+    """The mesh, where it is cut off, what it holds, what the mask got and how the net came to rest are as in memory."""
     bounded, surface = study.in_memory()
     mesh, expected = found.mesh.joined(), surface.mesh
     assert mesh.faces.tobytes() == expected.faces.tobytes()
     assert mesh.vertices.tobytes() == expected.vertices.tobytes()
+    assert cut_off_in(found.mesh).tobytes() == surface.cut_off.tobytes()
     assert (found.added, found.stepped) == (bounded.added, bounded.crossings.stepped)
     assert (found.enclosed, found.cavities) == (bounded.volumes.sum(), bounded.cavities)
     trace, before = found.trace, surface.net_fit.trace

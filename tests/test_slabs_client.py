@@ -6,18 +6,19 @@ import os
 import pickle
 import signal
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from tomomesh.errors import FormatError, ResourceError, TomomeshError
-from tomomesh.slabs.keep import LARGE, InMemory, OnDisk, mapped
+from tomomesh.slabs import keep
+from tomomesh.slabs.keep import LARGE, File, InMemory, OnDisk, mapped, put_away
 from tomomesh.slabs.on_client import OnClient
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -92,8 +93,66 @@ class TestSameValues:
         sent = mapped(pickle.loads(pickle.dumps(kept)))
         assert told(sent) == told(begin(2))
 
+    def test_our_own_workers_hand_over_where_arrays_are_and_no_bytes_of_them(self, client: Any) -> None:
+        """And what is fetched is there still when its worker has let go of it."""
+        kept = OnClient(client).each(begin, [3])
+        sent = client.gather(kept)[0]
+        assert len(pickle.dumps(sent)) < LARGE / 8
+        del kept
+        assert told(mapped(sent.value)) == told(begin(3))
+
+    def test_workers_of_others_hand_over_the_arrays(self, client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(client, "cluster", None)
+        slabs = OnClient(client)
+        assert len(pickle.dumps(client.gather(slabs.each(begin, [3]))[0])) > LARGE
+        assert run(slabs) == run(InMemory())
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="this system does not list what a process has open")
+class TestLentFiles:
+    """A file that a process has lent is opened by another one as long as it is open there."""
+
+    def lent(self, folder: Path) -> Row:
+        found: Row = put_away(begin(4), File(folder, lent=True))
+        return found
+
+    def test_the_same_values(self, tmp_path: Path) -> None:
+        sent = pickle.dumps(kept := self.lent(tmp_path))
+        received = pickle.loads(sent)
+        del kept
+        assert len(sent) < LARGE / 8
+        assert told(mapped(received)) == told(mapped(pickle.loads(pickle.dumps(received)))) == told(begin(4))
+        assert not any(tmp_path.iterdir())
+
+    def test_one_that_is_closed_is_not_there(self, tmp_path: Path) -> None:
+        sent = pickle.dumps(self.lent(tmp_path))
+        with pytest.raises(FileNotFoundError):
+            pickle.loads(sent)
+
+    def test_no_other_file_is_taken_for_it(self, tmp_path: Path) -> None:
+        """Numbers of open files are used again."""
+        file, other = File(tmp_path, lent=True), File(tmp_path, lent=True)
+        kept = [put_away(begin(4), one) for one in (file, other)]
+        sent = pickle.dumps(kept[0])
+        os.dup2(other.handle.fileno(), file.handle.fileno())
+        with pytest.raises(FileNotFoundError):
+            pickle.loads(sent)
+
+
+def _raised(fault: type[Exception]) -> None:
+    raise fault
+
 
 class TestFaults:
+    def test_what_is_gone_when_it_is_opened_is_asked_for_again(
+        self, client: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """As where its worker dies after it has told where it is."""
+        slabs, opened, gone = OnClient(client), keep._borrowed, [FileNotFoundError]
+        monkeypatch.setattr(keep, "_borrowed", lambda *where: _raised(gone.pop()) if gone else opened(*where))
+        assert told(slabs.fetch(slabs.each(begin, [5]))[0]) == told(begin(5))
+        assert not gone
+
     def test_a_worker_that_dies_with_what_it_kept(self, here: Any, client: Any, tmp_path: Path) -> None:
         """Its slabs are made again from the beginning by those that are left."""
         here.scheduler.allowed_failures = 1

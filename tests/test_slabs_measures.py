@@ -24,14 +24,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-LEFT_OUT = {"cavity_places_mm"}
-
 
 def wanted(mesh: TriMesh, cavities: int = 0) -> dict[str, Any]:
     """Return what is told of a whole mesh, without what only a whole one tells."""
     found = assess(mesh, cavities=cavities)
     rows = [{name: value for name, value in row.items() if name != "median_edge_mm"} for row in found["per_component"]]
-    return {name: value for name, value in found.items() if name not in LEFT_OUT} | {"per_component": rows}
+    return found | {"per_component": rows}
 
 
 class TestSums:
@@ -104,6 +102,21 @@ class TestReport:
         pieces = cut(mesh, [900, 901, 2000], slabs=OnDisk(tmp_path))
         assert assess_patches(patches_of(pieces), cavities=1) == wanted(pieces.joined(), cavities=1)
         assert not list(tmp_path.iterdir())
+
+    @law(25)
+    @given(seed=seeds, at=cuts, count=st.integers(1, 4), more=st.integers(0, 2))
+    def test_finds_the_place_in_each_cavity_that_memory_finds(
+        self, seed: int, at: list[int], count: int, more: int
+    ) -> None:
+        """But of pieces that face inward around nothing, which are no cavities."""
+        rng, mesh = np.random.default_rng(seed), TriMesh(20 * ball().vertices, ball().faces)
+        for n in range(count + more):
+            place = np.array([4.0 * n, 0.0, 0.0 if n < count else 99.0])
+            mesh = beside(mesh, TriMesh(ball().vertices * rng.uniform(0.2, 1) + place, ball().faces[:, ::-1]))
+        pieces = cut(mesh, at, seed=seed)
+        found = assess_patches(patches_of(pieces), cavities=count)
+        assert len(found["cavity_places_mm"]) == count
+        assert found == wanted(pieces.joined(), count)
 
     @pytest.mark.parametrize("along", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.3, -0.5, 0.1)])
     def test_finds_crossings_between_pieces_that_share_nothing(self, along: tuple[float, ...]) -> None:

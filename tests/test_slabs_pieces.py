@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds
-from cut_meshes import cut, cuts
+from cut_meshes import cut, cut_off_in, cuts
 from test_twins_topology import isosurface, ring
 from tomomesh import TriMesh, read_mesh
 from tomomesh.errors import OutputError, UsageError
@@ -50,17 +50,23 @@ class TestFiles:
     @law(30)
     @given(
         seed=seeds, share=st.floats(0.1, 0.6), at=cuts, count=st.integers(1, 7), precision=st.sampled_from([32, 64]),
-        suffix=st.sampled_from([".ply", ".stl", ".obj"]),
+        suffix=st.sampled_from([".ply", ".stl", ".obj"]), marked=st.sampled_from([0.0, 0.01, 0.5]),
     )  # fmt: skip
     def test_weld_to_the_whole_and_know_no_slabs(
-        self, tmp_path_factory: Any, seed: int, share: float, at: list[int], count: int, precision: int, suffix: str
-    ) -> None:
+        self, tmp_path_factory: Any, seed: int, share: float, at: list[int], count: int, precision: int, suffix: str,
+        marked: float,
+    ) -> None:  # fmt: skip
         folder, mesh = tmp_path_factory.mktemp("m"), isosurface(seed, share)
-        pieces = cut(mesh, at, 10, 20)
-        whole = pieces.joined()
+        some = np.random.default_rng(seed).random(len(mesh.faces)) < marked
+        pieces = cut(mesh, at, 10, 20, cut_off=some)
+        whole, marks = pieces.joined(), cut_off_in(pieces)
         found = write_pieces(patches_of(pieces), folder / f"a{suffix}", count, precision=precision)
-        alone = write_pieces(whole, folder / f"b{suffix}", count, precision=precision)
+        alone = write_pieces(in_one_patch(whole, marks), folder / f"b{suffix}", count, precision=precision)
         assert bytes_in(found[:-1]) == bytes_in(alone[:-1])
+        if suffix == ".ply":
+            columns = [trimesh.load_mesh(path, process=False).metadata for path in found[:-1]]
+            told = [one["_ply_raw"]["face"]["data"]["filled"].sum() for one in columns] if marks.any() else []
+            assert sum(told) == marks.sum()
         kind = np.float32 if suffix == ".stl" or (precision == 32 and suffix == ".ply") else np.float64
         again, wanted = welded(found[:-1]), whole.moved(whole.vertices.astype(kind).astype(np.float64))
         np.testing.assert_array_equal(sorted_corners(again), sorted_corners(wanted))
@@ -92,7 +98,7 @@ class TestFiles:
     @given(seed=seeds, share=st.floats(0.2, 0.6), count=st.integers(1, 6))
     def test_have_about_as_many_faces_each(self, seed: int, share: float, count: int) -> None:
         mesh = isosurface(seed, share)
-        found = [len(piece.faces) for piece in shares(in_one_patch(mesh), count)]
+        found = [len(piece.faces) for piece, _ in shares(in_one_patch(mesh), count)]
         # one vertex is the lowest of a dozen faces at most
         assert max(found) - min(found) <= 24
         assert sum(found) == len(mesh.faces)
@@ -127,7 +133,7 @@ class TestRefusals:
         old = bytes_in(write_pieces(ring(), folder / "m.ply", 3))
         names = sorted(folder.iterdir())
 
-        def fails(*arguments: Any) -> Iterator[TriMesh]:
+        def fails(*arguments: Any) -> Iterator[tuple[TriMesh, NDArray[np.bool_]]]:
             made = shares(*arguments)
             yield next(made)
             yield next(made)

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law, seeds
-from cut_meshes import cut, cuts
+from cut_meshes import cut, cut_off_in, cuts
 from test_twins_topology import isosurface, ring
 from tomomesh import TriMesh, read_mesh, write_mesh
 from tomomesh.errors import OutputError, UsageError
@@ -47,15 +47,19 @@ class TestBytes:
     @pytest.mark.parametrize("suffix", SUFFIXES)
     @law(25)
     @given(
-        seed=seeds, share=st.floats(0.05, 0.6), at=cuts, centers=st.integers(0, 40), precision=st.sampled_from([32, 64])
-    )
+        seed=seeds, share=st.floats(0.05, 0.6), at=cuts, centers=st.integers(0, 40),
+        precision=st.sampled_from([32, 64]), marked=st.sampled_from([0.0, 0.01, 0.5]),
+    )  # fmt: skip
     def test_are_the_whole_s(
-        self, tmp_path_factory: Any, suffix: str, seed: int, share: float, at: list[int], centers: int, precision: int
-    ) -> None:
+        self, tmp_path_factory: Any, suffix: str, seed: int, share: float, at: list[int], centers: int, precision: int,
+        marked: float,
+    ) -> None:  # fmt: skip
         folder, mesh = tmp_path_factory.mktemp("m"), isosurface(seed, share)
-        pieces = cut(mesh, at, min(centers, len(mesh.vertices)), 2 * centers, slabs=OnDisk(folder))
+        some = np.random.default_rng(seed).random(len(mesh.faces)) < marked
+        pieces = cut(mesh, at, min(centers, len(mesh.vertices)), 2 * centers, slabs=OnDisk(folder), cut_off=some)
         options = {"unit": "um", "frame": "RAS", "precision": precision}
-        wanted = written(pieces.joined(), folder / f"whole{suffix}", **options)
+        fields = {"filled": cut_off_in(pieces)} if some.any() else None
+        wanted = written(pieces.joined(), folder / f"whole{suffix}", face_fields=fields, **options)
         assert written(patches_of(pieces), folder / f"pieces{suffix}", **options) == wanted
 
     @law(40)
@@ -121,7 +125,7 @@ class Huge:
     def vertices(self) -> Iterator[Any]:
         raise AssertionError("nothing is asked of it")
 
-    faces = corners = vertices
+    faces = corners = filled = vertices
 
     def distinct(self, kind: Any) -> int:
         raise AssertionError("nothing is asked of it")

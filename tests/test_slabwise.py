@@ -10,146 +10,36 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conftest import law, seeds
-from tomomesh import Settings, Volume
-from tomomesh.errors import EmptyError, TomomeshError, UsageError
-from tomomesh.isosurface.run_mask import RunMask
-from tomomesh.model.lazy import ArraySource, LazyVoxels, in_memory
+from conftest import law
+from cuttings import (
+    ASKED,
+    BALL,
+    CIRCLE,
+    COLUMNS,
+    OBLIQUE,
+    ROWS,
+    SHAPE,
+    SLICES,
+    assert_equal,
+    assert_the_same,
+    cuttings,
+    grays,
+    kept,
+    label_maps,
+    lazily,
+    whole,
+)
+from tomomesh import Volume
+from tomomesh.errors import EmptyError, UsageError
+from tomomesh.model.lazy import in_memory
 from tomomesh.segmentation.otsu import otsu_threshold
-from tomomesh.segmentation.padding import beside
 from tomomesh.segmentation.slabwise.cut import Cutting
-from tomomesh.segmentation.slabwise.levels import TAILS, levels_of
-from tomomesh.segmentation.slabwise.sources import MaskVoxels, Placed
-from tomomesh.segmentation.study import lay_out, select_in
-from tomomesh.slabs.keep import InMemory, OnDisk
-from tomomesh.ways.choice import take_way
+from tomomesh.slabs.keep import OnDisk
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
-
-    from tomomesh.segmentation.study import Selected
-    from tomomesh.stage import Stage
-
-SHAPE = (11, 16, 17)
-SLICES, ROWS, COLUMNS = np.indices(SHAPE)
-BALL = (1.6 * (SLICES - 5)) ** 2 + (ROWS - 7) ** 2 + (COLUMNS - 8) ** 2 < 42
-CIRCLE = np.hypot(ROWS - 7.5, COLUMNS - 8) > 7.6
-KINDS = ("u1", "i1", "i2", ">i2", "u2", "i4", "u4", ">f4", "f4", "f8", "f2")
-TURN = np.deg2rad(20)
-OBLIQUE = np.array(
-    [[np.cos(TURN), -np.sin(TURN), 0, 4], [np.sin(TURN), np.cos(TURN), 0, -7], [0, 0, 1.5, 2], [0, 0, 0, 1.0]]
-)
-
-
-@st.composite
-def cuttings(draw: st.DrawFn) -> Cutting:
-    """Draw where studies are cut: in places that are shares of their slices, so that they fit every one."""
-    shares = draw(st.lists(st.floats(0.01, 0.99), max_size=6))
-    return Cutting(
-        lambda shape: sorted({0, shape[0], *(min(shape[0], int(share * shape[0]) + 1) for share in shares)}),
-        draw(st.sampled_from([None, InMemory()])),
-    )
-
-
-@st.composite
-def grays(draw: st.DrawFn) -> NDArray[Any]:
-    """Draw a study of a ball in noise: padding around it or not, specks and pores, levels that are no numbers."""
-    rng, kind = np.random.default_rng(draw(seeds)), np.dtype(draw(st.sampled_from(KINDS)))
-    levels = np.where(BALL, 1.0, 0.0) + 0.06 * rng.normal(size=SHAPE)
-    levels[rng.random(SHAPE) < draw(st.sampled_from([0, 0.01]))] = 1
-    levels[BALL & (rng.random(SHAPE) < draw(st.sampled_from([0, 0.02])))] = 0
-    padded = draw(st.sampled_from([None, CIRCLE, SLICES < 4, COLUMNS > 12]))
-    level = draw(st.sampled_from([0.4, 0.0, -9.0, -0.0]))
-    levels = levels if padded is None else np.where(padded, level, levels)
-    if kind.kind == "f":
-        levels.flat[7:9] = draw(st.sampled_from([0, np.nan, np.inf, -np.inf]))
-        return levels.astype(kind)
-    scale = 40 if kind.itemsize == 1 else 500
-    return np.clip(np.rint(levels * scale + (kind.kind == "u") * scale), *_limits(kind)).astype(kind)
-
-
-def _limits(kind: np.dtype[Any]) -> tuple[int, int]:
-    return int(np.iinfo(kind).min), int(np.iinfo(kind).max)
-
-
-@st.composite
-def label_maps(draw: st.DrawFn) -> NDArray[Any]:
-    """Draw a map of three labels, with gaps, specks, and numbers that are nearly whole."""
-    rng = np.random.default_rng(draw(seeds))
-    labels = np.where(BALL, 1 + (COLUMNS > 8), 0) * draw(st.sampled_from([1, 3, 70_000]))
-    labels[rng.random(SHAPE) < draw(st.sampled_from([0, 0.01]))] = 5
-    labels[draw(st.sampled_from([slice(0), slice(4, 6), slice(1, None, 2)]))] = 0
-    if draw(st.booleans()):
-        return np.asarray(labels + draw(st.sampled_from([0, 1e-5, 0.3])) * (labels == 1), np.float32)
-    return np.asarray(labels, draw(st.sampled_from(["i4", "u4", "i8"])))
-
-
-ASKED = st.fixed_dictionaries(
-    {},
-    optional={
-        "keep": st.sampled_from(["auto", "all", "largest"]),
-        "slices": st.sampled_from(["axial", "coronal", "sagittal"]),
-        "slice_range": st.just((2, 8)),
-        "roi": st.just((-3.0, 9.0, -4.0, 12.0, 3.0, 17.0)),
-    },
-)
-"""What may be asked of any study."""
-
-
-def kept(volume: Volume, asked: dict[str, Any], cutting: Cutting, labels: Volume | None = None) -> Stage[Selected]:
-    settings = Settings().replace(**asked)
-    return select_in(lay_out(volume, labels, settings, labelled="select" in asked, cutting=cutting), settings)
-
-
-def lazily(volume: Volume) -> Volume:
-    """Have its voxels stay where they are until they are read."""
-    voxels: Any = LazyVoxels.of(ArraySource(volume.voxels))
-    return replace(volume, voxels=voxels)
-
-
-def whole(shape: tuple[int, ...]) -> list[int]:
-    return [0, shape[0]]
-
-
-def assert_the_same(volume: Volume, asked: dict[str, Any], cutting: Cutting, labels: Volume | None = None) -> None:
-    """Compare what is kept, bit for bit, and every word that is told of it, or the error."""
-    there = None if labels is None else lazily(labels)
-    wanted = kept_or_not(volume, asked, Cutting(whole), labels)
-    for study, map_ in ((volume, labels), (lazily(volume), there)):
-        found = kept_or_not(study, asked, cutting, map_)
-        if isinstance(wanted, str) or isinstance(found, str):
-            assert found == wanted
-        else:
-            assert_equal(found, wanted)
-
-
-def kept_or_not(
-    volume: Volume, asked: dict[str, Any], cutting: Cutting, labels: Volume | None
-) -> Stage[Selected] | str:
-    """Return what is kept, or why nothing is."""
-    try:
-        return kept(volume, asked, cutting, labels)
-    except TomomeshError as fault:
-        return repr(fault)
-
-
-def assert_equal(found: Stage[Selected], wanted: Stage[Selected]) -> None:
-    ours, theirs = found.value.chosen, wanted.value.chosen
-    for name in ("shape", "begin", "starts", "stops"):
-        np.testing.assert_array_equal(getattr(ours.runs, name), getattr(theirs.runs, name))
-    np.testing.assert_array_equal(ours.mask, theirs.mask)
-    voxels = in_memory(ours.volume.voxels)
-    assert (voxels.dtype, voxels.tobytes()) == (theirs.volume.voxels.dtype, theirs.volume.voxels.tobytes())
-    np.testing.assert_array_equal(ours.lower, theirs.lower)
-    np.testing.assert_array_equal(ours.upper, theirs.upper)
-    assert (ours.counts, ours.told) == (theirs.counts, theirs.told)
-    assert repr(found.stats) == repr(wanted.stats)
-    assert found.warnings == wanted.warnings
-    assert found.value.study.notes == wanted.value.study.notes
-    ways = [take_way(one.value, Settings()).stats for one in (found, wanted)]
-    assert repr(ways[0]) == repr(ways[1])
 
 
 class TestSelection:
@@ -264,89 +154,6 @@ class TestBody:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("tomomesh.segmentation.body.CELLS", cells)
             assert_the_same(study, asked | ({"preset": preset} if preset else {}), cutting)
-
-
-@st.composite
-def sides(draw: st.DrawFn, size: int) -> slice:
-    """Draw some of so many numbers, in either direction."""
-    numbers = range(size)[draw(st.slices(size))]
-    return slice(numbers.start, numbers.stop if numbers.stop >= 0 else None, numbers.step)
-
-
-class TestSources:
-    """Voxels that are made as they are read are those of the array that is made at once."""
-
-    @law(150)
-    @given(
-        low=st.tuples(*[st.integers(0, 4)] * 3), sizes=st.tuples(*[st.integers(1, 4)] * 3),
-        at=st.tuples(*[sides(8)] * 3), here=st.booleans(),
-    )  # fmt: skip
-    def test_of_voxels_in_a_larger_lattice(
-        self, low: tuple[int, ...], sizes: tuple[int, ...], at: tuple[slice, ...], here: bool
-    ) -> None:
-        inner = np.arange(1, 1 + np.prod(sizes)).reshape(sizes)
-        whole = np.zeros((8, 8, 8), inner.dtype)
-        whole[tuple(slice(a, a + size) for a, size in zip(low, sizes, strict=True))] = inner
-        placed = LazyVoxels.of(Placed(inner if here else LazyVoxels.of(ArraySource(inner)), low, (8, 8, 8)))
-        np.testing.assert_array_equal(placed[at].read(), whole[at])
-
-    @law(100)
-    @given(seed=seeds, at=st.tuples(sides(7), sides(6), sides(5)))
-    def test_of_masks_and_of_other_voxels(self, seed: int, at: tuple[slice, ...]) -> None:
-        mask = np.random.default_rng(seed).random((7, 6, 5)) < 0.5
-        drawn = LazyVoxels.of(MaskVoxels(RunMask.of([mask])))
-        np.testing.assert_array_equal(drawn[at].read(), mask[at].view(np.uint8))
-        made = Cutting(whole).of(drawn).made(numbered, np.int64).voxels
-        np.testing.assert_array_equal(made[at].read(), np.indices(mask.shape).sum(axis=0)[at] + mask[at])
-
-
-def numbered(levels: NDArray[Any], box: tuple[slice, ...]) -> NDArray[np.int64]:
-    """Add the numbers of slice, row and column to each voxel."""
-    places = np.ogrid[tuple(slice(side.start, side.stop, side.step) for side in box)]
-    return np.asarray(levels + sum(places), np.int64)
-
-
-class TestLevels:
-    @law(150)
-    @given(levels=grays(), cutting=cuttings(), level=st.integers(0, 11 * 16 * 17 - 1))
-    def test_are_those_that_numpy_finds(self, levels: NDArray[Any], cutting: Cutting, level: int) -> None:
-        found = cutting.of(levels).levels
-        out = levels.flat[level]
-        for ours, theirs in ((found, levels), (found.finite, levels[np.isfinite(levels)])):
-            assert_levels(ours, theirs)
-        if out == out:
-            assert_levels(found.without(out.item()), levels[levels != out])
-            assert found.count([out.item()]) == [np.count_nonzero(levels == out)]
-
-    @pytest.mark.parametrize("kind", ["i4", "u4", "i8", "u8", "f4", "f8", "f2"])
-    def test_of_all_bits_are_in_their_order(self, kind: str) -> None:
-        bits = np.random.default_rng(1).integers(0, 256, 8 * 999, dtype=np.uint8)
-        levels = bits.view(kind)
-        assert_levels(levels_of(levels).finite, levels[np.isfinite(levels)])
-
-    @law(60)
-    @given(levels=grays(), cutting=cuttings(), every=st.integers(1, 40))
-    def test_some_beside_another_are_taken_in_even_steps(
-        self, levels: NDArray[Any], cutting: Cutting, every: int
-    ) -> None:
-        level = levels[0, 0, 0]
-        found = beside(level.item(), every, cutting.of(levels))
-        np.testing.assert_array_equal(found, levels[levels != level][::every])
-
-    def test_longer_floats_and_truths_are_levels_too(self) -> None:
-        assert levels_of(np.array([0.5, -1.5], np.longdouble)).ends == (-1.5, 0.5)
-        assert levels_of(np.array([False, True])).ends == (0.0, 1.0)
-
-
-def assert_levels(found: Any, levels: NDArray[Any]) -> None:
-    assert found.size == levels.size
-    np.testing.assert_array_equal(found.ends, (float(levels.min()), float(levels.max())))
-    for tail in TAILS:
-        wanted = np.percentile(levels, (tail, 100 - tail), method="inverted_cdf")
-        np.testing.assert_array_equal(found.bulk(tail), np.asarray(wanted, float))
-    low, high = found.ends
-    if np.isfinite([low, high]).all() and low < high < low + 1e4:  # beyond, numpy's own bins overflow
-        np.testing.assert_array_equal(found.histogram(low, high, 9), np.histogram(levels, 9, (low, high))[0])
 
 
 def test_what_is_kept_on_disk_is_the_same(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,6 +48,16 @@ class TestWay:
         assert report["quality"]["points_to_surface_mean_mm"] < 0.1 / 8
         assert surface.cuberille.triangulated().face_volumes.sum() == pytest.approx(stage_one.mask.sum() / 8**3)
         assert not surface.cap_faces.any()
+
+    def test_faces_are_filled_over_which_the_study_is_cut_off(self) -> None:
+        """Of a ball that the first slice halves they are the disk there, and nothing beside it."""
+        whole = ball(16)
+        half = replace(whole, voxels=whole.voxels[len(whole.voxels) // 2 :])
+        surface = reconstruct(half, lower=0.0, way="voxels", remesh=False)
+        areas, filled = surface.mesh.face_areas, surface.cap_faces
+        heights = surface.mesh.corners[:, :, 2].mean(axis=1)
+        assert areas[filled].sum() == pytest.approx(np.pi, rel=0.03)  # its edge is rounded
+        assert heights[filled].max() < heights[~filled].min()
 
     def test_every_key_of_its_report_is_documented(self) -> None:
         page = (Path(__file__).parents[1] / "docs" / "report.md").read_text(encoding="utf-8")

@@ -47,11 +47,16 @@ def begin(settings: Settings, given: Collection[str], *, input: str) -> Stage[Wa
     return Stage(way, {"way": section}, tuple(without_effect(settings, given, input=input)))
 
 
+def require_way(settings: Settings, input: str = "gray") -> None:
+    """Refuse settings that their way to a surface cannot do, before any work."""
+    way_of(choose_way(settings, input)).require(settings)
+
+
 def laid_out(
     volume: Volume, labels: Volume | None, settings: Settings, progress: Progress, *, labelled: bool
 ) -> LaidOut:
     """Lay out a study (`lay_out`), once its way to a surface does not refuse the settings."""
-    way_of(choose_way(settings, _input_of(volume))).require(settings)
+    require_way(settings, _input_of(volume))
     progress("window", 0, 2)
     return lay_out(volume, labels, settings, labelled=labelled)
 

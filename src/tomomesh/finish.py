@@ -103,7 +103,9 @@ def _remesh(made: Surface, settings: Settings, progress: Progress) -> Stage[Surf
     )  # fmt: skip
     mesh, stats = found.mesh.moved(found.mesh.vertices + low), {"remesh": found.report}
     lined = made.cavities - found.left_out.linings
-    even = replace(made, mesh=mesh, nearest=np.empty(0, np.int32), crossing=found.crossing, cavities=lined)
+    even = replace(
+        made, mesh=mesh, nearest=np.empty(0, np.int32), crossing=found.crossing, cavities=lined, cut_off=None
+    )  # fmt: skip
     _check(even)
     if made.filled is None:
         return Stage(even, stats, found.warnings)

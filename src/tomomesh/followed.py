@@ -7,7 +7,7 @@ shape is.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -16,13 +16,16 @@ from .isosurface.sides import WindowSides
 from .kernels.threads import in_blocks
 from .measure.links import Links
 from .measure.report import area_samples
-from .measure.shape import areas_and_volumes
+from .measure.shape import MeshExtent, areas_and_volumes, unfolded
 from .measure.tree import Tree
 from .model.boxes import box_of
+from .model.columns import carried
 from .model.sliced import areas_of, ranges_of, some_of
 from .segmentation.signal import SOLID, closed
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from .isosurface.voxels import Boundary
@@ -68,6 +71,18 @@ class Apart:
     back: Floats
 
 
+class Places(Protocol):
+    """Places that are not held in one array; `len` counts them."""
+
+    def __len__(self) -> int: ...
+
+    def some(self, every: int = 1) -> Floats:
+        """Return the first of every so many, (n, 3) as indices (x, y, z)."""
+
+    def distances(self, places: Floats, threads: int = 0) -> Floats:
+        """Return the distance of other places (p, 3) to the nearest, (p,)."""
+
+
 @dataclass(frozen=True)
 class Followed:
     """What a surface is to follow.
@@ -78,7 +93,7 @@ class Followed:
         How it is followed, a key of `tomomesh.judgement.LIMITS`.
     affine : (4, 4) float array
         Indices of the voxels that lengths are counted in to patient millimeters.
-    places : (n, 3) float array or WindowSides
+    places : (n, 3) float array or Places
         On the boundary, as voxel indices (x, y, z); or the faces of a window.
     inside : float
         Voxels that the surface should enclose.
@@ -92,7 +107,7 @@ class Followed:
 
     what: str
     affine: Floats
-    places: Floats | WindowSides
+    places: Floats | Places
     inside: float
     unit: float = 1.0
     wall: Sliced | None = None
@@ -110,12 +125,27 @@ class Followed:
 
     def apart(self, mesh: TriMesh, *, leave_out: Mask | None = None, threads: int = 0) -> Apart:
         """Measure a mesh in patient millimeters against it; `leave_out` are faces (m,) that are no part of it."""
-        places = np.linalg.solve(self.affine[:3, :3], (mesh.vertices - self.affine[:3, 3]).T).T
-        own = mesh.moved(np.asarray(places, np.float64))
-        enclosed = abs(float(areas_and_volumes(Links(own), threads=threads)[1].sum()))
+        own = mesh.moved(in_voxels(mesh.vertices, self.affine))
+        links, tree = Links(own), Tree.of_faces(own, threads=threads)
+        volume = MeshExtent.of(links).volumes(areas_and_volumes(links, threads=threads)[1])
         samples = area_samples(own, SAMPLES, leave_out=leave_out)
-        there = self._from(samples, threads)
-        back = Tree.of_faces(own, threads=threads).nearest(_some(self.places), threads=threads)[0]
+        return self.beside(volume, samples, lambda places: tree.nearest(places, threads=threads)[0], threads)
+
+    def beside(self, volume: Floats, samples: Floats, reach: Callable[[Floats], Floats], threads: int = 0) -> Apart:
+        """Return how far a mesh is apart, all in voxels.
+
+        Parameters
+        ----------
+        volume : (1, FOLDS) float array
+            Of the mesh, as `tomomesh.measure.shape.MeshExtent.volumes` sums it up.
+        samples : (n, 3) float array
+            Places on the mesh.
+        reach : callable
+            Returns how far places (n, 3) are from the mesh, (n,).
+        threads : int
+        """
+        enclosed, there = abs(float(unfolded(volume)[0])), self._from(samples, threads)
+        back = reach(_some(self.places))
         if self.wall is not None:
             back = np.maximum(back - WALLS * int(areas_of(self.wall).sum()) / len(self.places), 0.0)
         offset = (enclosed - self.inside) / len(self.places)
@@ -131,16 +161,22 @@ class Followed:
         return there
 
 
-def _distances(places: Floats | WindowSides, samples: Floats, threads: int) -> Floats:
-    if isinstance(places, WindowSides):
-        return places.distances(samples, threads)
-    return Tree.of_points(places, threads=threads).nearest(samples, threads=threads)[0]
+def in_voxels(places: Floats, affine: Floats) -> Floats:
+    """Return places in patient millimeters (n, 3) as indices."""
+    turn = np.asarray(np.linalg.inv(affine[:3, :3]).T, np.float64)
+    return carried(places - affine[:3, 3], turn, np.zeros(3))
 
 
-def _some(places: Floats | WindowSides) -> Floats:
+def _distances(places: Floats | Places, samples: Floats, threads: int) -> Floats:
+    if isinstance(places, np.ndarray):
+        return Tree.of_points(places, threads=threads).nearest(samples, threads=threads)[0]
+    return places.distances(samples, threads)
+
+
+def _some(places: Floats | Places) -> Floats:
     """Return about `SAMPLES` of many places."""
     every = -(-len(places) // SAMPLES)
-    return places.some(every) if isinstance(places, WindowSides) else places[::every]
+    return places[::every] if isinstance(places, np.ndarray) else places.some(every)
 
 
 def boundary_followed(mask: Sliced, volume: Volume) -> Followed:

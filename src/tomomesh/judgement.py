@@ -14,7 +14,7 @@ from .stage import Stage
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from .followed import Apart
+    from .followed import Apart, Followed
     from .results import Surface
     from .settings import Settings
 
@@ -135,10 +135,19 @@ def follow(made: Surface, settings: Settings, *, finer: Surface | None = None) -
     kind, found = _measured(made, settings.run.threads)
     if not found:
         return Stage(None)
+    coarse = finer is not None and bool(_beyond(found, LIMITS[kind])) and not _is_far(finer, settings.run.threads)
+    return _limited(kind, found, settings, coarse=coarse)
+
+
+def follow_apart(followed: Followed, apart: Apart, settings: Settings) -> Stage[None]:
+    """Refuse a mesh of which it was measured how far it is from what it is to follow; see `follow`."""
+    return _limited(followed.what, _keys(apart, followed.unit), settings)
+
+
+def _limited(kind: str, found: dict[str, float], settings: Settings, *, coarse: bool = False) -> Stage[None]:
     limits = LIMITS[kind]
     far, near = _beyond(found, limits), _beyond(found, limits.part(TOLD))
     what = "slices" if kind == "slices" else "window"
-    coarse = bool(far) and finer is not None and not _is_far(finer, settings.run.threads)
     if far and not (coarse or settings.run.allow_far):
         raise GeometryError(
             f"the mesh does not follow its {what}", found="; ".join(far), expected=limits.in_words(found),

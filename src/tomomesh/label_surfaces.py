@@ -15,6 +15,7 @@ from .segmentation.labels import MOST
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from .model.mesh import TriMesh
     from .model.volume import Volume
     from .results import Surface
     from .segmentation.study import LaidOut
@@ -57,6 +58,12 @@ class LabelSurfaces(Mapping[int, "Surface"]):
                 "the label map may be a study of gray levels", found=found, hint="--select with its labels"
             )
         return numbers
+
+    @property
+    def walls(self) -> TriMesh | None:
+        """All walls of the map, each once, in millimeters: once a surface that shares them has been made."""
+        labels = self._study.labels
+        return None if labels is None or labels.walls is None else labels.walls.mesh
 
     def _with_walls(self, progress: Progress) -> LaidOut:
         """Let the walls between all labels of the map come to rest, whichever of them are asked for."""

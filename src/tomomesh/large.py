@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .begin import begun_on, settled
+from .begin import begun_on, require_way, settled
 from .errors import ResourceError
 from .memory.limit import disk_folder
 from .model.mesh import TriMesh
@@ -24,11 +24,20 @@ from .slabs.keep import OnDisk
 from .slabs.on_client import OnClient
 from .slabs.place import HALO
 from .stage import folded
+from .ways.choice import known_way
 from .ways.in_slabs.contours import contours_in_slabs
-from .ways.in_slabs.voxels import checked_in_slabs, measured_in_slabs, mesh_in_slabs, require_slabs
+from .ways.in_slabs.voxels import (
+    checked_in_slabs,
+    followed_by,
+    followed_in_slabs,
+    measured_in_slabs,
+    mesh_in_slabs,
+    require_slabs,
+)
 
 if TYPE_CHECKING:
     from .begin import Begun
+    from .followed import Followed
     from .isosurface.run_mask import RunMask
     from .model.points import PointSet
     from .model.volume import Volume
@@ -47,6 +56,8 @@ A_CELL = 300.0
 """Bytes for each vertex of a slab and its halo."""
 CELLS_A_RUN = 6.0
 """Vertices for each run of a mask: a run has two sides across its row, and faces are as many along other axes."""
+IN_SLABS = ("voxels", "contours")
+"""Ways whose mesh is never whole."""
 
 
 @dataclass(frozen=True)
@@ -127,21 +138,35 @@ def reconstruct_large(
     (True, 3)
     """
     settings = settled(settings, changes)
+    require_large(settings)
     slabs, room = _workers(client, memory, slab)
     cutting = Cutting(partial(_cuts, room=room, itemsize=volume.voxels.dtype.itemsize), slabs)
     progress("window", 0, 2)
     study = lay_out(volume, labels, settings, labelled=settings.window.select is not None, cutting=cutting)
     begun = begun_on(study, settings, changes, progress)
-    if begun.way.name not in ("voxels", "contours"):
+    if begun.way.name not in IN_SLABS:
         return finished(begun, progress)
     require_slabs(begun.taken)
     kept, cut = begun.kept, partial(_cuts_of, room=room)
     if begun.way.name == "voxels":
         made = mesh_in_slabs(kept, begun.taken, slabs, cut(kept.study, kept.chosen.runs), progress)
-        return _checked(begun, made, progress)
+        return _checked(begun, made, followed_by(made.value, kept.study.affine), progress)
     found = contours_in_slabs(kept, begun.taken, slabs, cut, progress)
-    surface, neurons = found.value
-    return replace(_checked(begun, folded(surface, found), progress), neurons=neurons)
+    surface, neurons, follows = found.value
+    return replace(_checked(begun, folded(surface, found), follows, progress), neurons=neurons)
+
+
+def require_large(settings: Settings) -> None:
+    """Refuse what the settings alone tell cannot be done slab by slab, before anything is read.
+
+    Raises
+    ------
+    UsageError
+    """
+    require_way(settings)
+    known = known_way(settings)
+    if known is not None and known.way in IN_SLABS:
+        require_slabs(settings)
 
 
 @dataclass(frozen=True)
@@ -170,13 +195,13 @@ def _cuts_of(volume: Volume, runs: RunMask, *, room: _Room) -> Cuts:
     return Cuts(_cuts(volume.shape, room=room, itemsize=each, runs=runs, chunk=chunk))
 
 
-def _checked(begun: Begun, made: Stage[Any], progress: Progress) -> LargeSurface:
-    """Check a surface in pieces across its seams; it is measured once the report is read."""
+def _checked(begun: Begun, made: Stage[Any], follows: Followed, progress: Progress) -> LargeSurface:
+    """Check a surface in pieces across its seams, and that it follows its window; the rest is measured later."""
     kept, study = begun.kept, begun.kept.study
     checked = checked_in_slabs(made.value, kept, progress)
     patches = checked.value[0]
-    later = partial(measured_in_slabs, *checked.value)
-    stages = (begun.told, made, checked, later)
+    near = followed_in_slabs(patches, follows, begun.taken)
+    stages = (begun.told, made, checked, near, partial(measured_in_slabs, *checked.value))
     return LargeSurface(patches, study, way=begun.way.name, settings=begun.settings, stages=stages)
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import ctypes
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from .begin import begin, begun_on, laid_out, settled
 from .finish import compare_with, finish
+from .memory.heap import give_back
 from .memory.limit import memory_limit
 from .model.points import PointSet
 from .progress import Progress, silent
@@ -183,7 +182,7 @@ def _of_points(
     settings = replace(settings, printing=turned(settings.printing, cloud.frame))
     begun = begin(settings, given, input=taken.value.input)
     made = begun.value.surface(taken.value, settings, progress)
-    _give_back()
+    give_back()
     done, later = finish(replace(made.value, place=taken.value.place), settings, progress)
     return replace(done.value, way=begun.value.name, settings=settings, stages=(taken, begun, made, done, *later))
 
@@ -221,21 +220,15 @@ def finished(begun: Begun, progress: Progress, *, truth: TriMesh | None = None, 
     found = _segmented(begun, progress)
     del begun
     found = found if kept else found.without_voxels()
-    _give_back()
+    give_back()
     made = way.surface(found, taken, progress)
     surface, told = made.value if kept else made.value.bare(), folded(None, made)
     del made
     found = found if kept else found.bare()
-    _give_back()
+    give_back()
     done, later = finish(replace(surface, segmentation=found), settings, progress)
     known = () if truth is None else (compare_with(done.value, truth),)
     return replace(done.value, way=found.way, settings=settings, stages=(*found.stages, told, done, *known, *later))
-
-
-def _give_back() -> None:
-    """Hand what was let go back to the system: glibc keeps arrays below 32 MiB, half of a run's memory, to itself."""
-    with suppress(OSError, AttributeError, TypeError):  # other systems give it back themselves
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _laid_out(volume: Volume, labels: Volume | None, settings: Settings, progress: Progress) -> LaidOut:

@@ -151,6 +151,8 @@ class Surface(Reported):
         The history of the fit, where masses moved.
     filled : (m,) bool array or None
         Faces of `mesh` that lie where a cloud has no points: filled, not measured.
+    cut_off : (m,) bool array or None
+        Faces of `mesh` over which the study is cut off, where that is known of each; else caps are found by points.
     cavities : int
         Components of `mesh` that line a cavity.
     borders : bool
@@ -179,6 +181,7 @@ class Surface(Reported):
     cubes: CubeGrid | None = None
     trace: Trace | None = None
     filled: NDArray[np.bool_] | None = None
+    cut_off: NDArray[np.bool_] | None = None
     cavities: int = 0
     borders: bool = False
     crossing: NDArray[np.bool_] | None = None
@@ -201,7 +204,9 @@ class Surface(Reported):
 
     @property
     def cap_faces(self) -> NDArray[np.bool_]:
-        """Faces (m,) with a corner that is nearest to a cap: filled, not measured."""
+        """Faces (m,) that were filled, not measured: as known of each, or with a corner that is nearest to a cap."""
+        if self.cut_off is not None:
+            return self.cut_off
         if not self.capped:
             return np.zeros(len(self.mesh.faces), np.bool_)
         _, nearest = Tree.of_points(self.points.positions).nearest(self.mesh.vertices)

@@ -155,7 +155,7 @@ def _surface(chosen: Namespace) -> None:
 
     with memory_limit(chosen.memory), Bars(quiet=chosen.quiet) as progress:
         progress("read", 0, 1)
-        points = io.read_points(chosen.cloud, settings=settings.cloud)
+        points = io.read_points(chosen.cloud, settings=settings.cloud, roi=settings.crop.roi)
         progress("read", 1, 1)
         surface = reconstruct_points(points, settings, progress=progress, **given_of(chosen))
         surface = write_surface(chosen, surface, settings, progress)

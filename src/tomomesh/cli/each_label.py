@@ -14,11 +14,13 @@ from uuid import uuid4
 
 from .. import io
 from ..errors import GeometryError, TomomeshError, UsageError
+from ..io.meshes.attributes import fits_single
+from ..io.meshes.pieces.parts import InOnePiece
 from ..io.studies.naming import safe_name
 from .bars import bars_of
 from .batch import OF_ONE, check_results, do_all, done, refuse_with
 from .outputs.checks import check_archive
-from .outputs.write import write_surface
+from .outputs.write import frame_asked, write_surface
 from .records import COLUMNS, row_of_fault
 from .sources import names_of, read_study, sources_of
 from .spread import Batch, check_workers
@@ -157,7 +159,19 @@ class _InOnePass:
 
     def __call__(self, number: int, asked: Namespace, own: Settings) -> Surface:
         with bars_of(asked) as progress:
-            return write_surface(asked, self.found(progress).surface(number, progress), own, progress)
+            surface = self.found(progress).surface(number, progress)
+            return write_surface(asked, surface, own, progress, fits=self._fits(surface, asked, own))
+
+    def _fits(self, surface: Surface, asked: Namespace, own: Settings) -> bool | None:
+        """Tell whether 32 bits hold all walls of the map, where these are asked for: neighbors then have the same."""
+        walls = _KEPT[self.run].walls
+        if walls is None or own.run.precision == 64:
+            return None
+        if self.run not in _FIT:
+            frame = frame_asked(surface, asked.output, own)
+            _FIT.clear()
+            _FIT[self.run] = fits_single(InOnePiece(frame.mesh(walls)))
+        return _FIT[self.run]
 
     def found(self, progress: Progress) -> LabelSurfaces:
         """Return the labels of this run, which its process keeps until it works for another one."""
@@ -180,5 +194,7 @@ class _InOnePass:
 
 _KEPT: dict[str, LabelSurfaces] = {}
 """Run to its labels: of one run at most."""
+_FIT: dict[str, bool] = {}
+"""Run to whether 32 bits hold its walls: of one run at most."""
 _READING = Lock()
 """Held while a map is read: a worker may have threads."""

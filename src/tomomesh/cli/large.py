@@ -49,8 +49,9 @@ def reconstruct_in_slabs(chosen: Namespace, settings: Settings, given: Mapping[s
     TomomeshError
     """
     _check(chosen, settings)
-    from ..large import LargeSurface, reconstruct_large
+    from ..large import LargeSurface, reconstruct_large, require_large
 
+    require_large(settings)
     memory = None if chosen.memory is None else bytes_of(chosen.memory)
     with _client(chosen) as client, bars_of(chosen) as progress:
         volume, labels = open_study(chosen, settings, progress)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -145,6 +145,11 @@ def split(
     quarters = _quarters(quads[fours], first)[:, :, slice(None, None, 1 if outward else -1)]
     halves[fours] = quarters[:, :2]
     return halves.reshape(-1, 3), quarters[:, 2:].reshape(-1, 3)
+
+
+def of_triangles(values: NDArray[Any], fours: NDArray[np.integer[Any]]) -> NDArray[Any]:
+    """Return for each triangle, halves before quarters, the value (q,) of its square; see `split` and `fours_of`."""
+    return np.concatenate([np.repeat(values, 2), np.repeat(values[fours], 2)])
 
 
 def _quarters(quads: NDArray[np.int32], first: int) -> NDArray[np.int64]:

@@ -14,7 +14,7 @@ from ..model.mesh import QuadMesh
 from ..model.points import PointSet
 from ..progress import Progress, silent
 from .crossings import LevelCrossings, Levels, crossings
-from .diagonals import placed, right_handed, triangulated
+from .diagonals import of_triangles, placed, right_handed, triangulated
 from .run_mask import RunMask
 from .runs import Runs
 from .settle import NetFit, settle
@@ -167,12 +167,15 @@ class VoxelSurface:
     nearest : (n,) int32 array
         A crossing that draws each vertex.
     net_fit : NetFit
+    cut_off : (m,) bool array
+        Faces over which the volume is cut off.
     """
 
     smoothed: TriMesh
     mesh: TriMesh
     nearest: NDArray[np.int32]
     net_fit: NetFit
+    cut_off: NDArray[np.bool_]
 
 
 def voxel_surface(
@@ -197,4 +200,5 @@ def voxel_surface(
     made = settle(net, found.crossings, settings, threads=threads, progress=progress)
     smoothed, mesh, fours = triangulated(net, made, found.crossings, found.affine, threads)
     nearest = np.concatenate([net.fans[:, 0], fours])
-    return VoxelSurface(smoothed, mesh, nearest, made)
+    cut_off = of_triangles(found.crossings.cut_off, fours)
+    return VoxelSurface(smoothed, mesh, nearest, made, cut_off)

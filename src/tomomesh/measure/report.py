@@ -179,13 +179,26 @@ def area_samples(mesh: TriMesh, count: int = SAMPLES, *, leave_out: NDArray[np.b
     """Draw points uniformly by area from a mesh, (count, 3); the same points every time."""
     areas = areas_and_volumes(Links(mesh))[0]
     areas = areas if leave_out is None else np.where(leave_out, 0.0, areas)
-    rng = np.random.default_rng(0)
     reached = np.cumsum(areas)
     if len(areas) == 0 or reached[-1] == 0:
         return np.empty((0, 3))
-    face = np.searchsorted(reached, rng.random(count) * reached[-1], side="right").clip(0, len(areas) - 1)
-    u, v = rng.random((2, count, 1))
+    shares, sides = drawn(count)
+    face = np.searchsorted(reached, shares * reached[-1], side="right").clip(0, len(areas) - 1)
+    return placed_on(mesh.vertices[mesh.faces[face]], sides)
+
+
+def drawn(count: int) -> tuple[Floats, Floats]:
+    """Draw at which shares of an area samples lie, (count,), and how far along two sides of their faces, (2, count, 1).
+
+    The same ones every time.
+    """
+    rng = np.random.default_rng(0)
+    shares, (u, v) = rng.random(count), rng.random((2, count, 1))
     over = u + v > 1
-    u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
-    a, b, c = (mesh.vertices[mesh.faces[face, n]] for n in range(3))
-    return np.asarray(a + u * (b - a) + v * (c - a))
+    return shares, np.stack([np.where(over, 1 - u, u), np.where(over, 1 - v, v)])
+
+
+def placed_on(corners: Floats, sides: Floats) -> Floats:
+    """Return the places (n, 3) that lie so far along two sides (2, n, 1) of faces with corners (n, 3, 3)."""
+    a, b, c = (corners[:, n] for n in range(3))
+    return np.asarray(a + sides[0] * (b - a) + sides[1] * (c - a))

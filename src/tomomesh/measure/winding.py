@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from .shape import MeshExtent, areas_and_volumes, unfolded
 from .tree import Tree
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from numpy.typing import NDArray
 
 TRIES = 16
@@ -77,26 +79,77 @@ def places_in_cavities(mesh: TriMesh, *, tree: Tree | None = None, threads: int 
     """
     piece, volumes = pieces_of(mesh)
     tree = Tree.of_faces(mesh, threads=threads) if tree is None else tree
-    faces = _largest_faces(piece, mesh.face_areas, volumes < 0)
-    middles, normals = mesh.corners[faces].mean(axis=1), mesh.face_vectors[faces]
-    normals /= 2 * mesh.face_areas[faces, None]
-    radii, free = np.cbrt(np.abs(volumes[piece[faces]])), np.zeros(len(faces), np.bool_)
+    linings = LiningFaces.of(mesh, piece, volumes < 0)
+    return places_before(linings, volumes, lambda places: tree.nearest(places, threads=threads)[0])
+
+
+class LiningFaces(NamedTuple):
+    """Faces before which a place is looked for: of each lining the largest, `TRIES` at most and none without area.
+
+    Attributes
+    ----------
+    pieces : (n,) int array
+        The connected piece that each is of.
+    areas : (n,) float array
+    numbers : (n,) int64 array
+        Their own.
+    middles, normals : (n, 3) float array
+    """
+
+    pieces: NDArray[np.integer[Any]]
+    areas: NDArray[np.float64]
+    numbers: NDArray[np.int64]
+    middles: NDArray[np.float64]
+    normals: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, mesh: TriMesh, piece: NDArray[np.int32], some: NDArray[np.bool_]) -> LiningFaces:
+        """Take them from a mesh whose faces belong to pieces (m,), of which some (c,) are linings."""
+        areas = mesh.face_areas
+        asked = np.flatnonzero(some[piece] & (areas > 0))
+        faces = asked[_largest(piece[asked], areas[asked], asked)]
+        middles, normals = mesh.corners[faces].mean(axis=1), mesh.face_vectors[faces]
+        return cls(piece[faces], areas[faces], faces, middles, normals / (2 * areas[faces, None]))
+
+    @classmethod
+    def joined(cls, parts: Sequence[LiningFaces]) -> LiningFaces:
+        """Return those of a mesh, of those of its parts."""
+        every = [np.concatenate(column) for column in zip(*parts, strict=True)]
+        rows = _largest(*every[:3])
+        return cls(*(column[rows] for column in every))
+
+
+def places_before(
+    faces: LiningFaces, volumes: NDArray[np.float64], reach: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Return a place before one face of each lining, see `places_in_cavities`.
+
+    Parameters
+    ----------
+    faces : LiningFaces
+    volumes : (c,) float array
+        Of the connected pieces.
+    reach : callable
+        Returns how far places (n, 3) are from the mesh, (n,).
+    """
+    middles, normals = faces.middles, faces.normals
+    radii, free = np.cbrt(np.abs(volumes[faces.pieces])), np.zeros(len(middles), np.bool_)
     for _ in range(HALVINGS):
         left = np.flatnonzero(~free)
         if not len(left):
             break
-        reach, _ = tree.nearest(middles[left] + radii[left, None] * normals[left], threads=threads)
-        free[left] = reach >= TOUCHES * radii[left]
+        free[left] = reach(middles[left] + radii[left, None] * normals[left]) >= TOUCHES * radii[left]
         radii[left] /= np.where(free[left], 1, 2)
-    order = np.lexsort((-radii, ~free, piece[faces]))
-    _, first = np.unique(piece[faces][order], return_index=True)
+    order = np.lexsort((-radii, ~free, faces.pieces))
+    _, first = np.unique(faces.pieces[order], return_index=True)
     taken = order[first][free[order[first]]]
     return np.asarray(middles[taken] + radii[taken, None] * normals[taken])
 
 
-def _largest_faces(piece: NDArray[np.int32], areas: NDArray[np.float64], some: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the largest faces, `TRIES` at most and none without area, of each of some pieces (c,)."""
-    asked = np.flatnonzero(some[piece] & (areas > 0))
-    order = asked[np.lexsort((-areas[asked], piece[asked]))]
-    first = np.searchsorted(piece[order], piece[order], side="left")
+def _largest(
+    pieces: NDArray[np.integer[Any]], areas: NDArray[np.float64], numbers: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return the largest of some faces, `TRIES` at most of each piece; of equal ones those that come first."""
+    order = np.lexsort((numbers, -areas, pieces))
+    first = np.searchsorted(pieces[order], pieces[order], side="left")
     return order[np.arange(len(order)) - first < TRIES]

@@ -7,7 +7,6 @@ import re
 import shutil
 import sys
 import tempfile
-import threading
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -25,10 +24,9 @@ KEPT = 0.25
 points within 600 MiB half of it takes 5 % more time and 4 % less memory, twice 4 % less time and 20 % more memory."""
 FULL = 0.8
 """Share of the limit from which pages are let go of. The rest is for what comes before that is seen, which is late
-where NumPy holds the lock of the interpreter, and all cores are busy: at ten million points beside other processes the
-peak within 1 GiB was 1,063 MiB with .8, and 1,165 MiB with .7 in a later run, so less gains nothing."""
-LOOK_S = 0.005
-"""How often that is looked at, seconds: a processor fills some 20 MB meanwhile, and more where the machine is busy."""
+where all cores are busy: at ten million points within 1 GiB 260 MiB came once, and the peak was 1,102 MiB with .95,
+beside eight other processes; with .75 it was 945 MiB beside fourteen, but a million within 500 MiB took a tenth more
+time than with .8, which peaked at 1,442 MiB beside twenty to twenty-seven: there no share would do."""
 LEAST = 400 << 20
 """Smallest limit: Python, NumPy, SciPy and Numba take half of it."""
 UNITS = {"": 1, **{f"{k}{b}": (1024 if b else 1000) ** n for n, k in enumerate("KMGT", 1) for b in ("", "I")}}
@@ -117,29 +115,10 @@ def free_disk() -> float | None:
 @contextmanager
 def _lying_in(made: Arrays, most: int, folder: Path) -> Iterator[None]:
     with ExitStack() as stack:
-        stack.enter_context(_watched(made, int(FULL * most)))
+        stack.enter_context(made.watched(int(FULL * most)))
         stack.callback(_folder.reset, _folder.set(folder))
         stack.callback(swapped, swapped(made.capsule))
         yield
-
-
-@contextmanager
-def _watched(made: Arrays, full: int) -> Iterator[None]:
-    """Let pages go whenever too much is in the memory."""
-    done = threading.Event()
-
-    def watch() -> None:
-        while not done.wait(LOOK_S):
-            if _resident() > full:
-                made.leave()
-
-    watcher = threading.Thread(target=watch, daemon=True)
-    watcher.start()
-    try:
-        yield
-    finally:
-        done.set()
-        watcher.join()
 
 
 def disk_folder() -> Path:

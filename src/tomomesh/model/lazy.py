@@ -168,6 +168,15 @@ class LazyVoxels(NDArrayOperatorsMixin):
         gone = tuple(axis for axis in range(found.ndim) if axis not in self.order)
         return np.asarray(found.transpose((*gone, *self.order))[(0,) * len(gone)])
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let another process have no more of a source that is held in memory than is viewed."""
+        source, (slices, *others) = self.source, self.ranges
+        if 0 not in self.shape and hasattr(source, "part"):
+            held = _rising(slices)
+            source = source.part(held.start, held.stop)
+            slices = range(slices.start - held.start, slices.stop - held.start, slices.step)
+        return LazyVoxels, (source, self.order, (slices, *others))
+
     def _refused(self, *_: object, **__: object) -> NoReturn:
         raise ResourceError(
             "the study is read part by part, and this needs all of its voxels at once",

@@ -20,7 +20,8 @@ NEURON, BRIDGE, CAP = 0, 1, 2
 
 CROSSING, ADDED, BORDER = NEURON, BRIDGE, CAP
 """The same numbers on the boundary of a window, which has no networks: where gray levels cross a bound, beside a voxel
-that was added so that the boundary touches itself nowhere, on the border of the volume. In both, 0 is measured."""
+that was added so that the boundary touches itself nowhere, on the border of the volume, whatever voxel is behind it. In
+both, 0 is measured."""
 
 KINDS = (NEURON, BRIDGE, CAP)
 

@@ -13,7 +13,8 @@ class CropSettings(Group):
     """The part of a study that matters; the rest is cropped away before all else."""
 
     roi: tuple[float, ...] | None = param(
-        None, "box that is kept: the voxels whose centers lie from X0 to X1, Y0 to Y1 and Z0 to Z1 in the patient, LPS",
+        None, "box that is kept: the voxels whose centers lie from X0 to X1, Y0 to Y1 and Z0 to Z1 in the patient, "
+        "LPS; of a cloud the points that do, in its own frame and unit",
         unit="mm", length=(6,), metavar=("X0", "X1", "Y0", "Y1", "Z0", "Z1"),
     )  # fmt: skip
     slice_range: tuple[int, int] | None = param(

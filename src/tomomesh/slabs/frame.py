@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..isosurface.crossings import Stretch
+from ..isosurface.run_mask import RunMask
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,13 +51,28 @@ class MaskFrame:
         low, high = start - (start == 0), stop + 1 + (stop == self.shape[0] - 1)
         return max(low + self.low[0], 0), min(high + self.low[0], self.volume[0])
 
-    def drawn(self, mask: Any, start: int, stop: int) -> Marks:
+    @property
+    def _box(self) -> tuple[slice, slice]:
+        """Rows and columns of the volume that are its own, but for the background around them."""
+        (_, y, x), (_, rows, columns) = self.low, self.shape
+        return slice(y + 1, y + rows - 1), slice(x + 1, x + columns - 1)
+
+    def framed(self, mask: RunMask) -> RunMask:
+        """Return a mask of the volume in the frame."""
+        box, (slices, rows, columns) = (slice(*self.mask_slices(0, self.shape[0])), *self._box), self.shape
+        inner = slice(1, slices - 1), slice(1, rows - 1), slice(1, columns - 1)
+        return mask.cropped(box).placed(inner, self.shape)
+
+    def drawn(self, mask: Any, start: int, stop: int, threads: int = 1) -> Marks:
         """Draw some of its slices of a mask of those slices of the volume of `mask_slices`."""
         _, rows, columns = self.shape
         found, first = np.zeros((stop - start, rows, columns), np.bool_), max(start, 1) - start
-        box = tuple(slice(low + 1, low + size - 1) for low, size in zip(self.low[1:], self.shape[1:], strict=True))
-        dense = mask[:][(slice(None), *box)]
-        found[first : first + len(dense), 1:-1, 1:-1] = dense
+        if isinstance(mask, RunMask):
+            slices, inner = slice(0, mask.shape[0]), (slice(1, rows - 1), slice(1, columns - 1))
+            own = mask.cropped((slices, *self._box)).placed((slices, *inner), (mask.shape[0], rows, columns))
+            own.fill(found[first : first + mask.shape[0]], np.ones(len(own.starts), np.bool_), True, threads)
+        else:
+            found[first : first + len(mask), 1:-1, 1:-1] = mask[(slice(None), *self._box)]
         return found
 
     def stretch(self, held: Marks, voxels: Any, halo: Span) -> Stretch:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..isosurface.crossings import BARELY, IN_LINE, Levels
+from ..isosurface.crossings import BARELY, Levels
 from ..isosurface.run_mask import RunMask
 from ..isosurface.surface_nets import OWNED, borders_of, steps_of
 from ..isosurface.thin import thin_squares
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ..isosurface.crossings import Stretch
     from ..isosurface.means import Span
     from ..isosurface.well_composed import Cells
     from .frame import MaskFrame
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     Marks = NDArray[np.bool_]
 
 NOTHING = Part(0, (np.zeros(0, np.bool_),))
-PART = 200_000
+PART = 50_000
 """Squares whose levels are looked at together. No result depends on it."""
 
 
@@ -87,7 +88,7 @@ def ground(
         Of joining, at most; 0 where it is done.
     threads : int
     """
-    held, (_, *rows) = frame.drawn(mask, halo[0], halo[1] + 1), frame.shape
+    held, (_, *rows) = frame.drawn(mask, halo[0], halo[1] + 1, threads), frame.shape
     stretch, low = frame.stretch(held, voxels, halo), frame.lowest + np.array([0, 0, halo[0]], np.int32)
     known, inside = replace(levels, voxels=stretch), (own[0] - halo[0], own[1] - halo[0])
     begun = drawn_from(bits, halo[0], halo[1] + 1, tuple(rows)) if bits else held
@@ -105,9 +106,9 @@ def ground(
     )
     cells = cells + np.array([0, 0, halo[0]], np.int32)
     inner, directions = borders_of(cells + frame.lowest, cases, threads)
-    steps, stored = steps_of(directions), np.promote_types(stretch.stored.dtype, np.float16)  # the latter holds NaN
     x, y, z = (inner - low).T
-    squares = thin_squares(joined, inner - low, steps, threads), ~held[z, y, x], _lines(known, inner, steps, stored)
+    thin = thin_squares(joined, inner - low, steps_of(directions), threads)
+    squares = thin, ~held[z, y, x], _lines(stretch, inner, directions, threads)
     layers = _counted(cells, cases, own)
     return replace(found, added=added, cells=Part(0, (cells, cases)), squares=Part(0, squares), layers=layers)
 
@@ -124,13 +125,10 @@ def _scanned(mask: Marks, layers: Span, threads: int) -> Cells:
     return cells + np.array([0, 0, layers[0]], np.int32), cases
 
 
-def _lines(levels: Levels, inner: Ints, steps: Ints, stored: np.dtype[Any]) -> NDArray[Any]:
-    """Return the levels (q, 4, L) at the four places in line with each border."""
+def _lines(stretch: Stretch, inner: Ints, directions: NDArray[np.uint8], threads: int) -> NDArray[Any]:
+    """Return the levels (q, 4, L) in line with each border, see `Stretch.lines`."""
     parts = (slice(n, n + PART) for n in range(0, max(len(inner), 1), PART))
-    found = [
-        np.stack([levels.at(inner[one] + n * steps[one]).astype(stored) for n in IN_LINE], axis=1) for one in parts
-    ]
-    return np.concatenate(found)
+    return np.concatenate([stretch.lines(inner[one], directions[one], threads) for one in parts])
 
 
 def _counted(cells: Ints, cases: NDArray[np.uint8], own: Span) -> NDArray[np.int64]:

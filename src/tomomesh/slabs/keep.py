@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import mmap
+import os
 import tempfile
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
@@ -99,7 +101,9 @@ class _Far:
         return self.dtype.itemsize * int(np.prod(self.shape))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let other processes have the array itself."""
+        """Let other processes have the array itself, or its place in a file that is lent to them."""
+        if self.file.lent:
+            return _Far, (self.file, self.offset, self.dtype, self.shape)
         return _received, (self.mapped(),)
 
     def mapped(self) -> np.ndarray[Any, Any]:
@@ -109,10 +113,19 @@ class _Far:
 
 
 class File:
-    """A file without a name that arrays are put into one behind the other."""
+    """A file without a name that arrays are put into one behind the other.
 
-    def __init__(self, folder: Path) -> None:
+    Attributes
+    ----------
+    folder : path
+        Where it is.
+    lent : bool
+        Whether it is pickled as what other processes of this user on this machine may open, while it is open here.
+    """
+
+    def __init__(self, folder: Path, *, lent: bool = False) -> None:
         self.folder = folder
+        self.lent = lent
         self.end = 0
         self.handle: Any = None
 
@@ -120,6 +133,11 @@ class File:
         """Close the file with the last value that is kept in it; maps of it stay."""
         if self.handle is not None:
             self.handle.close()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let other processes open it: where its name would be there is nothing, so by the process that has it open."""
+        handle = self.handle.fileno()
+        return _borrowed, (self.folder, f"/proc/{os.getpid()}/fd/{handle}", os.fstat(handle)[1:3])
 
     def put(self, array: Any) -> Any:
         """Write an array; one that is small, and what is no array, stays as it is."""
@@ -146,9 +164,37 @@ class File:
         return found
 
 
+class _Unkept:
+    """An array that another process has sent, and that could not be kept here: who looks at it is told.
+
+    What is raised where it is received is seen by nobody: Dask would fetch it again and again.
+    """
+
+    def __init__(self, fault: OutputError) -> None:
+        self.fault = fault
+
+
 def _received(array: np.ndarray[Any, Any]) -> Any:
     """Keep an array that another process sends on the disk here too."""
-    return File(Path(tempfile.gettempdir())).put(array)
+    try:
+        return File(Path(tempfile.gettempdir())).put(array)
+    except OutputError as fault:
+        return _Unkept(fault)
+
+
+def _borrowed(folder: Path, place: str, identity: tuple[int, int]) -> File:
+    """Open a file that another process has lent.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where that has ended.
+    """
+    found = File(folder, lent=True)
+    found.handle = Path(place).open("rb", buffering=0)  # noqa: SIM115 - closed with its last user
+    if os.fstat(found.handle.fileno())[1:3] != identity:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), place)
+    return found
 
 
 def put_away(value: Any, file: File) -> Any:
@@ -157,11 +203,19 @@ def put_away(value: Any, file: File) -> Any:
 
 
 def mapped(value: Any, *, own: bool = False) -> Any:
-    """Return a value whose arrays can all be worked on, if asked for those too that another process has sent."""
+    """Return a value whose arrays can all be worked on, if asked for those too that another process has sent.
+
+    Raises
+    ------
+    OutputError
+        For one that it has sent and that could not be kept.
+    """
 
     def looked_at(part: Any) -> Any:
         if isinstance(part, _Far):
             return part.mapped()
+        if isinstance(part, _Unkept):
+            raise part.fault
         return part.copy() if own and isinstance(part, np.ndarray) and not part.flags.behaved else part
 
     return _changed(value, looked_at)

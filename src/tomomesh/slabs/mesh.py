@@ -31,12 +31,15 @@ class Piece:
         Two triangles a square.
     quarters : (2 c, 3) int64 array
         The other two of those that are split into four.
+    cut_off : (2 q + 2 c,) bool array
+        Which of these faces the study is cut off over.
     """
 
     vertices: NDArray[np.float64]
     centers: NDArray[np.float64]
     halves: NDArray[np.int64]
     quarters: NDArray[np.int64]
+    cut_off: NDArray[np.bool_]
 
     @property
     def counts(self) -> tuple[int, int, int, int]:
@@ -78,6 +81,11 @@ class SlabMesh:
         before[:, 1] += self.counts[:, 0].sum()
         before[:, 3] += self.counts[:, 2].sum()
         return np.asarray(before)
+
+    @property
+    def squares(self) -> NDArray[np.int64]:
+        """How many squares lie before each piece, and in all, (s + 1,): each has two halves."""
+        return np.append(0, np.cumsum(self.counts[:, 2])) // 2
 
     @property
     def vertex_count(self) -> int:

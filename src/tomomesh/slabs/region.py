@@ -46,11 +46,6 @@ def region(place: Extent, cells: Sequence[Part], *, frame: MaskFrame, threads: i
     return Region(replace(net, links=np.empty((0, 6), np.int32)), rings)  # no step looks at them again
 
 
-def rings_of(found: Region) -> Rings:
-    """Return what steps alone look at."""
-    return found.rings
-
-
 def crossings_of(net: Net, shares: Sequence[NDArray[np.float64]], rows: Any = slice(None)) -> Floats:
     """Return where levels cross the bounds (q, 3), of some squares; half way where no shares (q,) are given."""
     steps = steps_of(net.directions[rows])
@@ -91,14 +86,14 @@ def goals_of(place: Extent, parts: Sequence[Part]) -> Floats:
 
 
 def stepped(
-    place: Extent, rings: Rings, goals: Floats, parts: Sequence[Part], *, springs: Springs, steps: int, begins: bool
+    place: Extent, found: Region, goals: Floats, parts: Sequence[Part], *, springs: Springs, steps: int, begins: bool
 ) -> Part:
     """Take steps, of which no vertex that is looked at is too far from a slab's own.
 
     Parameters
     ----------
     place : Extent
-    rings : Rings
+    found : Region
     goals : (n, 3) float array
     parts : sequence of Part
         Where the vertices were before the last step, and where they are.
@@ -115,7 +110,7 @@ def stepped(
     *earlier, position = gathered(parts, place.of_vertices, LAST if begins else slice(None))
     state, motions = NetState(position, earlier[0] if earlier else position.copy(), goals), []
     for left in range(steps - 1, -1, -1):
-        state, motion = moved(state, rings, springs, place.rows(left * springs.reach))
+        state, motion = moved(state, found.rings, springs, place.rows(left * springs.reach))
         motions.append(motion[:2])
     return replace(_own(place, (state.before, state.position)), told=np.array(motions))
 

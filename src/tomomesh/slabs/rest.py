@@ -13,7 +13,7 @@ from ..isosurface.thin import GIVEN_BACK
 from ..model.trace import Motion, Trace
 from .parts import told_by
 from .place import HALO
-from .region import LAST, begun, goals_of, put, returned, rings_of, stepped
+from .region import LAST, begun, goals_of, put, returned, stepped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,14 +58,13 @@ class Settling:
     def reached(self) -> tuple[list[Kept], slice, Trace]:
         """Return a part a slab, which of its arrays says where the vertices come to rest, and how they did."""
         goals, state = self._begun()
-        rings, where = self.slabs.each(rings_of, self.regions), LAST
-        history, rested, most = list[Motion](), False, self.settings.max_steps
+        where, history, rested, most = LAST, list[Motion](), False, self.settings.max_steps
         while len(history) < most and not rested:
             begin, steps = self.net.exchanged(state), min(self._likely(history), most - len(history))
-            state, motions = self._stepped(rings, goals, begin, steps, not history)
+            state, motions = self._stepped(goals, begin, steps, not history)
             done = next((n for n, one in enumerate(motions, 1) if one.rests(self.settings.tolerance)), 0)
             if 0 < done < steps - 1:  # the others are not to be taken
-                state, motions = self._stepped(rings, goals, begin, done, not history)
+                state, motions = self._stepped(goals, begin, done, not history)
             where = slice(1) if 0 < done == len(motions) - 1 else LAST
             history, rested = [*history, *motions[: done or None]], done > 0
             self.progress("fit", len(history), most)
@@ -98,10 +97,10 @@ class Settling:
         return self.slabs.each(goals_of, places, near), start
 
     def _stepped(
-        self, rings: list[Kept], goals: list[Kept], begin: list[tuple[Kept, ...]], steps: int, begins: bool
+        self, goals: list[Kept], begin: list[tuple[Kept, ...]], steps: int, begins: bool
     ) -> tuple[list[Kept], list[Motion]]:
         """Take steps, and tell how the whole moves in each."""
         work = partial(stepped, springs=self.springs, steps=steps, begins=begins)
-        state = self.slabs.each(work, self.net.places, rings, goals, begin)
+        state = self.slabs.each(work, self.net.places, self.regions, goals, begin)
         longest = np.max(told_by(self.slabs, state), axis=0)
         return state, [Motion(speed, change, 0.0) for speed, change in longest.tolist()]

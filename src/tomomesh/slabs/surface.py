@@ -24,10 +24,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..isosurface.crossings import EVENED, Levels, sampled
+from ..isosurface.run_mask import RunMask
 from ..isosurface.settle import Springs
 from ..model.boxes import box_of
 from ..progress import Progress, silent
 from .contacts import AROUND, ROUNDS, cavities_in, filled, whole_of
+from .crossed import SlabCrossings, crossed
 from .cuts import Cuts
 from .frame import MaskFrame
 from .ground import bits_of, cells_from, ground, runs_of, sample, squares_from, told_of
@@ -41,7 +43,6 @@ from .triangles import chosen, piece
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..isosurface.run_mask import RunMask
     from ..model.boxes import Box
     from ..model.trace import Trace
     from ..settings import FitSettings
@@ -106,6 +107,7 @@ class SlabSurface:
         Voxels that lie inside, and components of the others that the outside does not reach.
     stepped : bool
         Whether the levels are those of a mask.
+    crossings : SlabCrossings
     trace : Trace
         In voxels; the energies, `distance_mm`, `clamped` and `unattracted` are not measured.
     """
@@ -115,12 +117,13 @@ class SlabSurface:
     enclosed: int
     cavities: int
     stepped: bool
+    crossings: SlabCrossings
     trace: Trace
 
     @property
     def squares(self) -> int:
         """Faces between voxels, each of two halves."""
-        return int(self.mesh.counts[:, 2].sum()) // 2
+        return int(self.mesh.squares[-1])
 
 
 def surface_in_slabs(
@@ -160,9 +163,10 @@ def surface_in_slabs(
     del found, cells  # they would take the disk
     thin = any(one.thin for one in told)
     state, rest, trace = Settling(net, regions, squares, thin, springs, settings, slabs, progress).reached()
-    mesh = _meshed(net, regions, squares, state, rest, asked.affine, slabs)
+    mesh = _meshed(net, regions, squares, state, rest, asked, slabs)
     added = sum(one.added for one in told)
-    return SlabSurface(mesh, added, solid.count, cavities_in(solid), even, trace)
+    crossings = SlabCrossings(slabs, slabs.each(crossed, net.places, regions, squares), mesh.squares)
+    return SlabSurface(mesh, added, solid.count, cavities_in(solid), even, crossings, trace)
 
 
 def _layers(cuts: Cuts, frame: MaskFrame) -> Cuts:
@@ -198,7 +202,7 @@ def _grounded(asked: Asked, frame: MaskFrame, layers: Cuts, slabs: Slabs, thread
     found = slabs.each(joins, *columns, [()] * len(layers), nothing)
     while any(one.unfinished for one in slabs.fetch(slabs.each(told_of, found))):
         found = slabs.each(joins, *columns, bits(), nothing)
-    joined = _mask_of(found, frame, slabs)
+    joined = _mask_of(found, asked, frame, slabs)
     if asked.surface != "outer":
         return found, joined
     whole = filled(joined)
@@ -206,8 +210,10 @@ def _grounded(asked: Asked, frame: MaskFrame, layers: Cuts, slabs: Slabs, thread
     return slabs.each(partial(work, rounds=0), *columns, bits(), solid), whole
 
 
-def _mask_of(found: list[Kept], frame: MaskFrame, slabs: Slabs) -> RunMask:
-    """Return the whole mask as it is now, in the frame."""
+def _mask_of(found: list[Kept], asked: Asked, frame: MaskFrame, slabs: Slabs) -> RunMask:
+    """Return the whole mask as it is now, in the frame: where no voxel was added, the one that was asked for."""
+    if isinstance(asked.mask, RunMask) and not any(one.added for one in slabs.fetch(slabs.each(told_of, found))):
+        return frame.framed(asked.mask)
     return whole_of(slabs.fetch(slabs.each(partial(runs_of, shape=frame.shape[1:]), found)))
 
 
@@ -232,13 +238,13 @@ def _meshed(
     squares: list[tuple[Kept, ...]],
     state: list[Kept],
     rest: slice,
-    affine: NDArray[np.float64],
+    asked: Asked,
     slabs: Slabs,
 ) -> SlabMesh:
     """Split the squares into triangles, and give the centers their numbers."""
-    work = partial(chosen, rest=rest, affine=affine)
+    work = partial(chosen, rest=rest, affine=asked.affine)
     choice = slabs.each(work, net.places, regions, squares, net.exchanged(state))
     fours = np.array(told_by(slabs, choice), np.int64)
     first = (int(net.vertices[-1]) + np.cumsum(fours) - fours).tolist()
-    last = partial(piece, rest=rest, affine=affine)
+    last = partial(piece, rest=rest, affine=asked.affine, shape=tuple(asked.mask.shape))
     return SlabMesh.of(slabs.each(last, net.places, regions, squares, state, choice, first), slabs)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..isosurface.diagonals import diagonals, fours_of, placed, right_handed, split
+from ..isosurface.crossings import beyond_border
+from ..isosurface.diagonals import diagonals, fours_of, of_triangles, placed, right_handed, split
+from ..isosurface.surface_nets import steps_of
 from .mesh import Piece
 from .parts import Part, gathered
 from .region import crossings_of
@@ -45,13 +47,15 @@ def chosen(
 
 def piece(
     place: Extent, found: Region, squares: Sequence[Part], part: Part, choice: Part, first: int, *, rest: slice,
-    affine: NDArray[np.float64],
+    affine: NDArray[np.float64], shape: tuple[int, ...],
 ) -> Piece:  # fmt: skip
-    """Return a slab's piece of the mesh, whose first center has a number in the whole; see `chosen`."""
+    """Return a slab's piece of the mesh, of a volume of a shape; its first center has a number in it. See `chosen`."""
     net, threads, (_, *shares) = found.net, found.rings.threads, gathered(squares, place.of_squares)
     (start, stop), own, shift = place.own_squares(), choice.arrays[0], place.of_vertices[0]
     halves, quarters = split(net.quads[start:stop], own, right_handed(affine), first - shift, threads)
-    centers = crossings_of(net, shares, start + fours_of(own))
+    fours = fours_of(own)
+    centers = crossings_of(net, shares, start + fours)
     halves += shift
-    (position,) = part.arrays[rest]
-    return Piece(placed(position, affine, threads), placed(centers, affine, threads), halves, quarters + shift)
+    beyond = beyond_border(net.inner[start:stop], steps_of(net.directions[start:stop]), shape)
+    vertices, middles = (placed(indices, affine, threads) for indices in (*part.arrays[rest], centers))
+    return Piece(vertices, middles, halves, quarters + shift, of_triangles(beyond, fours))

@@ -31,6 +31,7 @@ JUMP = 0.02
 end half a slice inside. Chosen: a ball of 32 slices has .006 and its mesh 98.5 % of the volume, a cylinder .031 and
 96 %. Half changes none of 42 windows, twice lets cylinders pass, whose ring is .5 mm off where a ball's is .23."""
 ONE = "one outline a slice"
+LABELS = "labels are drawn to the voxel"
 OPEN = ("slices", "way", "network", "space", "contours")
 """Parameters of networks that ask for none."""
 
@@ -80,6 +81,12 @@ def asked_way(asked: NetworkSettings) -> Taken | None:
     return Taken("ring" if asked.way == "paper" else asked.way, f"asked for by --way {asked.way}", chosen=False)
 
 
+def known_way(settings: Settings) -> Taken | None:
+    """Return the way that the settings alone tell, whatever the window is; None where it is to choose."""
+    labelled = chosen_by(settings) == "labels"
+    return asked_way(settings.network) or (chosen_way(settings.network, LABELS) if labelled else None)
+
+
 def chosen_way(asked: NetworkSettings, against: str) -> Taken:
     """Choose one ring a slice where nothing speaks against it; else voxels, or several rings to who asks for networks.
 
@@ -108,7 +115,7 @@ def against_one_ring(found: Outlines, source: str) -> str:
         What chose the window.
     """
     if source == "labels":
-        return "labels are drawn to the voxel"
+        return LABELS
     if found.share(found.single) < NEARLY:
         return f"{_counted(found.pieces, found)} and {_counted(found.holes, found)} a slice"
     return _against_wall(found, source) if found.wall else _against_solid(found)

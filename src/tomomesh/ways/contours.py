@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -10,9 +11,9 @@ import numpy as np
 from ..errors import EmptyError
 from ..followed import Followed, boundary_followed, components_followed
 from ..isosurface.crossings import Levels
-from ..isosurface.run_mask import RunMask
 from ..isosurface.voxels import Boundary, boundary, voxel_surface
 from ..measure.rings import assess_contours
+from ..memory.limit import disk_folder
 from ..model.sliced import ranges, some_of, together
 from ..progress import Progress, silent
 from ..results import Enclosed, Segmentation, Surface
@@ -20,17 +21,22 @@ from ..segmentation.contours.between import Between, filled_between
 from ..segmentation.contours.train import train_contours
 from ..segmentation.networks.training import regions
 from ..segmentation.sample import sample_contours
+from ..slabs.near import NearSurface
 from ..stage import Stage, folded, measured
 from .sections import body_of_voxels, boundary_found, missed, networks_on_slices, sampling_found
 from .way import POINTS, TRAINING, Way, parameters
 
 if TYPE_CHECKING:
+    from ..isosurface.run_mask import RunMask
     from ..model.contours import Contours
     from ..model.volume import Volume
     from ..segmentation.study import Selected
     from ..settings import Settings
 
 NOTHING = np.empty(0, np.int32)
+FEW = 4
+"""What part of the slices that are read together levels are drawn of together, where they are never whole: what lies
+between the parts is drawn twice, and what they are made of takes three times their memory. Chosen."""
 
 
 def segment_by_contours(kept: Selected, settings: Settings, progress: Progress) -> Stage[Segmentation[Contours]]:
@@ -59,7 +65,7 @@ def surface_by_contours(found: Segmentation[Contours], settings: Settings, progr
         Where the rings enclose the middle of no pixel, or are on one slice alone.
     """
     run = settings.run
-    follows = measured("quality", _followed, found, run.threads)  # before there is a net, which takes as much
+    follows = measured("quality", followed_by, found, run.threads)  # before there is a net, which takes as much
     bounded = measured(
         "contours", boundary_of_rings, found, surface=settings.cubes.surface, threads=run.threads, progress=progress
     )
@@ -74,7 +80,7 @@ def surface_by_contours(found: Segmentation[Contours], settings: Settings, progr
     return folded(surface, bounded, meshed, follows, boundary_found(made, rest))
 
 
-def _followed(found: Segmentation[Contours], threads: int) -> Followed:
+def followed_by(found: Segmentation[Contours], threads: int) -> Followed:
     """Return what of the window the contours are to follow."""
     if found.source.kind != "components":
         return boundary_followed(found.runs, found.volume)
@@ -83,7 +89,7 @@ def _followed(found: Segmentation[Contours], threads: int) -> Followed:
 
 
 def levels_of_rings(found: Segmentation[Contours], threads: int = 0) -> tuple[Volume, RunMask]:
-    """Return the levels around rings, drawn as they are asked for, and which voxels lie inside: what slabs take.
+    """Return the levels around rings, drawn once, some slices at a time, and which voxels lie inside: what slabs take.
 
     Inside is what is over 0.
 
@@ -95,10 +101,11 @@ def levels_of_rings(found: Segmentation[Contours], threads: int = 0) -> tuple[Vo
     _refuse_one_slice(found.source)
     between = Between.of(found.source, found.runs, found.volume, found.levels, threads)
     volume = between.over(found.volume)
-    parts = ranges(0, between.shape[0], together(between.frame) * between.times)
-    inside = RunMask.of((some_of(volume.voxels, *part) > 0 for part in parts), threads)
-    _refuse_none(found.source, inside.count)
-    return volume, inside
+    parts = ranges(0, between.shape[0], max(together(between.frame) // FEW, 1) * between.times)
+    drawn = (some_of(volume.voxels, *part) for part in parts)
+    levels: Any = NearSurface.of(drawn, between.most, disk_folder(), threads)
+    _refuse_none(found.source, levels.inside.count)
+    return replace(volume, voxels=levels), levels.inside
 
 
 def boundary_of_rings(

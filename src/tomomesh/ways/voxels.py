@@ -52,6 +52,7 @@ def surface_by_voxels(found: Segmentation[Boundary], settings: Settings, progres
     surface = Surface(
         found.points, source.cuberille, made.smoothed, made.mesh, made.nearest, cavities=source.cavities,
         follows=Followed("voxels", source.affine, source.crossings.positions, float(source.volumes.sum())),
+        cut_off=made.cut_off,
     )  # fmt: skip
     return folded(surface, meshed, boundary_found(source, made, labels=settings.window.select is not None))
 

@@ -56,6 +56,7 @@ def surface_by_walls(found: Segmentation[WallBoundary], settings: Settings, prog
     surface = Surface(
         found.points, source.cuberille, made.smoothed, made.mesh, made.nearest, cavities=source.cavities,
         follows=Followed("voxels", source.affine, source.crossings.positions, float(source.volumes.sum())),
+        cut_off=made.cut_off,
     )  # fmt: skip
     return folded(surface, boundary_found(source, made, labels=True), _walls_found(source))
 

@@ -88,7 +88,7 @@ def _surface(commands: Any) -> None:
         help="memory to take, about, as 4GB: arrays beyond it lie on the disk of TMPDIR (Linux; default: no limit)",
     )  # fmt: skip
     add_outputs(stage_two, "figures")
-    add_settings(stage_two, ("cloud", *STAGE_TWO, "run"), without=STUDY_ONLY)
+    add_settings(stage_two, ("cloud", "crop", *STAGE_TWO, "run"), without=("slice_range", *STUDY_ONLY))
 
 
 def _network(commands: Any) -> None:

@@ -51,6 +51,8 @@ USUAL = {
     "quiet": ("q", "silent"),
 }
 """Options by which other programs call what ours do."""
+SEVERAL = ("--workers", "--scheduler", "--slab")
+"""Options of a study larger than the memory that a cloud has not: one process takes it, for any limit."""
 COMMANDS = {
     "reconstruct": ("convert", "mesh", "run", "extract", "marching-cubes", "volume", "isosurface", "dicom2stl"),
     "surface": ("points", "cloud", "poisson", "pointcloud"),
@@ -76,6 +78,15 @@ def likely_option(word: str, known: Collection[str]) -> str:
     usual = [option for option, others in USUAL.items() if name in others]
     near = get_close_matches(name, [option.lstrip("-") for option in known], 1, 0.7)
     return next((f"--{option}" for option in (*usual, *near) if f"--{option}" in known), "")
+
+
+def likely_instead(word: str, known: Collection[str]) -> str:
+    """Return what a command has in place of an option of another's, given all that it has; "" where it has nothing."""
+    return (
+        "--memory SIZE, as 4GB: one process takes the cloud"
+        if word.partition("=")[0] in SEVERAL and "--memory" in known
+        else ""
+    )
 
 
 def likely_output(words: Collection[str]) -> str:

@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 from ... import __version__
 from ...errors import UsageError
 from .commands import add_commands
-from .likely import likely_command, likely_option, likely_output
+from .likely import likely_command, likely_instead, likely_option, likely_output
 
 
 class _Parser(argparse.ArgumentParser):
@@ -65,7 +65,8 @@ def _no_option(parser: argparse.ArgumentParser, unknown: list[str]) -> UsageErro
     given = unknown[0].partition("=")
     value = f"={given[2]}" if given[1] else "".join(f" {word}" for word in unknown[1:2])
     said = f"unrecognized arguments: {' '.join(unknown)}"
-    return UsageError(said, hint=f"{meant}{value}" if meant else f"`{parser.prog} --help`")
+    instead = likely_instead(unknown[0], parser._option_string_actions)
+    return UsageError(said, hint=instead or (f"{meant}{value}" if meant else f"`{parser.prog} --help`"))
 
 
 def build_parser() -> _Parser:

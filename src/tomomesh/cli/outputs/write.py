@@ -26,11 +26,16 @@ if TYPE_CHECKING:
     from ..bars import Bars
 
 
-def write_surface(chosen: Namespace, surface: Surface, settings: Settings, progress: Bars) -> Surface:
-    """Write the mesh, and whatever else was asked for; return the surface, whose report tells of it."""
+def write_surface(
+    chosen: Namespace, surface: Surface, settings: Settings, progress: Bars, *, fits: bool | None = None
+) -> Surface:
+    """Write the mesh, and whatever else was asked for; return the surface, whose report tells of it.
+
+    See `tomomesh.io.write_mesh` for `fits`.
+    """
     stage_one, part = surface.segmentation, surface.part
-    frame = _frame_asked(surface, chosen.output, settings)
-    in_file = _write_mesh(chosen, surface, frame, settings)
+    frame = frame_asked(surface, chosen.output, settings)
+    in_file = _write_mesh(chosen, surface, frame, settings, fits)
     told: dict[str, dict[str, Any]] = {"written": {"unit": in_file.unit, "frame": in_file.name}}
     if getattr(chosen, "points", None):
         write_points(surface.points, stage_one, chosen.points, settings, surface.place)
@@ -50,7 +55,7 @@ def write_one(what: str, surface: Surface, settings: Settings, path: Path) -> No
     """Write one file of a surface by itself: its mesh, points, labels, mask or report."""
     if what == "mesh":
         chosen = Namespace(output=path, patient=False)
-        _write_mesh(chosen, surface, _frame_asked(surface, path, settings), settings)
+        _write_mesh(chosen, surface, frame_asked(surface, path, settings), settings, None)
     elif what == "points":
         write_points(surface.points, surface.segmentation, path, settings, surface.place)
     elif what == "mask":
@@ -62,7 +67,9 @@ def write_one(what: str, surface: Surface, settings: Settings, path: Path) -> No
         io.write_labels(surface.segmentation.labels, surface.segmentation.volume, path)
 
 
-def _write_mesh(chosen: Namespace, surface: Surface, frame: io.Frame, settings: Settings) -> io.Frame:
+def _write_mesh(
+    chosen: Namespace, surface: Surface, frame: io.Frame, settings: Settings, fits: bool | None
+) -> io.Frame:
     """Write the mesh in a frame, or its part to print; return that of the numbers in the file."""
     stage_one, part, output = surface.segmentation, surface.part, chosen.output
     at_vertices, on_faces = _fields(surface, output)
@@ -74,7 +81,7 @@ def _write_mesh(chosen: Namespace, surface: Surface, frame: io.Frame, settings: 
     else:
         io.write_mesh(
             mesh, output, **named, vertex_fields=at_vertices, face_fields=on_faces, z_up=part is not None,
-            precision=settings.run.precision,
+            precision=settings.run.precision, fits=fits,
         )  # fmt: skip
     return io.frame_in_file(output, **named)
 
@@ -86,7 +93,7 @@ def _tell_cavities(report: dict[str, Any], frame: io.Frame, in_file: io.Frame) -
         report["written"]["cavity_places"] = in_file.place(frame.place(np.array(places))).tolist()
 
 
-def _frame_asked(surface: Surface, output: str | Path, settings: Settings) -> io.Frame:
+def frame_asked(surface: Surface, output: str | Path, settings: Settings) -> io.Frame:
     """Return the frame of the mesh that is written: a cloud's own, or that which was asked for, or the format has."""
     stage_one = surface.segmentation
     if stage_one is None:

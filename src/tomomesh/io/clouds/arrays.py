@@ -93,7 +93,8 @@ def _positions(array: NDArray[Any], file: str) -> NDArray[np.float64]:
             found=f"shape = {array.shape}, type = {array.dtype}",
             expected="(n, 3) real numbers",
         )
-    return doubles(array)
+    as_needed = array.dtype == np.float64 and array.flags.carray
+    return array if as_needed else doubles(array)  # a file's own rows are not held twice
 
 
 def write_npy(points: PointSet, path: str | Path, _beside: MeshAttributes) -> None:

@@ -13,12 +13,15 @@ from ..fields import AXES, side_by_side
 from ..files.extras import required
 from ..files.limits import require_bytes, require_memory, require_rows
 from ..files.source import first_bytes, third_party
+from .copc import apart, inside, nodes_meeting, unpacked
 from .laz import check_chunks
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
 
-    from ..fields import Cloud
+    from ..fields import Cloud, Fields
+    from .copc import Box
 
 CARRIED = ("intensity", "classification", "red", "green", "blue", "nir")
 """What is taken of a point beside its position and the file's own extra dimensions; the rest is the scan's."""
@@ -39,10 +42,11 @@ POINTS_AT_ONCE = 1 << 18
 """Points read at a time, at most 17 MB of them: a count that lies is found before much is allocated."""
 
 
-def read_las(path: Path) -> Cloud:
-    """Read a LAS or LAZ file of any version and point format that laspy knows.
+def read_las(path: Path, box: Box | None = None) -> Cloud:
+    """Read a LAS or LAZ file of any version and point format that laspy knows, or what of it lies in a box.
 
-    Heights in another unit than the other two are brought to theirs.
+    Heights in another unit than the other two are brought to theirs. Of a COPC file what lies beside the box is not
+    unpacked, nor is a file whose header says that all of it does.
     """
     file = str(path)
     _check_head(path)
@@ -55,17 +59,17 @@ def read_las(path: Path) -> Cloud:
         laspy.open(path, read_evlrs=False, laz_backend=laspy.LazBackend.Lazrs) as reader,
     ):
         heights = _meters(reader.header, file)[1]
-        _check_promises(path, reader.header)
         names = [name for name in reader.header.point_format.dimension_names if name in CARRIED]
         names += reader.header.point_format.extra_dimension_names
-        chunks = [_columns(chunk, names) for chunk in reader.chunk_iterator(POINTS_AT_ONCE)]
-        require_rows(reader.header.point_count, sum(len(chunk[""]) for chunk in chunks), "points", file=file)
-    if not chunks:
-        return np.empty((0, 3)), {}
-    columns = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
-    positions = columns.pop("")
-    positions[:, 2] *= heights
-    return positions, columns
+        _check_promises(path, reader.header)
+        if box is None:
+            require_memory(reader.header.point_count * reader.header.point_format.size, file=file)
+            chunks = (_columns(chunk, names, heights) for chunk in reader.chunk_iterator(POINTS_AT_ONCE))
+            columns = _filled(chunks, reader.header.point_count, file)
+        else:
+            near = _near(path, reader, (*box[:4], box[4] / heights, box[5] / heights))
+            columns = _joined([_part(_columns(chunk, names, heights), box) for chunk in near])
+    return columns.pop("", np.empty((0, 3))), columns
 
 
 def las_frame(path: Path) -> dict[str, Any]:
@@ -100,16 +104,52 @@ def _check_head(path: Path) -> None:
 
 
 def _check_promises(path: Path, header: Any) -> None:
-    """Compare the count of points with the file's bytes, where compressed that of the chunks, and the memory."""
-    size = header.point_count * header.point_format.size
+    """Compare the count of points with the file's bytes, where compressed that of the chunks."""
     if header.are_points_compressed:
         check_chunks(path, header)
     else:
-        require_bytes(header.offset_to_point_data + size, path.stat().st_size, file=str(path))
-    require_memory(size, file=str(path))
+        end = header.offset_to_point_data + header.point_count * header.point_format.size
+        require_bytes(end, path.stat().st_size, file=str(path))
 
 
-def _columns(chunk: Any, names: list[str]) -> dict[str, Any]:
+def _near(path: Path, reader: Any, box: Box) -> Iterator[Any]:
+    """Read the points that may lie in a box: those of the nodes that meet it, else all or none."""
+    if apart(reader.header, box):
+        return iter(())
+    nodes = nodes_meeting(path, reader.header, box)
+    if nodes is None:
+        return iter(reader.chunk_iterator(POINTS_AT_ONCE))
+    require_memory(int(nodes["count"].sum(dtype=np.int64)) * reader.header.point_format.size, file=str(path))
+    return unpacked(path, reader.header, nodes, at_once=POINTS_AT_ONCE)
+
+
+def _columns(chunk: Any, names: list[str], heights: float) -> Fields:
     """Return a chunk's positions, under the empty name, and its fields."""
     positions = side_by_side([chunk[axis].scaled_array() for axis in AXES])
+    positions[:, 2] *= heights
     return {"": positions, **{name: np.array(chunk[name]) for name in names}}
+
+
+def _part(columns: Fields, box: Box) -> Fields:
+    kept = inside(columns[""], box)
+    return {name: values[kept] for name, values in columns.items()}
+
+
+def _filled(chunks: Iterable[Fields], count: int, file: str) -> Fields:
+    """Put chunks one behind the other, in columns of so many rows: they are there once."""
+    columns: Fields = {}
+    done = 0
+    for chunk in chunks:
+        columns = columns or {
+            name: np.empty((count, *values.shape[1:]), values.dtype) for name, values in chunk.items()
+        }
+        for name, values in chunk.items():
+            columns[name][done : done + len(values)] = values
+        done += len(chunk[""])
+    require_rows(count, done, "points", file=file)
+    return columns
+
+
+def _joined(chunks: list[Fields]) -> Fields:
+    """Put chunks one behind the other whose rows were not known before."""
+    return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in (chunks[0] if chunks else ())}

@@ -6,8 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...errors import EmptyError, FormatError, GeometryError
+from ...errors import EmptyError, FormatError, GeometryError, UsageError
 from ...settings import CloudSettings
+from ...settings.crop import CropSettings
 from ..dicom import is_dicom
 from ..fields import point_set
 from ..files.source import existing, existing_file, reader_of, regular_files, suffix_of, whole
@@ -15,6 +16,7 @@ from ..finite import check_finite
 from ..meshes.read import MESH_READERS
 from ..meshes.vtp import read_vtp
 from .arrays import read_npy, read_npz
+from .copc import inside
 from .delimited import read_obj, read_text
 from .e57 import read_e57
 from .frame import frame_of_cloud
@@ -28,12 +30,14 @@ if TYPE_CHECKING:
 
     from ...model.points import PointSet
     from ..fields import Cloud
+    from .copc import Box
 
 TILES = (".las", ".laz")
 """Suffixes of the files of a folder that are read as one cloud; ``.copc.laz`` is one of them."""
+NONE_INSIDE = "no point of the cloud lies in the box"
 
 
-def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> PointSet:
+def read_points(path: str | Path, *, settings: CloudSettings | None = None, roi: Box | None = None) -> PointSet:
     """Read a cloud.
 
     Parameters
@@ -48,6 +52,10 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
         and ``.laz`` tiles of one cloud.
     settings : CloudSettings, optional
         What to do where the file leaves a choice.
+    roi : tuple of six floats, optional
+        Lowest and highest x, y and z of what is kept, in the cloud's own frame and unit, both included. Of LAS and LAZ
+        files, tiles among them, no more is held than that, and of COPC files (``.copc.laz``) no more unpacked than the
+        nodes that meet it.
 
     Returns
     -------
@@ -66,7 +74,9 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
     GeometryError
         Where a structure must be chosen, or its contours are no stack; where tiles are in several units.
     EmptyError
-        For a file without points.
+        For a file without points, or without any in the box.
+    UsageError
+        For a box of a structure's contours, which are closed curves.
     ResourceError
         For a file that would not fit into the memory.
 
@@ -79,21 +89,36 @@ def read_points(path: str | Path, *, settings: CloudSettings | None = None) -> P
     >>> cloud.positions.tolist(), cloud.attributes["intensity"].tolist()
     ([[0.0, 0.0, 0.0], [1.0, 0.0, 2.0]], [7, 8])
     """
+    roi = CropSettings(roi=roi).roi
     if Path(path).is_dir():
-        return _read_tiles(existing(path))
+        return _read_tiles(existing(path), roi)
     path = existing_file(path)
     if suffix_of(path) not in POINT_READERS and is_dicom(path):
         from ..dicom.objects.structures import read_structure  # its columns of contours load SciPy and the kernels
 
+        if roi is not None:
+            raise UsageError("contours are not cut to a box", file=str(path), found="--roi", hint="--structure")
         return read_structure(path, settings or CloudSettings())
-    positions, fields = reader_of(path, POINT_READERS)(path)
+    positions, fields = _within(path, roi)
     if len(positions) == 0:
-        raise EmptyError("the cloud has no points", file=str(path))
+        raise EmptyError("the cloud has no points" if roi is None else NONE_INSIDE, file=str(path), found=_said(roi))
     check_finite(positions, "row", file=str(path))
     return replace(point_set(positions, fields), **frame_of_cloud(path))
 
 
-def _read_tiles(folder: Path) -> PointSet:
+def _within(path: Path, roi: Box | None) -> Cloud:
+    """Read a file's points, or those in a box."""
+    if suffix_of(path) in TILES:
+        return read_las(path, roi)
+    positions, fields = reader_of(path, POINT_READERS)(path)
+    if roi is None:
+        return positions, fields
+    check_finite(positions, "row", file=str(path))
+    kept = inside(positions, roi)
+    return positions[kept], {name: values[kept] for name, values in fields.items()}
+
+
+def _read_tiles(folder: Path, roi: Box | None) -> PointSet:
     """Read the tiles in a folder as one cloud; those without points are none."""
     files, _ = regular_files(folder)
     tiles = [path for path in files if suffix_of(path) in TILES]
@@ -101,9 +126,10 @@ def _read_tiles(folder: Path) -> PointSet:
         raise FormatError(
             "the path is a folder", file=str(folder), expected="a file, or a folder of .las or .laz tiles"
         )
-    clouds = [cloud for cloud in map(_tile, tiles) if cloud is not None]
+    clouds = [cloud for cloud in (_tile(path, roi) for path in tiles) if cloud is not None]
     if not clouds:
-        raise EmptyError("the tiles have no points", file=str(folder), found=f"{len(tiles)} file(s)")
+        told = "the tiles have no points" if roi is None else NONE_INSIDE
+        raise EmptyError(told, file=str(folder), found=", ".join(filter(None, [f"{len(tiles)} file(s)", _said(roi)])))
     units = {str(cloud.unit) for cloud in clouds}
     if len(units) > 1:
         raise GeometryError(
@@ -114,11 +140,15 @@ def _read_tiles(folder: Path) -> PointSet:
     return replace(clouds[0].joined(*clouds[1:]), notes=(told,))
 
 
-def _tile(path: Path) -> PointSet | None:
+def _tile(path: Path, roi: Box | None) -> PointSet | None:
     try:
-        return read_points(path)
+        return read_points(path, roi=roi)
     except EmptyError:
         return None
+
+
+def _said(roi: Box | None) -> str:
+    return "" if roi is None else f"--roi = {' '.join(f'{side:.10g}' for side in roi)}"
 
 
 def _read_vertices(path: Path) -> Cloud:
@@ -136,8 +166,7 @@ POINT_READERS: dict[str, Callable[[Path], Cloud]] = {
     ".npy": read_npy,
     ".npz": read_npz,
     ".pcd": read_pcd,
-    ".las": read_las,
-    ".laz": read_las,
+    **dict.fromkeys(TILES, read_las),
     ".e57": read_e57,
     ".obj": read_obj,
     ".off": _read_vertices,

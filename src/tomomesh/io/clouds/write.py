@@ -50,7 +50,7 @@ def write_points(
 
 
 def _write_ply(points: PointSet, path: str | Path, beside: MeshAttributes) -> None:
-    columns: Fields = dict(zip(AXES, narrowed(points.positions, single=beside.single).T, strict=True))
+    columns: Fields = dict(zip(AXES, narrowed(points.positions, beside).T, strict=True))
     columns |= zip(IDS, (points.slices, points.neurons, points.kinds), strict=True)
     columns |= flat_columns(points.attributes, len(points), columns)
     write_ply(path, beside.head, columns)

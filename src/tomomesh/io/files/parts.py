@@ -81,11 +81,13 @@ class Seen:
         """
         try:
             stat = self.path.stat()
-            found = f"size = {stat.st_size} bytes, {self.size} before"
-            same = (stat.st_size, stat.st_mtime_ns) == (self.size, self.changed_ns)
         except OSError as fault:
-            same, found = False, str(fault.strerror).lower()
-        if not same:
+            raise UnreadableError(
+                "the file that was opened is not there", file=self.path.name, found=str(fault.strerror).lower(),
+                hint="the same command, with the file at the same path on every machine that works on it",
+            ) from None  # fmt: skip
+        if (stat.st_size, stat.st_mtime_ns) != (self.size, self.changed_ns):
+            found = f"size = {stat.st_size} bytes, {self.size} before"
             hint = "the same command again, once nothing writes to it"
             raise UnreadableError(
                 "the file has changed since it was opened", file=self.path.name, found=found, hint=hint

@@ -59,9 +59,9 @@ class MeshAttributes:
         return signature(self.unit, self.frame)
 
 
-def narrowed(positions: NDArray[np.float64], *, single: bool) -> NDArray[np.floating[Any]]:
+def narrowed(positions: NDArray[np.float64], beside: MeshAttributes) -> NDArray[np.floating[Any]]:
     """Return positions (n, 3) in 32 bits where that was asked for and keeps them apart, else in 64."""
-    return np.asarray(positions, np.float32 if single and fits_single(_alone(positions)) else np.float64)
+    return np.asarray(positions, kind_of(_alone(positions), beside))
 
 
 def kind_of(mesh: Parts, beside: MeshAttributes) -> type[np.floating[Any]]:

@@ -44,6 +44,9 @@ WRITTEN = ("u1", "i4", "u4", "f4", "f8")
 MOST_VERTICES = 2**31 - 1
 """As many as ``int`` numbers, which every reader takes; ``uint``, the longest that PLY has, reaches twice as far."""
 
+FILLED = "filled"
+"""The property of faces that were filled, not measured."""
+
 LINE_END = re.compile(rb"[ \t]*(\r\n|\n|\r)")
 """The end of the header's last line: behind a lone carriage return the first row may begin with any byte but that of a
 line feed, which no format tells from the end of both."""
@@ -167,9 +170,11 @@ def ply_parts(mesh: Parts, path: str | Path, beside: MeshAttributes) -> Iterator
     kind = kind_of(mesh, beside)
     at, on = ({name: _storable(values) for name, values in one.items()} for one in _fields(beside))
     vertices = _numbered((dict(zip(AXES, some.astype(kind).T, strict=True)) for some in mesh.vertices()), at)
-    faces = _numbered(({"count": _threes(some), "corners": some.astype(np.int32)} for some in mesh.faces()), on)
+    filled = mesh.filled()
+    faces = _numbered(_marked(_corners(mesh), filled), on)
     lines = _element("vertex", mesh.vertex_count, {**dict.fromkeys(AXES, np.empty(0, kind)), **at})
-    lines += [f"element face {mesh.face_count}", "property list uchar int vertex_indices", *_properties(on)]
+    lines += [f"element face {mesh.face_count}", "property list uchar int vertex_indices"]
+    lines += _properties({} if filled is None else {FILLED: np.empty(0, np.uint8)}) + _properties(on)
     yield _head(beside.head, lines)
     yield from (_rows(some).tobytes() for rows in (vertices, faces) for some in rows)
 
@@ -180,6 +185,17 @@ def _fields(beside: MeshAttributes) -> tuple[Fields, Fields]:
 
 def _threes(faces: NDArray[np.int64]) -> NDArray[np.uint8]:
     return np.full(len(faces), 3, np.uint8)
+
+
+def _corners(mesh: Parts) -> Iterator[Fields]:
+    return ({"count": _threes(some), "corners": some.astype(np.int32)} for some in mesh.faces())
+
+
+def _marked(parts: Iterator[Fields], filled: Iterator[NDArray[np.bool_]] | None) -> Iterator[Fields]:
+    """Put which faces were filled behind the columns of each part of them, where any was."""
+    if filled is None:
+        return parts
+    return (columns | {FILLED: some.view(np.uint8)} for columns, some in zip(parts, filled, strict=True))
 
 
 def _numbered(parts: Iterator[Fields], fields: Fields) -> Iterator[Fields]:

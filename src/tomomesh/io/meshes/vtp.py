@@ -152,7 +152,7 @@ def _write(
                 f'<Piece NumberOfPoints="{len(positions)}"{counts}>',
                 *_section("PointData", point_data),
                 *_section("CellData", cell_data),
-                *_section("Points", {"Points": narrowed(positions, single=beside.single)}),
+                *_section("Points", {"Points": narrowed(positions, beside)}),
                 *(line for name in PARTS for line in _cells(name, cells if name == part else cells[:0])),
                 "</Piece>",
                 "</PolyData>",

@@ -40,6 +40,7 @@ def write_mesh(
     face_fields: Mapping[str, NDArray[Any]] | None = None,
     z_up: bool = False,
     precision: int = 64,
+    fits: bool | None = None,
 ) -> None:
     """Write a triangle mesh; the same mesh gives the same bytes.
 
@@ -62,6 +63,8 @@ def write_mesh(
         Whether z is up where the frame does not say so, as of a part to print: GLB has y up.
     precision : {64, 32}
         Bits of the coordinates in PLY and VTP; 64 all the same where 32 would let vertices fall together.
+    fits : bool, optional
+        Whether 32 do not, where that is known of the whole that this mesh is a part of: all parts then have the same.
 
     Raises
     ------
@@ -84,7 +87,7 @@ def write_mesh(
     check_output(path, MESH_WRITERS)
     at_vertices = flat_columns(vertex_fields or {}, parts.vertex_count, AXES)
     on_faces = flat_columns(face_fields or {}, parts.face_count, ["count", "corners", "vertex_indices"])
-    beside = MeshAttributes(unit, frame, at_vertices, on_faces, z_up=z_up, single=precision == 32)
+    beside = MeshAttributes(unit, frame, at_vertices, on_faces, z_up=z_up, single=precision == 32, fits=fits)
     if suffix_of(path) in PART_WRITERS:
         write_parts(PART_WRITERS[suffix_of(path)](parts, path, beside), path)
     elif isinstance(mesh, TriMesh):

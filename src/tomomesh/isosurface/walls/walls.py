@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...model.columns import any_of
 from ...model.mesh import TriMesh
-from ...model.points import ADDED, BORDER, CROSSING
 from ...progress import Progress, silent
-from ..crossings import LevelCrossings
-from ..diagonals import triangulated
+from ..crossings import LevelCrossings, beyond_border, kinds_of
+from ..diagonals import of_triangles, triangulated
 from ..settle import settle
 from ..surface_nets import Net
 from ..voxels import Boundary, VoxelSurface
@@ -91,7 +89,10 @@ class Walls:
             self.crossings.positions[squares], self._kinds(net), stepped=True, bending=self.crossings.bending
         )  # fmt: skip
         beyond = np.append(0, self.block.numbers)[self.net.labels[squares, np.where(turned, 0, 1)]]
-        made, lost = self._made(squares, turned, used, net), int(np.count_nonzero(self.block.before == index))
+        made, lost = (
+            self._made(squares, turned, used, net, crossings),
+            int(np.count_nonzero(self.block.before == index)),
+        )
         return WallBoundary(
             self.block.affine, net, crossings, self._given_to(index), self.block.parts, made=made, beyond=beyond,
             lost=lost,
@@ -109,26 +110,28 @@ class Walls:
         links = _links(low, quads)
         return used, Net(low, links, none, quads, none, inner, net.directions[squares] ^ turned)
 
-    def _made(self, squares: Ints, turned: Marks, used: NDArray[np.int32], net: Net) -> VoxelSurface:
+    def _made(
+        self, squares: Ints, turned: Marks, used: NDArray[np.int32], net: Net, crossings: LevelCrossings
+    ) -> VoxelSurface:
         fours = np.flatnonzero(np.isin(self.fours, squares))
         of_fours = np.searchsorted(squares, self.fours[fours])
         quarters = 2 * len(self.net.quads) + 2 * fours[:, None] + (0, 1)
         chosen = np.concatenate([(2 * squares[:, None] + (0, 1)).ravel(), quarters.ravel()])
         faces = self.mesh.faces[chosen]
-        back = np.concatenate([np.repeat(turned, 2), np.repeat(turned[of_fours], 2)])
+        back = of_triangles(turned, of_fours)
         faces[back] = faces[back, ::-1]
         vertices = np.concatenate([used, len(self.net.low) + fours])
         place = np.empty(len(self.mesh.vertices), np.int64)
         place[vertices] = np.arange(len(vertices))
         start, mesh = (TriMesh(one.vertices[vertices], place[faces]) for one in (self.start, self.mesh))
-        return VoxelSurface(start, mesh, np.concatenate([_first_squares(net), of_fours]).astype(np.int32), self.fit)
+        nearest = np.concatenate([_first_squares(net), of_fours]).astype(np.int32)
+        return VoxelSurface(start, mesh, nearest, self.fit, of_triangles(crossings.cut_off, of_fours))
 
     def _kinds(self, net: Net) -> NDArray[np.uint8]:
         """Tell what the crossings of a label's net are."""
-        outer, last = net.inner + net.steps, np.array(self.block.shape[::-1], np.int32) - 1
-        beyond = any_of((outer < 0) | (outer > last))
+        beyond = beyond_border(net.inner, net.steps, self.block.shape)
         voxels = np.ravel_multi_index(tuple((net.inner - self.block.low).T[::-1]), self.block.labels.shape)
-        return np.where(np.isin(voxels, self.block.given), ADDED, np.where(beyond, BORDER, CROSSING)).astype(np.uint8)
+        return kinds_of(np.isin(voxels, self.block.given), beyond)
 
     def _given_to(self, index: int) -> int:
         return int(np.count_nonzero(self.block.labels.reshape(-1)[self.block.given] == index))

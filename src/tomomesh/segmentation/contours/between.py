@@ -92,6 +92,11 @@ class Between:
         return {one.track for one in self.contours.contours if one.side % 2}
 
     @property
+    def most(self) -> np.float32:
+        """The greatest depth that is told."""
+        return np.float32(self.frame.pixel.max())
+
+    @property
     def around(self) -> int:
         """Slices before the first with a ring, and after the last."""
         return self.times // 2 + 1
@@ -126,8 +131,7 @@ class Between:
                 found[begin + within.start - start : begin + within.stop - start] = spaces.filled(k)[within]
 
         in_blocks(work, high + 1 - low, block=1, threads=self.threads)
-        most = np.float32(self.frame.pixel.max())
-        return np.clip(found, -most, most, out=found)[(slice(None, None, by), *box[1:])]
+        return np.clip(found, -self.most, self.most, out=found)[(slice(None, None, by), *box[1:])]
 
     def over(self, study: Volume) -> Volume:
         """Place the slices in space, not drawn yet."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...kernels.threads import in_order
+from ...kernels.threads import in_blocks, in_order
 from ..signal import is_stepped
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class FullLevels:
         """
         if levels is None or len(levels.voxels.shape) > 3 or is_stepped(mask, levels):
             return None
-        rows = [row for insides in parts for row in _full(insides, levels, threads)]
+        rows = [row for some in map(partial(_full, levels, threads), parts) for row in some]  # keeps none of the parts
         inside, outside = (np.concatenate(each) for each in zip(*rows, strict=True))
         return cls(levels, (_median(inside), _median(outside)))
 
@@ -70,16 +71,20 @@ class FullLevels:
         """
         seen, most = insides.over(self.levels.voxels, np.nan), np.float32(DEEP * insides.pixel.max())
 
-        def temper(k: int) -> Depths:
-            depths, within = insides.depths[k], _within(self.levels, seen[k])
-            deep = np.full(depths.shape, most)
-            for side, full in zip((1, -1), self.full, strict=True):
-                if full > 0:
-                    here = side * depths > 0
-                    deep[here] *= np.clip(side * within[here] / full, 0, 1)
-            return np.asarray(np.clip(depths, -deep, deep))
+        found = np.empty_like(insides.depths)
 
-        return np.stack(in_order(temper, len(seen), threads=threads))
+        def temper(start: int, stop: int) -> None:
+            for k in range(start, stop):
+                depths, within = insides.depths[k], _within(self.levels, seen(k))
+                deep = np.full(depths.shape, most)
+                for side, full in zip((1, -1), self.full, strict=True):
+                    if full > 0:
+                        here = side * depths > 0
+                        deep[here] *= np.clip(side * within[here] / full, 0, 1)
+                np.clip(depths, -deep, deep, out=found[k])
+
+        in_blocks(temper, len(found), block=1, threads=threads)
+        return found
 
 
 def _within(levels: Levels, seen: NDArray[np.float32]) -> Values:
@@ -87,17 +92,17 @@ def _within(levels: Levels, seen: NDArray[np.float32]) -> Values:
     return np.asarray(np.nan_to_num(np.minimum(seen - levels.lower, levels.upper - seen), nan=-np.inf))
 
 
-def _full(insides: Insides, levels: Levels, threads: int) -> list[list[Values]]:
+def _full(levels: Levels, threads: int, insides: Insides) -> list[list[Values]]:
     """Return how far levels are within the bounds inside, past the blur, and beyond them outside: of each slice."""
     low, high = (bound * float(insides.pixel.max()) for bound in BEYOND)
     seen = insides.over(levels.voxels, np.nan)
 
     def find(k: int) -> list[Values]:
-        depths, within = insides.depths[k], _within(levels, seen[k])
+        depths, within = insides.depths[k], _within(levels, seen(k))
         known = np.isfinite(within)
         return [side * within[(side * depths > low) & (side * depths < high) & known] for side in (1, -1)]
 
-    return in_order(find, len(seen), threads=threads)
+    return in_order(find, len(insides.depths), threads=threads)
 
 
 def _median(values: Values) -> float:

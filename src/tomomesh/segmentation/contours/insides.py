@@ -14,7 +14,7 @@ from ...model.sliced import some_of
 from .curved import finely
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -98,14 +98,22 @@ class Insides:
         """The greatest depth that is told."""
         return REACH * float(self.pixel.max())
 
-    def over(self, voxels: Sliced, beyond: float) -> NDArray[np.float32]:
-        """Return voxels (K, J, I) of the study over the pixels that are looked at; `beyond` where it has none."""
-        found = np.full(self.depths.shape, beyond, np.float32)
-        low = self.low[::-1]
-        first, stop = np.maximum(low, 0), np.minimum(low + found.shape, voxels.shape)
+    def over(self, voxels: Sliced, beyond: float) -> Callable[[int], NDArray[np.float32]]:
+        """Look at voxels (K, J, I) of the study over the pixels: returns what tells a slice (J, I) of them.
+
+        There are `beyond` where the study has none.
+        """
+        low, shape = self.low[::-1], self.depths.shape
+        first, stop = np.maximum(low, 0), np.minimum(low + shape, voxels.shape)
         slices, *box = map(slice, first, stop)
-        found[tuple(map(slice, first - low, stop - low))] = some_of(voxels, slices.start, slices.stop)[:, *box]
-        return found
+        some = some_of(voxels, slices.start, slices.stop)[:, *box]  # as few bytes as the study has
+
+        def plane(k: int) -> NDArray[np.float32]:
+            found = np.full(shape[1:], beyond, np.float32)
+            found[tuple(map(slice, (first - low)[1:], (stop - low)[1:]))] = some[k]
+            return found
+
+        return plane
 
     def only(self, start: int, stop: int) -> Insides:
         """Return some of the slices."""
@@ -145,14 +153,14 @@ def insides_of(
     stop = frame.shape[0] if stop is None else stop
     depths = np.full((stop - start, *frame.shape[1:]), -REACH * frame.pixel.max(), np.float32)
     insides = Insides(frame.pixel, np.add(frame.low, (0, 0, start)), frame.curves(contours, start, stop), depths)
-    window = insides.over(mask, 0) > 0 if contours.kind == "loops" else None
+    window = insides.over(mask, 0) if contours.kind == "loops" else None
 
     def work(first: int, last: int) -> None:
         for k in range(first, last):
             if insides.curves[k]:
                 insides.draw(list(insides.curves[k].values()), depths[k])
                 if window is not None:
-                    _side_with(window[k], depths[k], float(frame.pixel.min()))
+                    _side_with(window(k) > 0, depths[k], float(frame.pixel.min()))
 
     in_blocks(work, len(depths), block=1, threads=threads)
     return insides

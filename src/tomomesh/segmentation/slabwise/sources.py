@@ -74,6 +74,10 @@ class MaskVoxels:
         """Whole slices are drawn."""
         return 1, *self.shape[1:]
 
+    def part(self, start: int, stop: int) -> MaskVoxels:
+        """Return some slices alone."""
+        return MaskVoxels(self.mask.part(start, stop))
+
     def read(self, box: tuple[slice, ...]) -> NDArray[Any]:
         """Draw a part of it."""
         slices = self.mask[box[0].start : box[0].stop]

@@ -39,6 +39,8 @@ class MeshPatch:
         Number of each vertex in the whole mesh.
     shared : (v,) bool array
         Vertices that another patch may use.
+    cut_off : (f,) bool array
+        Faces over which the study is cut off.
     own, centers, halves : int
         How many vertices of the first two kinds there are, and how many faces of the first.
     """
@@ -47,6 +49,7 @@ class MeshPatch:
     faces: NDArray[np.int32]
     numbers: Ints
     shared: NDArray[np.bool_]
+    cut_off: NDArray[np.bool_]
     own: int
     centers: int
     halves: int
@@ -108,9 +111,13 @@ class Patches:
 
     def carried(self, matrix: Floats) -> Patches:
         """Return the mesh in another frame, at positions times a matrix (4, 4); a mirror turns the faces over."""
-        kept, along = self.each(_carried, [matrix]), np.array(self.along) @ np.linalg.inv(matrix[:3, :3])
-        extent = _extent(self.slabs, kept, self.face_count)
-        return replace(self, kept=kept, extent=extent, along=tuple(along.tolist()))
+        along = np.array(self.along) @ np.linalg.inv(matrix[:3, :3])
+        return replace(self.moved(_carried, matrix), along=tuple(along.tolist()))
+
+    def moved(self, work: Callable[..., MeshPatch], given: Any) -> Patches:
+        """Return the mesh with what some work makes of each patch."""
+        kept = self.each(work, [given])
+        return replace(self, kept=kept, extent=_extent(self.slabs, kept, self.face_count))
 
     @property
     def face_count(self) -> int:
@@ -129,6 +136,16 @@ class Patches:
         """Hand out the positions of the corners of faces, (m, 3, 3)."""
         return self._rows(lambda one: one.faces[: one.halves], lambda one, rows: one.vertices[rows], _quarter_corners)
 
+    def filled(self) -> Iterator[NDArray[np.bool_]] | None:
+        """Hand out which faces (m,) were filled, not measured: the study is cut off over them; None where none was."""
+        return self._filled() if any(self.told(_any_cut_off)) else None
+
+    def _filled(self) -> Iterator[NDArray[np.bool_]]:
+        for some in (_halves_cut_off, _quarters_cut_off):
+            for kept in self.each(some):
+                rows = self.slabs.fetch([kept])[0]
+                yield from (rows[part] for part in parts_of(len(rows)))
+
     def distinct(self, kind: type[np.floating[Any]]) -> int:
         """Count the positions that stay apart at a precision."""
         return distinct_in(self, kind)
@@ -146,6 +163,18 @@ class Patches:
         for kept in self.each(few):
             rows = self.slabs.fetch([kept])[0]
             yield from (rows[part] for part in parts_of(len(rows)))
+
+
+def _any_cut_off(patch: MeshPatch) -> bool:
+    return bool(patch.cut_off.any())
+
+
+def _halves_cut_off(patch: MeshPatch) -> NDArray[np.bool_]:
+    return patch.cut_off[: patch.halves]
+
+
+def _quarters_cut_off(patch: MeshPatch) -> NDArray[np.bool_]:
+    return patch.cut_off[patch.halves :]
 
 
 def _centers(patch: MeshPatch) -> Floats:
@@ -174,9 +203,10 @@ def patches_of(mesh: SlabMesh, along: tuple[float, ...] = (0.0, 0.0, 1.0)) -> Pa
     return Patches(slabs, kept, mesh.vertex_count, _extent(slabs, kept, mesh.face_count), shared, along)
 
 
-def in_one_patch(mesh: TriMesh) -> Patches:
-    """Return a mesh that is whole in memory as a single patch."""
-    piece = Piece(mesh.vertices, mesh.vertices[:0], mesh.faces, mesh.faces[:0])
+def in_one_patch(mesh: TriMesh, cut_off: NDArray[np.bool_] | None = None) -> Patches:
+    """Return a mesh that is whole in memory as a single patch; the study is cut off over some of its faces (m,)."""
+    cut_off = np.zeros(len(mesh.faces), np.bool_) if cut_off is None else cut_off
+    piece = Piece(mesh.vertices, mesh.vertices[:0], mesh.faces, mesh.faces[:0], cut_off)
     return patches_of(SlabMesh.of([piece], InMemory()))
 
 
@@ -238,5 +268,5 @@ def _patch(piece: Piece, begins: Ints, asked: Ints, beside: Ints, given: Floats)
     faces = [_local(piece, begins, some, beside).astype(np.int32) for some in (piece.halves, piece.quarters)]
     return MeshPatch(
         np.concatenate([piece.vertices, piece.centers, given]), np.concatenate(faces), np.concatenate(ranges), shared,
-        own, centers, len(piece.halves),
+        piece.cut_off, own, centers, len(piece.halves),
     )  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...measure.components import LISTED
 from ...measure.shape import unfolded
+from .cavities import places_in
 from .crossing import crossing_in
 from .seams import whole_of
 from .shapes import shapes_in
@@ -38,8 +39,8 @@ def assess_patches(patches: Patches, whole: Gathered | None = None, *, cavities:
     -------
     dict
         What `tomomesh.measure.report.assess` tells, to the last bit, but for what asks for all vertices in one place:
-        places in cavities, the median edge of each component, whether a mesh is sound after welding in which 32 bits
-        join vertices, and how far points lie from it.
+        the median edge of each component, whether a mesh is sound after welding in which 32 bits join vertices, and how
+        far points lie from it.
     """
     whole = whole_of(patches, cavities=cavities) if whole is None else whole
     counts, table = whole.topology, whole.table
@@ -55,6 +56,7 @@ def assess_patches(patches: Patches, whole: Gathered | None = None, *, cavities:
     shapes, ends = shapes_in(patches, whole)
     crossing = np.bincount(whole.numbers, crossing_in(patches), len(table.faces)).astype(np.int64)
     found |= shapes | {"self_intersections": int(crossing.sum())}
+    found["cavity_places_mm"] = places_in(patches, whole, cavities).tolist() if closed else []
     found["per_component"] = _components(whole, ends, crossing)
     return found | {"components_not_listed": counts.components - len(found["per_component"])}
 

@@ -127,6 +127,8 @@ class Gathered:
     seams : Seams
     numbers : (p,) int64 array
         The row of each connected piece of the patches.
+    pieces : list of int
+        How many of these each patch has.
     finite : bool
         Whether all vertices are.
     """
@@ -135,6 +137,7 @@ class Gathered:
     table: Tally
     seams: Seams
     numbers: NDArray[np.int64]
+    pieces: list[int]
     finite: bool
 
 
@@ -152,9 +155,11 @@ def whole_of(patches: Patches, *, cavities: int = 0) -> Gathered:
     Gathered
     """
     found: list[PatchCounts] = patches.told(counted, [patches.extent])
-    seams = Seams.between([one.rim for one in found], [len(one.table.faces) for one in found], patches.shared)
+    pieces = [len(one.table.faces) for one in found]
+    seams = Seams.between([one.rim for one in found], pieces, patches.shared)
     table, numbers = _joined([one.table for one in found], seams)
-    return Gathered(_topology(found, table, seams, cavities), table, seams, numbers, all(one.finite for one in found))
+    finite = all(one.finite for one in found)
+    return Gathered(_topology(found, table, seams, cavities), table, seams, numbers, pieces, finite)
 
 
 def _joined(tables: list[Tally], seams: Seams) -> tuple[Tally, NDArray[np.int64]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,10 @@ BINS = 2**16
 """Ranges of vertices among which meshes end: they differ by so small a part of the faces. Chosen: half a megabyte."""
 
 
-def shares(patches: Patches, count: int) -> Iterator[TriMesh]:
+def shares(patches: Patches, count: int) -> Iterator[tuple[TriMesh, NDArray[np.bool_]]]:
     """Share the faces out by their lowest vertex, and hand out each part as a mesh with the vertices that it uses.
+
+    With each it is told over which of its faces the study is cut off.
 
     Vertices that two parts use have the same bits in both, and are in both in the order of the whole.
 
@@ -59,21 +61,31 @@ def _spread(lowest: Ints, total: int) -> tuple[tuple[int, int], Ints]:
     return (int(lowest.min(initial=total)), int(lowest.max(initial=-1))), bins.astype(np.int64)
 
 
-def _together(slabs: Slabs, kept: list[Kept]) -> TriMesh:
+def _together(slabs: Slabs, kept: list[Kept]) -> tuple[TriMesh, NDArray[np.bool_]]:
     """Put faces of several patches into one mesh, halves before quarters, over each vertex once."""
     found = slabs.fetch(kept)
-    halves, quarters = (np.concatenate([np.empty((0, 3), np.int64), *(one[n] for one in found)]) for n in (0, 1))
-    numbers = np.concatenate([np.empty(0, np.int64), *(one[2] for one in found)])
-    places = np.concatenate([np.empty((0, 3)), *(one[3] for one in found)])
+    faces = np.concatenate([np.empty((0, 3), np.int64), *(one.faces[n] for n in (0, 1) for one in found)])
+    cut_off = np.concatenate([np.empty(0, np.bool_), *(one.cut_off[n] for n in (0, 1) for one in found)])
+    numbers = np.concatenate([np.empty(0, np.int64), *(one.numbers for one in found)])
+    places = np.concatenate([np.empty((0, 3)), *(one.places for one in found)])
     once, first = np.unique(numbers, return_index=True)
-    return TriMesh(places[first], np.searchsorted(once, np.concatenate([halves, quarters])))
+    return TriMesh(places[first], np.searchsorted(once, faces)), cut_off
 
 
-def _between(patch: MeshPatch, lowest: Ints, start: int, stop: int) -> tuple[Ints, Ints, Ints, NDArray[np.float64]]:
-    """Return the faces of a patch whose lowest vertex lies in a range, and the numbers and places of all they use."""
+class _Some(NamedTuple):
+    """Some faces of a patch, halves and quarters: their vertices, over which the study is cut off, and all they use."""
+
+    faces: list[Ints]
+    cut_off: list[NDArray[np.bool_]]
+    numbers: Ints
+    places: NDArray[np.float64]
+
+
+def _between(patch: MeshPatch, lowest: Ints, start: int, stop: int) -> _Some:
+    """Return the faces of a patch whose lowest vertex lies in a range."""
     some = (lowest >= start) & (lowest < stop)
     used = np.unique(patch.faces[some])
-    halves, quarters = (
-        patch.numbers[patch.faces[part][some[part]]] for part in (slice(patch.halves), slice(patch.halves, None))
-    )
-    return halves, quarters, patch.numbers[used], patch.vertices[used]
+    parts = (slice(patch.halves), slice(patch.halves, None))
+    faces = [patch.numbers[patch.faces[part][some[part]]] for part in parts]
+    cut_off = [patch.cut_off[part][some[part]] for part in parts]
+    return _Some(faces, cut_off, patch.numbers[used], patch.vertices[used])

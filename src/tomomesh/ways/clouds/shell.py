@@ -126,7 +126,7 @@ def _tightest(count: int, samples: Samples, settings: Settings, progress: Progre
     edges = cell_edges(samples, settings)
     require_parts(samples, edges[0], 3)
     for tried, span, cell in product(closings, SPANS, edges):
-        require_room(count, samples, cell)
+        require_room(count, samples, cell, even=settings.run.even)
         spanned = bridges(samples, float(cell.min()), span=span, threads=settings.run.threads, progress=progress)
         lowest, keys = cubes_over(np.concatenate([samples.positions, spanned]), cell)
         cells = cells_of(once_each(keys))

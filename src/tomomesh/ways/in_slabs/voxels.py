@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import UsageError
+from ...followed import Followed
+from ...judgement import follow_apart
 from ...segmentation.slabwise.sources import MaskVoxels
 from ...settings import option_of
+from ...slabs.patches.following import apart_in
 from ...slabs.patches.patch import patches_of
 from ...slabs.patches.promise import check_patches
 from ...slabs.patches.report import assess_patches
@@ -17,6 +20,8 @@ from ...stage import Stage, folded, timed
 from ..sections import net_found
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ...progress import Progress
     from ...segmentation.selection import Chosen
     from ...segmentation.study import Selected
@@ -89,6 +94,11 @@ def told_of_slabs(made: SlabSurface, *, labels: bool) -> Stage[None]:
     return folded(None, Stage(None, stats), net_found(made.trace, of_mask=made.stepped and not labels))
 
 
+def followed_by(made: SlabSurface, affine: NDArray[np.float64]) -> Followed:
+    """Return what a mesh of a window's own voxels is to follow."""
+    return Followed("voxels", affine, made.crossings, float(made.enclosed))
+
+
 @timed("quality")
 def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> Stage[tuple[Patches, Gathered, int]]:
     """Check across all seams what is promised of a mesh; return it as patches, what was counted, and its cavities.
@@ -105,6 +115,17 @@ def checked_in_slabs(made: SlabSurface, kept: Selected, progress: Progress) -> S
     found, inside = whole.topology.components, made.enclosed
     told = {"found": found, "cavities": made.cavities, "taken": found, "debris": 0, "enclosed_cubes": inside}
     return Stage((patches, whole, made.cavities), {"surface": told})
+
+
+@timed("quality")
+def followed_in_slabs(patches: Patches, followed: Followed, settings: Settings) -> Stage[None]:
+    """Refuse a mesh that does not follow what it was made from, as `tomomesh.finish.finish` does.
+
+    Raises
+    ------
+    GeometryError
+    """
+    return follow_apart(followed, apart_in(patches, followed, settings.run.threads), settings)
 
 
 @timed("quality")

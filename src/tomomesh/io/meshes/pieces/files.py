@@ -70,9 +70,10 @@ def write_pieces(
     beside = MeshAttributes(unit, frame, {}, {}, single=precision == 32, fits=_fits(whole, path, precision))
     with ExitStack() as files:
         *pieces, index = (files.enter_context(replacing(name)) for name in names)
-        told = []
-        for file, name, piece in zip(pieces, names, shares(whole, count), strict=False):
-            file.writelines(PART_WRITERS[suffix_of(path)](InOnePiece(piece), name, beside))
+        told, marked = [], whole.filled() is not None
+        for file, name, (piece, filled) in zip(pieces, names, shares(whole, count), strict=False):
+            part = InOnePiece(piece, filled if marked else None)
+            file.writelines(PART_WRITERS[suffix_of(path)](part, name, beside))
             told.append(_told(name, piece))
         index.write(json_of({"written_by": beside.head, **_counts(whole), "pieces": told}))
     return names

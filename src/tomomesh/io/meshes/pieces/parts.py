@@ -42,15 +42,19 @@ class Parts(Protocol):
     def corners(self) -> Iterator[Floats]:
         """Hand out the positions of the corners of faces, (m, 3, 3)."""
 
+    def filled(self) -> Iterator[NDArray[np.bool_]] | None:
+        """Hand out which faces (m,) were filled, not measured, in the parts of `faces`; None where none was."""
+
     def distinct(self, kind: type[np.floating[Any]]) -> int:
         """Count the positions that stay apart at a precision."""
 
 
 @dataclass(frozen=True)
 class InOnePiece:
-    """A mesh that is whole in memory, or positions alone."""
+    """A mesh that is whole in memory, or positions alone, and which of its faces (m,) are marked as filled."""
 
     mesh: TriMesh
+    marked: NDArray[np.bool_] | None = None
 
     @property
     def vertex_count(self) -> int:
@@ -73,6 +77,11 @@ class InOnePiece:
     def corners(self) -> Iterator[Floats]:
         """Hand out the positions of the corners of faces, (m, 3, 3)."""
         return (self.mesh.vertices[faces] for faces in self.faces())
+
+    def filled(self) -> Iterator[NDArray[np.bool_]] | None:
+        """Hand out which faces (m,) were filled, in the parts of `faces`; None where none is marked."""
+        marked = self.marked
+        return None if marked is None else (marked[part] for part in parts_of(self.face_count))
 
     def distinct(self, kind: type[np.floating[Any]]) -> int:
         """Count the positions that stay apart at a precision."""
