@@ -55,7 +55,7 @@ def survey(volume: Volume) -> dict[str, Any]:
     """
     voxels, padded = volume.voxels, all_padding(volume)
     measured = levels_of(voxels if padded is None else voxels[~padded])
-    low, high = _drawn_from(measured)
+    low, high = drawn_from(measured)
     return {
         "slices_rows_columns": list(volume.shape),
         "layers": volume.layers,
@@ -90,7 +90,7 @@ def _tilt(volume: Volume) -> float:
     return float(np.degrees(np.arccos(min(1.0, cosine))))
 
 
-def _drawn_from(measured: Levels) -> tuple[float, float]:
+def drawn_from(measured: Levels) -> tuple[float, float]:
     """Return the range of the histogram: all levels, unless a few far ones would leave the others too few bars."""
     (low, high), (first, last) = measured.ends, measured.bulk()
     reach = REACH * (last - first)
