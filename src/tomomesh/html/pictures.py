@@ -23,6 +23,8 @@ SHADED = "10-shaded"
 """The picture that stands in for the 3-D view."""
 ORDER = ("12", "04", "05", "06", "02", "11", "07", "08", "10", "09", "03")
 """Numbers of the pictures, the most telling first: where the budget ends, the last are left out."""
+SHEETS = ("06-slices", "12-outlines")
+"""Pictures of many slices."""
 SHOWS = {
     "02-film": "The network of one slice while it is trained, over what it sees",
     "03-relief": "The gray levels of one slice as a relief (Fig. 3)",
@@ -57,6 +59,11 @@ class Picture:
     data: str
     width: int
     height: int
+
+    @property
+    def wide(self) -> bool:
+        """Whether it shows many slices, and wants the whole width of a page."""
+        return self.name.startswith(SHEETS)
 
 
 def pictures_of(drawn: Mapping[str, bytes]) -> tuple[list[Picture], list[str]]:

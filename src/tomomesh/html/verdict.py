@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 GOOD, CARE, BAD = "good", "care", "bad"
 """How a check ended, the best first."""
 SAID = {GOOD: "Good to use", CARE: "Use with care", BAD: "Not good to use"}
+SEEN = 0.05
+"""Voxels under which a distance is told as none. Only words depend on it."""
 UNORIENTED = ("nonmanifold_edges", "nonmanifold_vertices", "misoriented_edges", "inward_components")
 """Counts that are 0 on a manifold that faces outward."""
 
@@ -112,9 +114,7 @@ def _near(follows: Mapping[str, Any]) -> str:
     near = follows.get("mesh_to_window_p95_voxels")
     if near is None:
         return f"it encloses {follows['volume_share']:.0%} of the volume of its slices"
-    return (
-        f"95 % of it lie within {near:.2g} voxels of the window, and it has {follows['volume_share']:.0%} of its volume"
-    )
+    return f"95 % of it lie within {near:.2g} voxels of the window" if near > SEEN else "it lies in the window's voxels"
 
 
 def _of_fit(report: Mapping[str, Any]) -> Iterator[Check]:

@@ -45,7 +45,7 @@ def write_surface_html(chosen: Namespace, surface: Surface, pictures: Mapping[st
     unit = "mm" if part is not None or place is None else place.unit
     values = _values(surface, unit) if part is None else {}
     _write(
-        chosen, report, mesh, summary.of_surface(report, _name(chosen)), pictures,
+        chosen, report, mesh, summary.of_surface(report, _name(chosen)), {**pictures, **_film(surface)},
         scene=scene_of_mesh(mesh, most=MOST, values=values, unit=unit, axes=PATIENT if place is None else PLAIN),
         crossing=surface.crossing if part is None else None, histogram=_histogram(surface.segmentation),
         frame=_frame(surface),
@@ -100,6 +100,15 @@ def _values(surface: Surface, unit: str) -> dict[str, Values]:
         at[surface.mesh.faces[filled]] = 1.0
         found["filled"] = Values(at, "filled, not measured")
     return found
+
+
+def _film(surface: Surface) -> dict[str, bytes]:
+    """Draw key frames of the training of one slice's network, where slices have one."""
+    from ...show.drawing.page import png
+    from .pictures import key_frames
+
+    page = key_frames(surface.segmentation) if surface.segmentation is not None else None
+    return {} if page is None else {"02-film": png(page)}
 
 
 def _histogram(found: Segmentation[Any] | None) -> Histogram | None:
