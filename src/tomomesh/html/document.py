@@ -76,7 +76,7 @@ def document(told: Contents) -> str:
     drawn, left_out = pictures_of(told.pictures)
     return page(
         "report.html.jinja",
-        styles=[asset("style.css"), asset("viewer.css")],
+        styles=[asset("viewer.css"), asset("style.css")],
         scripts=[three_js(), asset("viewer.js"), asset("tables.js"), asset("report.js")],
         told=told,
         verdict=verdict_of(told.report),
