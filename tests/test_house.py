@@ -55,7 +55,7 @@ FOREIGN = {
     "wall_p1_mm", "changed",  # a key with a number in it; what findings/run prints
 }  # fmt: skip
 """What else stands between backticks alone in a page and is no name or word of ours."""
-OTHER_FILES = re.compile(r"\.(json|csv|toml|gz|tif|stl|ply|npz|cff|txt)$")
+OTHER_FILES = re.compile(r"\.(html|json|csv|toml|gz|tif|stl|ply|npz|cff|txt)$")
 
 
 @cache

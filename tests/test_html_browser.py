@@ -206,7 +206,10 @@ class TestWithoutWebGL:
 class TestIndex:
     def test_leads_to_the_page_of_each(self, browser: Any, file: Path) -> None:
         path = file.parent / "index.html"
-        rows = [{"name": "ball", "error": "", "sound": True}, {"name": "b", "error": "it is broken"}]
+        rows: list[dict[str, Any]] = [
+            {"name": "ball", "error": "", "sound": True},
+            {"name": "b", "error": "it is broken"},
+        ]
         path.write_text(index("all", rows, folder=""), encoding="utf-8")
         watched = Watched(browser, path)
         watched.page.locator("input.search").fill("broken")

@@ -168,7 +168,8 @@ def draw(
 
     if folder is not None:
         make_folder(Path(folder))
-    done, expected, found = 0, 10 if surface else 6, {}
+    done, expected = 0, 10 if surface else 6
+    found: dict[str, bytes] = {}
     for done, (name, page) in enumerate(pictures(stage_one, surface, settings), 1):
         progress("pictures", done - 1, max(expected, done))
         drawn = png(page)
