@@ -260,7 +260,7 @@ class TestOptions:
         """A new option must be one of these, or a finished study would be taken for another one."""
         parameter = {entry.name for group, entry in parameters() if group != "cloud"}
         silent = {"help", "study", "output", "input_format", "format", "each", "force", "quiet", "json", "patient"}
-        silent |= {"workers", "scheduler", "each_label", "label_names"}
+        silent |= {"workers", "scheduler", "each_label", "label_names", "html"}
         kept_in_settings = {"auto", "paper", "settings", "save_settings"}
         (commands,) = (one for one in build_parser()._actions if isinstance(one, argparse._SubParsersAction))
         found = {action.dest for action in commands.choices["reconstruct"]._actions}

@@ -137,6 +137,7 @@ class TestOtherCommands:
         folder = tmp_path / "demo"
         assert main(["demo", "-o", str(folder)]) == 0
         names = {"mesh.stl", "points.ply", "labels.nii.gz", "truth.ply", "report.json", "settings.toml", "figures"}
+        names |= {"report.html"}
         assert {path.name for path in folder.iterdir()} == names
         assert trimesh.load(folder / "truth.ply").is_volume
         assert "truth" in json.loads((folder / "report.json").read_text())

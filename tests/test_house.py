@@ -51,11 +51,11 @@ FOREIGN = {
     "apply_rescale", "vtkContourFilter", "vtkFlyingEdges3D", "vtkMarchingCubes", "vtkSynchronizedTemplates3D",
     "AnatomicalOrientation", "CenterOfRotation", "thicknesses", "qfac",  # fields of formats
     "dev54_t1", "dev54_synth_t1", "visit2", "X_mm",  # of files
-    "_deg", "_mm2", "_mm3", "_NAME",  # ends of names
+    "_NAME",  # an end of names
     "wall_p1_mm", "changed",  # a key with a number in it; what findings/run prints
 }  # fmt: skip
 """What else stands between backticks alone in a page and is no name or word of ours."""
-OTHER_FILES = re.compile(r"\.(json|csv|toml|gz|tif|stl|ply|npz|cff|txt)$")
+OTHER_FILES = re.compile(r"\.(html|json|csv|toml|gz|tif|stl|ply|npz|cff|txt)$")
 
 
 @cache

@@ -41,7 +41,7 @@ READ = (
 COMMANDS = {
     "reconstruct": [
         "-o", "m{}.stl", "--points", "p.ply", "--labels", "l.nii.gz", "--report", "r.json", "--save-settings", "s.toml",
-        "--figures", "f", "--json",
+        "--figures", "f", "--html", "h.html", "--json",
     ],
     "segment": ["-o", "p{}.ply", "--report", "r.json", "--figures", "f", "--json"],
     "inspect": ["--json"],

@@ -57,7 +57,7 @@ def _run(arguments: Sequence[str]) -> int:
     try:
         begun = time.perf_counter()
         chosen = build_parser().parse_args(joined(arguments))
-        chosen.begun = begun
+        chosen.begun, chosen.words = begun, tuple(arguments)
         if chosen.command in TOLD:
             shell.tell(chosen)
             return 0

@@ -17,7 +17,7 @@ from ..errors import BatchError, UsageError, printable
 from ..settings import option_of
 from . import summary
 from .faults import as_error
-from .outputs.checks import check_files, check_folder, check_frame, make_folder
+from .outputs.checks import check_files, check_folder, check_frame, check_page, make_folder
 from .records import finished, record_of, row_of, row_of_fault
 from .spread import Batch, check_workers, spread_rows
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     Work = Callable[[Namespace, Settings], Surface]
 
 TABLE = "reports.csv"
+PAGE = ".html"
+"""Suffix of the page beside a mesh, where --html asks for an index of them."""
 USUAL = "stl"
 """Format of the meshes where none is asked for."""
 OF_ONE = ("memory", "slab", "pieces", "neuroglancer")
@@ -70,9 +72,12 @@ def do_all(batch: Batch) -> None:
     BatchError
         At the end, where some failed.
     """
+    _refuse_same_page(batch)
     rows, chosen = _rows(batch), batch.chosen
     if chosen.save_settings:
         io.write_settings(batch.settings, chosen.save_settings)
+    if chosen.html:
+        _write_index(batch, rows)
     if chosen.json:
         print(json.dumps(rows, indent=2))
     _tell_failures(batch, rows)
@@ -93,6 +98,26 @@ def _rows(batch: Batch) -> list[Row]:
         if rows:
             io.write_table(rows, batch.columns, batch.folder / TABLE)
     return rows
+
+
+def _refuse_same_page(batch: Batch) -> None:
+    """Refuse an index with the name of a study's own page."""
+    html = batch.chosen.html
+    pages = {os.path.realpath(batch.folder / f"{study.name}{PAGE}") for study in batch.studies} if html else set()
+    if html and os.path.realpath(html) in pages:
+        raise UsageError("the index has the name of a study's own page", file=html, hint="--html with another name")
+
+
+def _write_index(batch: Batch, rows: list[Row]) -> None:
+    """Write the page that leads to that of each study."""
+    from ..html.index import index
+    from .outputs.html import command_of, write_page
+
+    chosen = batch.chosen
+    folder = os.path.relpath(os.path.realpath(batch.folder), os.path.realpath(Path(chosen.html).parent))
+    named = "" if folder == os.curdir else Path(folder).as_posix()
+    text = index(printable(batch.folder.name), rows, folder=named, command=command_of(chosen))
+    write_page(text, chosen.html)
 
 
 def refuse_for_one(chosen: Namespace) -> None:
@@ -142,8 +167,10 @@ def check_results(many: str, chosen: Namespace, settings: Settings) -> Path:
     if Path(chosen.output).is_file():
         raise UsageError(f"{many} writes into a folder", file=chosen.output, expected="a folder")
     check_frame(Path(chosen.output, f"NAME.{chosen.format or USUAL}"), settings)
-    check_files(chosen)
-    return check_folder(chosen.output)
+    check_files(Namespace(**vars(chosen) | {"html": None}))
+    folder = check_folder(chosen.output)
+    check_page(chosen, folder)
+    return folder
 
 
 def _rows_in_turn(batch: Batch) -> Generator[tuple[int, Row]]:
@@ -161,7 +188,8 @@ def done(study: io.Study, chosen: Namespace, settings: Settings, folder: Path, w
         asked = settings if study.series is None else settings.replace(series=study.series)
         mesh, told = (folder / f"{study.name}.{suffix}" for suffix in (chosen.format or USUAL, "json"))
         state = study.state
-        report = None if chosen.force else finished(told, mesh, asked, state)
+        again = chosen.force or (chosen.html and not told.with_suffix(PAGE).is_file())
+        report = None if again else finished(told, mesh, asked, state)
         if report is not None:
             return row_of(study.name, report) | {"passed": True}
         return row_of(study.name, _worked(study, chosen, asked, (mesh, told, state), work))
@@ -177,6 +205,7 @@ def _worked(
     """Reconstruct one study; its report is written last, so that it stands for the whole."""
     mesh, told, state = outputs
     single = {"study": str(study.path), "output": str(mesh), "save_settings": None}
+    single |= {"html": str(told.with_suffix(PAGE)) if chosen.html else None}
     start = time.perf_counter()
     report = work(Namespace(**vars(chosen) | single), settings).report
     report = report | {"batch": record_of(mesh, state, time.perf_counter() - start)}

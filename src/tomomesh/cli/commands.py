@@ -26,6 +26,7 @@ from .outputs.checks import (
     check_folder,
     check_frame,
     check_outputs,
+    check_page,
     make_folder,
 )
 from .outputs.parts import frame_of_mesh, frame_of_part
@@ -73,6 +74,7 @@ def given_of(chosen: Namespace) -> dict[str, Any]:
 def _demo(chosen: Namespace) -> None:
     settings = settings_of(chosen)
     folder = check_folder(chosen.output)
+    check_page(chosen, folder)
     from ..head_phantom import phantom
     from ..pipeline import reconstruct
 
@@ -87,6 +89,7 @@ def _demo(chosen: Namespace) -> None:
         outputs = Namespace(
             output=folder / "mesh.stl", points=folder / "points.ply", labels=folder / "labels.nii.gz",
             report=folder / "report.json", save_settings=folder / "settings.toml", figures=folder / "figures",
+            html=chosen.html or folder / "report.html", words=chosen.words,
         )  # fmt: skip
         surface = write_surface(outputs, surface, settings, progress)
     _tell(chosen, surface.report, summary.of_surface(surface.report, str(chosen.output)))
@@ -119,7 +122,7 @@ def _reconstruct_one(chosen: Namespace, settings: Settings) -> Surface:
         return volume, labels
 
     with bars_of(chosen) as progress:
-        if chosen.figures or chosen.labels or chosen.mask_out:
+        if chosen.figures or chosen.labels or chosen.mask_out or chosen.html:
             volume, labels = read()
             surface = reconstruct(volume, settings, labels=labels, progress=progress, **given_of(chosen))
         else:
@@ -190,8 +193,7 @@ def _inspect(chosen: Namespace) -> None:
 
 
 def _check(chosen: Namespace) -> None:
-    if chosen.report:
-        io.check_output(chosen.report, (".json",), inputs=[chosen.mesh])
+    check_files(chosen, chosen.mesh)
     from ..measure.report import assess
     from ..measure.winding import linings
 
@@ -207,6 +209,10 @@ def _check(chosen: Namespace) -> None:
         report["print"] = _verdict(chosen, mesh, settings)
     if chosen.report:
         io.write_document(report, chosen.report)
+    if chosen.html:
+        from .outputs.html import write_mesh_html
+
+        write_mesh_html(chosen, report, mesh, summary.of_check(report), **frame_of_mesh(chosen.mesh))
     _say(report, None if chosen.json else summary.of_check(report))
 
 
@@ -247,7 +253,12 @@ def _print(chosen: Namespace) -> None:
     report = {"print": part.report, "written": written, "settings": settings.to_dict()}
     if chosen.report:
         io.write_document(report, chosen.report)
-    _tell(chosen, report, summary.of_part(report["print"], chosen.output))
+    said = summary.of_part(report["print"], _shown(chosen))
+    if chosen.html:
+        from .outputs.html import write_mesh_html
+
+        write_mesh_html(chosen, report, part.mesh, said, **named)
+    _tell(chosen, report, said)
 
 
 def _view(chosen: Namespace) -> None:

@@ -189,7 +189,7 @@ class _InOnePass:
             check_archive(self.chosen, volume)
             return volume, labels
 
-        return LabelSurfaces(read, self.settings, progress, self.given, kept=False)
+        return LabelSurfaces(read, self.settings, progress, self.given, kept=bool(self.chosen.html))
 
 
 _KEPT: dict[str, LabelSurfaces] = {}

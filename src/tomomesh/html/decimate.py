@@ -15,7 +15,7 @@ FINER = 1.08
 """By how much more than the count of faces asks for cells grow at each trial. Chosen: half of the step takes one trial
 more, twice of it leaves a sixth fewer faces than were allowed."""
 PER_CELL = 2.5
-"""Faces that a cell of a grid leaves of a surface, over its area in sides of the cell, to begin with; trials mend it."""
+"""Faces that a cell of a grid leaves of a surface, over its area in sides of the cell; trials mend it."""
 TRIALS = 24
 """Most trials: cells are then more than 2^20 as large, and one holds any mesh."""
 
@@ -63,7 +63,7 @@ def _clustered(mesh: TriMesh, size: float) -> tuple[TriMesh, NDArray[np.int64]]:
 
 
 def _keys(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Number cells (n, 3) of a grid."""
+    """Return a number for each cell (n, 3) of a grid."""
     _, rows, columns = (int(count) + 1 for count in cells.max(axis=0))
     return np.asarray((cells[:, 0] * rows + cells[:, 1]) * columns + cells[:, 2])
 

@@ -83,7 +83,10 @@ def problems_of(
 
 def _once(found: list[Problem]) -> list[Problem]:
     """Leave out what was said already, at the same place."""
-    return list({(one.text, one.place): one for one in reversed(found)}.values())[::-1]
+    kept = dict[object, Problem]()
+    for one in found:
+        kept.setdefault((one.text, one.place), one)
+    return [*kept.values()]
 
 
 def _of_data(report: Mapping[str, Any]) -> Iterator[Problem]:

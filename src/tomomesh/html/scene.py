@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..model.mesh import TriMesh
 from .decimate import decimated, means
 
 if TYPE_CHECKING:
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..model.mesh import QuadMesh
+    from ..model.mesh import QuadMesh, TriMesh
 
     Floats = NDArray[np.float64]
 

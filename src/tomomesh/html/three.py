@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import zipfile
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
-
-import trimesh
 
 SHIPPED = ("resources", "templates", "viewer.zip")
 PAGE = "viewer.html.template"
@@ -25,7 +24,10 @@ def three_js() -> str:
     str
         MIT license, which it begins with; empty where trimesh ships it otherwise: pages show pictures then.
     """
-    shipped = Path(trimesh.__file__).parent.joinpath(*SHIPPED)
+    found = find_spec("trimesh")
+    if found is None or found.origin is None:
+        return ""
+    shipped = Path(found.origin).parent.joinpath(*SHIPPED)
     try:
         with zipfile.ZipFile(shipped) as archive:
             page = archive.read(PAGE).decode()

@@ -64,7 +64,7 @@ def survey(volume: Volume, bars: int | None = None) -> dict[str, Any]:
     cut = HERE.of(volume.voxels)
     padded = padding_in(cut, volume.padding, guessed=True)
     measured = cut.levels if padded is None else beside(cut, padded)
-    low, high = _drawn_from(measured)
+    low, high = drawn_from(measured)
     lowest, highest = cut.ends
     return {
         "slices_rows_columns": list(volume.shape),
@@ -102,7 +102,7 @@ def _tilt(volume: Volume) -> float:
     return float(np.degrees(np.arccos(min(1.0, cosine))))
 
 
-def _drawn_from(measured: Levels) -> tuple[float, float]:
+def drawn_from(measured: Levels) -> tuple[float, float]:
     """Return the range of the histogram: all levels, unless a few far ones would leave the others too few bars."""
     (low, high), (first, last) = measured.ends, measured.bulk()
     reach = REACH * (last - first)

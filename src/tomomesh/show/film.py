@@ -32,6 +32,8 @@ FRAME_MS, START_MS, END_MS = 80, 800, 2400
 """How long a frame stands, and the first and the last."""
 SIDE = 4.0
 """Inches of a frame."""
+ACROSS, SMALL = 3, 2.8
+"""Key frames in a row, and inches of each."""
 DPI = 100
 COLORS = 32
 FRONT = Camera()
@@ -119,6 +121,45 @@ def film_slice(
     return _encoded(list(_frames(page, ax, places, network, notes, title)))
 
 
+def draw_key_frames(
+    mask: NDArray[np.bool_],
+    codebooks: Floats | Sequence[Floats],
+    network: Lattice,
+    plane: Plane = PIXELS,
+    *,
+    notes: Sequence[str],
+    title: str = "A network over its slice",
+) -> Page:
+    """Draw some frames of `film_slice` beside each other, three in a row.
+
+    Parameters
+    ----------
+    mask : (J, I) bool array
+    codebooks : (s, u, 2) float array
+    network : Lattice
+    plane : Plane
+    notes : sequence of str
+        What is said over each.
+    title : str
+    """
+    places = np.stack([plane.place(one) for one in codebooks])
+    bounds = plane.bounds(mask, places.reshape(-1, 2))
+    ratio = float(np.clip((bounds[1] - bounds[0])[1] / (bounds[1] - bounds[0])[0], 0.4, 1.8))
+    rows = -(-len(places) // ACROSS)
+    page, axes = canvas(ACROSS * SMALL, rows * (SMALL * ratio + 0.4), rows, ACROSS)
+    for n, (ax, neurons) in enumerate(zip(axes, places, strict=False)):
+        plane.crop(ax, bounds)
+        plane.draw(ax, on_paper(np.asarray(mask, bool), PALE))
+        _draw_neurons(ax, neurons, network)
+        ax.heading(title if n == 0 else "", notes[n])
+    return page
+
+
+def _draw_neurons(ax: Panel, neurons: Floats, network: Lattice) -> None:
+    lines(ax, neurons[network.edges], color=NETWORK, width=1.1)
+    dots(ax, neurons, size=3.7, color=NETWORK, rim=WHITE, width=0.4)
+
+
 def _dot_size(count: int, dimensions: int) -> float:
     """Let the dots of a filled plane region overlap, which also is shorter to store; keep those in space apart."""
     area = np.clip(1.5e5 / count, 2.0, 36.0) if dimensions == 2 else np.clip(1.5e4 / count, 1.0, 9.0)
@@ -133,8 +174,7 @@ def _frames(
     background, words = page.pixels.copy(), [*page.words]
     for n in chosen:
         page.pixels[:], page.words = background, [*words]
-        lines(ax, places[n][network.edges], color=NETWORK, width=1.1)
-        dots(ax, places[n], size=3.7, color=NETWORK, rim=WHITE, width=0.4)
+        _draw_neurons(ax, places[n], network)
         ax.heading(title, notes[n] if notes is not None else f"{n} of {len(places) - 1}")
         yield page.image()
 

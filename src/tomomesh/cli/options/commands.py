@@ -20,7 +20,7 @@ from .formats import (
     STUDY_MESH,
     STUDY_MESH_FORMATS,
 )
-from .groups import add_each, add_outputs, add_scale, add_settings, add_streams, add_study
+from .groups import HTML, add_each, add_outputs, add_scale, add_settings, add_streams, add_study
 
 STAGE_ONE = ("read", "crop", "window", "network")
 STAGE_TWO = ("cubes", "fit", "printing")
@@ -49,6 +49,7 @@ def add_commands(commands: Any) -> None:
 def _demo(commands: Any) -> None:
     demo = _command(commands, "demo", "the built-in head, everything it can show")
     demo.add_argument("-o", "--output", default="tomomesh-demo", metavar="FOLDER", help="default: %(default)s")
+    demo.add_argument("--html", metavar="FILE.html", help=f"{HTML} (default: FOLDER/report.html)")
     add_settings(demo, ("network", *STAGE_TWO, "run"), without=STUDY_ONLY)
 
 
@@ -62,7 +63,7 @@ def _reconstruct(commands: Any) -> None:
     add_streams(main, STUDY_FORMATS, STUDY_MESH_FORMATS)
     add_each(main)
     add_scale(main)
-    add_outputs(main, "points", "labels", "mask_out", "figures").add_argument(
+    add_outputs(main, "points", "labels", "mask_out", "figures", "html").add_argument(
         "--patient", action="store_true", help="copy the patient's fields of a DICOM study into MESH.dcm"
     )
     add_settings(main, (*STAGE_ONE, *STAGE_TWO, "run"))
@@ -87,7 +88,7 @@ def _surface(commands: Any) -> None:
         "--memory", metavar="SIZE",
         help="memory to take, about, as 4GB: arrays beyond it lie on the disk of TMPDIR (Linux; default: no limit)",
     )  # fmt: skip
-    add_outputs(stage_two, "figures")
+    add_outputs(stage_two, "figures", "html")
     add_settings(stage_two, ("cloud", "crop", *STAGE_TWO, "run"), without=("slice_range", *STUDY_ONLY))
 
 
@@ -129,6 +130,7 @@ def _check(commands: Any) -> None:
         help="what the coordinates of MESH are in, where a study is beside it (default: as its file states, else lps)",
     )  # fmt: skip
     check.add_argument("--report", metavar="FILE.json", help="write the report")
+    check.add_argument("--html", metavar="FILE.html", help=HTML)
     check.add_argument("--json", action="store_true", help="print the report as JSON")
     check.add_argument("--print", dest="print_check", action="store_true", help="tell whether it can be printed, too")
     add_settings(
@@ -142,6 +144,7 @@ def _print(commands: Any) -> None:
     part.add_argument("mesh", metavar="MESH", help=CHECKED)
     part.add_argument("-o", "--output", required=True, metavar="MESH", help=MESH)
     part.add_argument("--report", metavar="FILE.json", help="write the report")
+    part.add_argument("--html", metavar="FILE.html", help=HTML)
     part.add_argument("--json", action="store_true", help="print the report as JSON in place of the summary")
     part.add_argument("--quiet", action="store_true", help="print nothing but errors")
     add_settings(

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
+HTML = "write one page that opens in any browser, offline: verdict, mesh in 3-D, pictures, report, and how to repeat it"
+"""What ``--html`` writes."""
+
+
 def add_study(parser: argparse.ArgumentParser) -> None:
     """Add the arguments that name a study, and what is chosen in it."""
     parser.add_argument(
@@ -113,6 +117,7 @@ def add_outputs(parser: argparse.ArgumentParser, *files: str) -> Any:
         "labels": ("FILE", f"write the regions on the study's own grid: {LABEL}"),
         "mask_out": ("FILE", f"write the voxels inside the mesh on the study's own grid: {LABEL}"),
         "figures": ("FOLDER", "write the pictures"),
+        "html": ("FILE.html", HTML),
     }
     group = parser.add_argument_group("More results")
     for name in files:

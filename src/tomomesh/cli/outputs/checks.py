@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from ...model.volume import Volume
     from ...settings import Settings
 
+PAGES = (".html", ".htm")
+"""Suffixes of pages for a browser."""
 OF_STUDIES = (*io.MESH_WRITERS, *io.ARCHIVED)
 """Suffixes of meshes of a study."""
 
@@ -60,6 +62,7 @@ def check_files(chosen: Namespace, *taken: str) -> None:
         "labels": io.LABEL_WRITERS,
         "mask_out": io.LABEL_WRITERS,
         "report": (".json",),
+        "html": PAGES,
         "save_settings": (".toml",),
     }
     names = list(taken)
@@ -69,6 +72,20 @@ def check_files(chosen: Namespace, *taken: str) -> None:
             names.append(getattr(chosen, name))
     if getattr(chosen, "figures", None):
         check_folder(chosen.figures)
+
+
+def check_page(chosen: Namespace, folder: Path) -> None:
+    """Refuse a page that could not be written; it may lie in a folder that is made only once the work begins.
+
+    Raises
+    ------
+    OutputError, UsageError
+    """
+    if not chosen.html:
+        return
+    page = Path(chosen.html)
+    coming = not folder.exists() and os.path.realpath(page.parent) == os.path.realpath(folder)
+    io.check_output(folder.parent / page.name if coming else page, PAGES, inputs=[])
 
 
 def check_frame(output: str | Path, settings: Settings) -> None:

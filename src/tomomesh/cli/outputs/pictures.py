@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...model.networks import Networks
+from ...segmentation.signal import outline, pixels_of
 from ...show import draw_all
-from ...show.film import film
+from ...show.film import draw_key_frames, film
 from ...show.fit import draw_learning
+from ...show.gallery import median_slice
 from ...show.maps import SHEETS, draw_maps
 from ...show.plane import Plane
 from ...show.render import View
@@ -27,8 +30,8 @@ if TYPE_CHECKING:
     from ...show.drawing.page import Page
     from ...som.region import TrainedNetwork
 
-FRAMES = 40
-"""Most frames of a network that is filmed."""
+FRAMES, KEY_FRAMES = 40, 6
+"""Most frames of a network that is filmed, and of those that are drawn beside each other."""
 
 
 def pictures(
@@ -47,12 +50,12 @@ def pictures(
     if surface is not None and len(surface.cuberille.quads):
         stages |= {"cuberille": surface.cuberille, "triangulated": surface.cuberille.triangulated()}
     if stage_one is not None:
-        volume, way = stage_one.volume, way_of(stage_one.way)
+        way = way_of(stage_one.way)
         stages |= {
             "images": _shown(stage_one, settings),
             "mask": stage_one.mask,
             "points": stage_one.points,
-            "plane": Plane(spacing_mm=volume.spacing_mm[:2], upward=stage_one.plane != "axial"),
+            "plane": _plane(stage_one),
             **way.pictures(stage_one),
         }
     if surface is not None and stage_one is not None:
@@ -84,6 +87,29 @@ def film_of_network(trained: TrainedNetwork, settings: Settings, pixel_area: flo
         notes.append(f"{notes[-1]}, spaced evenly")
     places = [one[:, axes] for one in codebooks]
     return film(trained.inputs[:, axes], places, trained.lattice, notes=notes, title=title)
+
+
+def key_frames(found: Segmentation[Any]) -> Page | None:
+    """Train the network of the slice with the median window once more, looking on; None where slices have none."""
+    networks, settings, volume = found.source, found.settings, found.volume
+    if not isinstance(networks, Networks) or not len(networks.slices):
+        return None
+    k, spacing = median_slice(found.mask, networks.slices), np.array(volume.spacing_mm[:2])
+    window = found.mask[k]
+    inputs = (outline if networks.outlined else pixels_of)(window)[:, :2] * spacing
+    seen = snapshots(
+        inputs, networks.lattice, settings.network, seed=settings.run.seed, pixel_area=float(spacing.prod()),
+        most=KEY_FRAMES - 1,
+    )  # fmt: skip
+    notes = [*(f"{step:,} {seen.unit}" for step in seen.steps), "as it was handed on"]
+    codebooks = [*(one / spacing for one in seen.codebooks), networks.codebook_on(k)]
+    title = f"{networks.lattice.name} of {len(networks.lattice)} neurons, slice {k + 1}"
+    return draw_key_frames(window, codebooks, networks.lattice, _plane(found), notes=notes, title=title)
+
+
+def _plane(found: Segmentation[Any]) -> Plane:
+    """Return spacing and sense of the slices."""
+    return Plane(spacing_mm=found.volume.spacing_mm[:2], upward=found.plane != "axial")
 
 
 def _shown(stage_one: Segmentation[Any], settings: Settings) -> NDArray[Any]:

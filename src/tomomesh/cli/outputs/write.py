@@ -47,7 +47,12 @@ def write_surface(
     if part is None:
         _tell_cavities(surface.report, frame, in_file)
     write_documents(chosen, surface.report, settings)
-    draw(chosen.figures, stage_one, surface, settings, progress)
+    html = getattr(chosen, "html", None)
+    drawn = draw(chosen.figures, stage_one, surface, settings, progress, kept=bool(html))
+    if html:
+        from .html import write_surface_html
+
+        write_surface_html(chosen, surface, drawn)
     return surface
 
 
@@ -174,19 +179,28 @@ def draw(
     surface: Surface | None,
     settings: Settings,
     progress: Bars,
-) -> None:
-    """Draw the paper's figures of whatever stages there are."""
-    if folder is None:
-        return
+    *,
+    kept: bool = False,
+) -> dict[str, bytes]:
+    """Draw the paper's figures of whatever stages there are, into a folder where one is named; return those kept."""
+    if folder is None and not kept:
+        return {}
+    from ...show.drawing.page import png
     from .pictures import pictures
 
-    where = Path(folder)
-    make_folder(where)
+    if folder is not None:
+        make_folder(Path(folder))
     done, expected = 0, 10 if surface else 6
+    found: dict[str, bytes] = {}
     for done, (name, page) in enumerate(pictures(stage_one, surface, settings), 1):
         progress("pictures", done - 1, max(expected, done))
-        write_picture(page, where / f"{name}.png")
+        drawn = png(page)
+        if folder is not None:
+            with io.replacing(Path(folder) / f"{name}.png") as file:
+                file.write(drawn)
+        found |= {name: drawn} if kept else {}
     progress("pictures", done, done)
+    return found
 
 
 def draw_network(

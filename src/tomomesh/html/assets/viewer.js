@@ -76,29 +76,19 @@
     return VIRIDIS[n].map((value, k) => value + (place - n) * (VIRIDIS[n + 1][k] - value));
   }
 
-  function hasWebGL() {
-    try {
-      const canvas = document.createElement("canvas");
-      return Boolean(canvas.getContext("webgl2") || canvas.getContext("webgl"));
-    } catch {
-      return false;
-    }
-  }
-
   /** Create a view in an element; null where it cannot be. */
   function createViewer(element, { dark = false, wheel = "focused" } = {}) {
-    if (typeof THREE === "undefined" || !THREE.TrackballControls || !hasWebGL()) return null;
-    try {
-      return new Viewer(element, dark, wheel);
-    } catch {
-      return null;
-    }
+    if (typeof THREE === "undefined" || !THREE.TrackballControls) return null;
+    const canvas = document.createElement("canvas");
+    const wanted = { antialias: true, preserveDrawingBuffer: true };
+    const context = canvas.getContext("webgl2", wanted) || canvas.getContext("webgl", wanted);
+    return context ? new Viewer(element, canvas, context, dark, wheel) : null;
   }
 
   class Viewer {
-    constructor(element, dark, wheel) {
+    constructor(element, canvas, context, dark, wheel) {
       this.element = element;
-      this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+      this.renderer = new THREE.WebGLRenderer({ canvas, context });
       this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
       this.canvas = this.renderer.domElement;
       this.canvas.className = "view-canvas";
@@ -325,7 +315,7 @@
     lookAlong(direction, up) {
       cancelAnimationFrame(this.traveling);
       const narrow = Math.min(1, this.camera.aspect);
-      const far = (0.45 * this.size) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
+      const far = (0.41 * this.size) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
       this.controls.target.set(0, 0, 0);
       this.camera.up.copy(up);
       this.camera.position.copy(direction.normalize().multiplyScalar(far));
