@@ -3,31 +3,36 @@ import { numbers } from "./api.js";
 import { el } from "./dom.js";
 import { state, trying } from "./store.js";
 
-const LINE = 1.6;
+const SIDE = 660;
+const LINE = 2;
 
-/** Make the picture; `show(plane, k, ends)` draws a slice and the segments (s, 2, 2) that lie on it. */
+/**
+ * Make the picture; `show(plane, k, ends, of)` draws a slice and the segments (s, 2, 2) that lie on it, of a plane as
+ * /api/planes tells of it.
+ */
 export function sliceWithOutline() {
   const canvas = el("canvas", { class: "outline", role: "img", "aria-label": "The slice with the outline of the mesh" });
   let drawn = 0;
-  async function show(plane, k, ends) {
+  async function show(plane, k, ends, of) {
     const asked = (drawn += 1);
     const slice = await trying(numbers(`/slice/${plane}/${k}`));
     if (!slice || asked !== drawn) return;
-    draw(canvas, slice, ends);
+    draw(canvas, slice, ends, of);
   }
   return { element: canvas, show };
 }
 
-function draw(canvas, { values, shape, headers }, ends) {
+/** Rows of coronal and sagittal slices rise to the head, which is drawn above. */
+function draw(canvas, { values, shape }, ends, { pixel_mm: [dy, dx], rows: axis }) {
   const [rows, columns] = shape;
-  const [dx, dy] = (headers.get("x-spacing") || "1,1").split(",").map(Number);
-  const scale = Math.max(1, Math.round(640 / Math.max(columns * dx, rows * dy)));
+  const scale = SIDE / Math.max(columns * dx, rows * dy);
   canvas.width = Math.round(columns * dx * scale);
   canvas.height = Math.round(rows * dy * scale);
   const context = canvas.getContext("2d");
+  if (axis === 0) context.setTransform(1, 0, 0, -1, 0, canvas.height);
   context.drawImage(picture(values, rows, columns, values.length / rows / columns), 0, 0, canvas.width, canvas.height);
-  context.lineWidth = LINE * Math.max(1, scale / 2);
-  context.strokeStyle = getComputedStyle(canvas).getPropertyValue("--trace") || "#ffb000";
+  context.lineWidth = LINE;
+  context.strokeStyle = getComputedStyle(canvas).getPropertyValue("--trace");
   context.beginPath();
   for (let n = 0; n < ends.length; n += 4) {
     context.moveTo((ends[n] + 0.5) * dx * scale, (ends[n + 1] + 0.5) * dy * scale);

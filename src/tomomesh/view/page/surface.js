@@ -14,7 +14,7 @@ export const applies = (kind) => kind !== "nothing";
 
 const NAMES = { points: "Points", cuberille: "Cuberille", triangulated: "Triangulated", smoothed: "Smoothed", fitted: "Fitted" };
 const COLORS = { "": "none", distance: "distance to the points", thickness: "thickness", filled: "filled, not measured" };
-const AXES = { axial: [2, "S", "I"], coronal: [1, "P", "A"], sagittal: [0, "L", "R"] };
+const PLANES = ["axial", "coronal", "sagittal"];
 
 /** @param {HTMLElement} panel */
 export function mount(panel) {
@@ -42,7 +42,7 @@ class SurfacePart {
     this.steps = el("div", { class: "steps", "aria-hidden": "true" });
     this.color = el("select", { onchange: () => this.showStage() }, ...Object.entries(COLORS).map(([name, text]) => el("option", { value: name }, text)));
     this.wire = el("input", { type: "checkbox", onchange: () => this.viewer?.setWire(this.wire.checked) });
-    this.plane = el("select", { onchange: () => this.cut() }, ...Object.keys(AXES).map((name) => el("option", { value: name }, name)));
+    this.plane = el("select", { onchange: () => this.cut() }, ...PLANES.map((name) => el("option", { value: name }, name)));
     this.slice = el("input", { type: "range", min: 0, max: 0, step: 1, "aria-label": "Slice of the cut", oninput: () => this.cut() });
     this.cuts = el("input", { type: "checkbox", onchange: () => this.cut() });
     this.beside = sliceWithOutline();
@@ -106,15 +106,10 @@ class SurfacePart {
     this.step.value = this.step.max;
     fill(this.steps, ...this.stages.map(({ name }) => el("span", {}, NAMES[name])));
     fill(this.told, problemList(found.problems, (one) => this.fly(one)), reportTable(found.report));
-    if (state.opened.kind === "study") await this.measureSlices();
+    if (state.opened.kind === "study") this.planes = (await trying(get("/api/planes")))?.planes;
     await this.showStage();
   }
 
-  async measureSlices() {
-    this.sizes = (await trying(get("/api/study")))?.slices_rows_columns || [1, 1, 1];
-    const [k, j, i] = this.sizes;
-    this.counts = { axial: k, coronal: j, sagittal: i };
-  }
 
   async showStage() {
     const stage = this.stages[Number(this.step.value)];
@@ -149,15 +144,17 @@ class SurfacePart {
   }
 
   async cutNow() {
-    if (!this.viewer || this.cutting.hidden || !this.counts) return;
+    if (!this.viewer || this.cutting.hidden || !this.planes) return;
     const plane = this.plane.value;
-    this.slice.max = this.counts[plane] - 1;
-    if (!this.slice.dataset.touched) this.slice.value = Math.round((this.counts[plane] - 1) / 2);
-    this.slice.dataset.touched = "yes";
+    const last = this.planes[plane].count - 1;
+    if (Number(this.slice.max) !== last) {
+      this.slice.max = last;
+      this.slice.value = Math.round(last / 2);
+    }
     const k = Number(this.slice.value);
     const outline = await trying(numbers(`/outline/${plane}/${k}`));
     if (!outline || k !== Number(this.slice.value)) return;
-    this.beside.show(plane, k, outline.values);
+    this.beside.show(plane, k, outline.values, this.planes[plane]);
     const at = await trying(get(`/api/place/${plane}/${k}`));
     if (at) this.viewer.clip(this.cuts.checked ? at : null);
   }
