@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import threading
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +28,8 @@ from tomomesh.view.session import Session
 from tomomesh.view.windows import Kept
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
     from starlette.responses import Response
 
@@ -82,7 +83,9 @@ class TestSlices:
         volume = Volume.from_stored(sampled(TURNED[name]), TURNED[name])
         told = slices._planes(session_of(volume))
         for plane in told["planes"].values():
-            for side, axis, step in zip(("rows", "columns"), (plane["rows"], plane["columns"]), plane["pixel_mm"], strict=True):
+            for side, axis, step in zip(
+                ("rows", "columns"), (plane["rows"], plane["columns"]), plane["pixel_mm"], strict=True
+            ):
                 direction = volume.affine[:3, 2 - axis]
                 assert step == pytest.approx(np.linalg.norm(direction))
                 main = int(np.argmax(np.abs(direction)))

@@ -82,7 +82,9 @@ def survey(volume: Volume, bars: int | None = None) -> dict[str, Any]:
         "gray_unit": volume.unit,
         "lowest": lowest,
         "highest": highest,
-        "histogram": measured.histogram(low, high, _bars(volume, high - low, bars)).tolist() if high > low else [measured.size],
+        "histogram": measured.histogram(low, high, _bars(volume, high - low, bars)).tolist()
+        if high > low
+        else [measured.size],
         "histogram_from": low,
         "histogram_to": high,
         "windows": _windows(volume, cut, measured, padded),
@@ -136,7 +138,7 @@ def _taken(volume: Volume, cut: Cut, windows: Sequence[tuple[Any, float]]) -> li
         found = np.array(cut.levels.within(windows))
     else:
         layers = range(volume.layers)
-        found = sum(np.array(cut.layer(n).within([(low[n], high) for low, high in windows])) for n in layers)
+        found = np.sum([cut.layer(n).within([(low[n], high) for low, high in windows]) for n in layers], axis=0)
     return list((found / math.prod(volume.voxels.shape)).tolist())
 
 

@@ -80,9 +80,7 @@ class Session:
         What was found out about what is opened, and what some choices keep of it.
     """
 
-    def __init__(
-        self, opened: Opened, choices: Mapping[str, Any] | None = None, reach: Reach | None = None
-    ) -> None:
+    def __init__(self, opened: Opened, choices: Mapping[str, Any] | None = None, reach: Reach | None = None) -> None:
         self.opened, self.reach = opened, reach or Reach()
         self._turns, self._told = 0, count(1)
         self.surveys, self.selections = Held(1), Held(3)
