@@ -158,10 +158,11 @@ def test_the_window_follows_handles_keys_numbers_and_suggestions(head: Shown) ->
     assert head.settings.window.lower == before  # drawn, not chosen yet
     tab.mouse.up()
     dragged = head.until(lambda found: found.window.lower != before).window.lower
+    assert isinstance(dragged, float)
     tab.focus(".handle.lower")
     tab.keyboard.press("ArrowRight")
     tab.keyboard.press("ArrowRight")
-    assert head.until(lambda found: found.window.lower != dragged).window.lower == np.add(dragged, 2)
+    assert head.until(lambda found: found.window.lower != dragged).window.lower == dragged + 2
     tab.focus(".handle.upper")
     tab.keyboard.press("PageDown")
     head.until(lambda found: found.window.upper is not None)

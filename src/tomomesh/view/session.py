@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from ..errors import TomomeshError, UsageError
 from ..settings import Settings
 from .events import Events
-from .held import Held
 from .jobs import Jobs
 from .opened import Opened, opened_as
 from .reach import Reach
+from .remembered import Remembered
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -76,14 +76,14 @@ class Session:
     events : Events
     reach : Reach
         What may be opened.
-    surveys, selections : Held
+    surveys, selections : Remembered
         What was found out about what is opened, and what some choices keep of it.
     """
 
     def __init__(self, opened: Opened, choices: Mapping[str, Any] | None = None, reach: Reach | None = None) -> None:
         self.opened, self.reach = opened, reach or Reach()
         self._turns, self._told = 0, count(1)
-        self.surveys, self.selections = Held(1), Held(3)
+        self.surveys, self.selections = Remembered(1), Remembered(3)
         self.choices = Choices().then(choices or {})
         self.made: dict[str, Made] = {}
         self.events = Events()
