@@ -237,9 +237,15 @@ def test_labels_are_chosen_in_the_list_and_in_a_slice(browser: Any, tmp_path: Pa
         page.until(lambda found: found.window.select == (2,))
         page.wait("document.querySelector('.told').textContent.includes('voxels')")
         page.tab.keyboard.press("p")
-        page.tab.locator(".plane-axial canvas").click()
-        page.until(lambda found: found.window.select in ((1, 2), (2,)))
-        assert not page.tab.locator(".for-gray").is_visible()
+        box = page.tab.locator(".plane-axial canvas").bounding_box()
+        j, i = np.argwhere(LABELS[13] == 1)[200]
+        edge = min(box["width"], box["height"]) / 64  # its pixels are square
+        place = {"x": box["width"] / 2 + (i - 31.5) * edge, "y": box["height"] / 2 + (j - 31.5) * edge}
+        page.tab.locator(".plane-axial canvas").click(position=place)
+        page.until(lambda found: found.window.select == (1, 2))
+        page.tab.locator(".plane-axial canvas").click(position=place)
+        page.until(lambda found: found.window.select == (2,))
+        assert not page.tab.locator(".for-gray >> nth=0").is_visible()
 
 
 def test_a_series_is_opened_from_the_table(browser: Any, tmp_path: Path) -> None:
