@@ -38,11 +38,12 @@ MB = 1e6
 AFTER_INPUT = """
 ([name, doing]) => new Promise((done) => {
   const canvas = document.querySelector(`.plane-${name} canvas`);
+  const handle = document.querySelector(".handle.lower");
   const seen = () => `${canvas.dataset.slice} ${canvas.dataset.lower}`;
   const before = seen(), start = performance.now();
   const look = () => seen() === before ? requestAnimationFrame(look) : done(performance.now() - start);
   if (doing === "slice") canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: -100, cancelable: true }));
-  else document.querySelector(".handle.lower").dispatchEvent(new KeyboardEvent("keydown", { key: doing, bubbles: true }));
+  else handle.dispatchEvent(new KeyboardEvent("keydown", { key: doing, bubbles: true }));
   requestAnimationFrame(look);
 })
 """

@@ -138,7 +138,7 @@ def _taken(volume: Volume, cut: Cut, windows: Sequence[tuple[Any, float]]) -> li
         found = np.array(cut.levels.within(windows))
     else:
         layers = range(volume.layers)
-        found = sum(np.array(cut.layer(n).within([(low[n], high) for low, high in windows])) for n in layers)
+        found = np.sum([cut.layer(n).within([(low[n], high) for low, high in windows]) for n in layers], axis=0)
     return list((found / math.prod(volume.voxels.shape)).tolist())
 
 
@@ -158,7 +158,7 @@ def _finite(limit: Any) -> Any:
 def _remarks(volume: Volume, cut: Cut, padded: Padding | None) -> Iterator[str]:
     """Say what a mesh of the study will show that nobody may expect."""
     if padded is not None:
-        lows, highs, counts = zip(*cut.each(partial(_held, padded=padded)), strict=True)
+        lows, highs, counts = zip(*cut.each(partial(_padding_of, padded=padded)), strict=True)
         low, high = min(lows), max(highs)
         levels = f"{low:g}" if low == high else f"{low:g} to {high:g}"
         share = sum(counts) / math.prod(volume.voxels.shape)
@@ -173,7 +173,7 @@ def _remarks(volume: Volume, cut: Cut, padded: Padding | None) -> Iterator[str]:
         yield "one slice: the mesh will be a slab of its thickness"
 
 
-def _held(levels: NDArray[Any], box: Box, *, padded: Padding) -> tuple[float, float, int]:
+def _padding_of(levels: NDArray[Any], box: Box, *, padded: Padding) -> tuple[float, float, int]:
     """Return the lowest and the highest level of the padding of a slab, and how many voxels it takes."""
     held = levels[padded.within(levels, box)]
     return (float(held.min()), float(held.max()), held.size) if held.size else (np.inf, -np.inf, 0)

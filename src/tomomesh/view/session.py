@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from ..errors import TomomeshError, UsageError
 from ..settings import Settings
 from .events import Events
-from .held import Held
 from .jobs import Jobs
 from .opened import Opened, opened_as
 from .reach import Reach
+from .remembered import Remembered
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -82,7 +82,7 @@ class Session:
         Writes a file of a surface as the command line does: what of it, the surface, its settings, the path.
     reach : Reach
         What may be opened.
-    surveys, selections : Held
+    surveys, selections : Remembered
         What was found out about what is opened, and what some choices keep of it.
     """
 
@@ -91,7 +91,7 @@ class Session:
     ) -> None:
         self.opened, self.write, self.reach = opened, write, reach or Reach()
         self._turns, self._told = 0, count(1)
-        self.surveys, self.selections = Held(1), Held(3)
+        self.surveys, self.selections = Remembered(1), Remembered(3)
         self.choices = Choices().then(choices or {})
         self.made: dict[str, Made] = {}
         self.events = Events()

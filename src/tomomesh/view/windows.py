@@ -137,7 +137,7 @@ class Kept:
 
 
 def box_of(volume: Volume, low: Longs, high: Longs) -> list[float]:
-    """Return a box (X0 X1 Y0 Y1 Z0 Z1) in the patient around the voxels (K, J, I) from some to others, half of one wider."""
+    """Return a box (X0 X1 Y0 Y1 Z0 Z1) in the patient, mm, half a voxel around those (K, J, I) from some to others."""
     sides = np.stack([low - 0.5, high + 0.5])[:, ::-1]
     corners = np.stack(np.meshgrid(*sides.T, indexing="ij"), axis=-1).reshape(-1, 3)
     places = volume.to_mm(corners)

@@ -81,7 +81,7 @@ function drawAll(canvas, handles) {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   const dots = devicePixelRatio;
   Object.assign(canvas, { width: Math.round(width * dots), height: Math.round(height * dots) });
-  const pen = canvas.getContext("2d");
+  const pen = canvas.getContext("2d", { willReadFrequently: true });
   pen.scale(dots, dots);
   drawBars(pen, width, height - 10, survey);
   drawRamp(pen, width, height);
@@ -95,13 +95,16 @@ function drawBars(pen, width, height, { histogram }) {
   const most = Math.log1p(Math.max(...histogram));
   const [low, high] = [0, 1].map((n) => share(boundsOf(n)[looked.layer]));
   const dot = 1 / devicePixelRatio;
+  const paths = [new Path2D(), new Path2D()];
   for (let x = 0; x < width; x += dot) {
     const at = x / width;
-    const count = histogram[Math.floor(at * histogram.length)];
-    const tall = Math.round((Math.log1p(count) / most) * (height - 20) * devicePixelRatio) * dot;
-    pen.fillStyle = at > low && at <= high ? inside : outside;
-    pen.fillRect(x, height - tall, dot, tall);
+    const tall = Math.round((Math.log1p(histogram[Math.floor(at * histogram.length)]) / most) * (height - 20) * devicePixelRatio) * dot;
+    paths[Number(at > low && at <= high)].rect(x, height - tall, dot, tall);
   }
+  paths.forEach((path, n) => {
+    pen.fillStyle = [outside, inside][n];
+    pen.fill(path);
+  });
 }
 
 /** Draw below the bars which levels are drawn from black to white. */

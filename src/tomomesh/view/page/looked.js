@@ -1,5 +1,5 @@
 /** What is looked at in the study; its parts tell one another of changes by `tell`, as of "look", "at" and "under". */
-import { tell } from "./store.js";
+import { state, tell } from "./store.js";
 
 /**
  * - geometry, survey, kept: the answers of /api/planes, /api/study and /api/kept, null before they have come
@@ -31,5 +31,5 @@ export function inPatient([k, j, i]) {
 /** The unit of the gray levels, as it is written behind a number. */
 export const unit = () => (looked.geometry.unit === "HU" ? " HU" : "");
 
-/** Whether the study is a label map. */
-export const isLabels = () => Boolean(looked.survey && Object.keys(looked.survey.labels).length);
+/** Whether the study is a label map, and no gray levels of it were asked for. */
+export const isLabels = () => Boolean(looked.survey && Object.keys(looked.survey.labels).length) && !["lower", "upper", "preset"].some((name) => name in state.choices);

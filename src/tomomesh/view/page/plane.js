@@ -8,6 +8,8 @@ import { on, state, tell } from "./store.js";
 
 const AHEAD = 4;
 const MOST_ZOOM = 16;
+/** Slices are painted by the processor: to hand each to the graphics card costs twice the time where that is emulated. */
+const PAINTED = { willReadFrequently: true };
 
 /** A plane of the study; `grays` and `keeps` fetch its slices, `tables` leads to colors, `pick` takes a click on a voxel. */
 export class Plane {
@@ -178,7 +180,7 @@ export class Plane {
     this.painted = now;
     const having = { indices: slice.indices, layers: looked.geometry.layers };
     paint(new Uint32Array(this.image.data.buffer), having, kept || null, outsideOf(this.plane, this.k), this.tables());
-    this.drawn.getContext("2d").putImageData(this.image, 0, 0);
+    this.drawn.getContext("2d", PAINTED).putImageData(this.image, 0, 0);
   }
 
   #mark() {
@@ -186,7 +188,7 @@ export class Plane {
     const dots = devicePixelRatio;
     if (this.canvas.width !== Math.round(room.width * dots)) this.canvas.width = Math.round(room.width * dots);
     if (this.canvas.height !== Math.round(room.height * dots)) this.canvas.height = Math.round(room.height * dots);
-    const pen = this.canvas.getContext("2d");
+    const pen = this.canvas.getContext("2d", PAINTED);
     pen.setTransform(dots, 0, 0, dots, 0, 0);
     pen.fillStyle = "#000";
     pen.fillRect(0, 0, room.width, room.height);

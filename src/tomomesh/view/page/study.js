@@ -191,7 +191,7 @@ let active = "axial";
 on("active", ({ name }) => { active = name; });
 
 function onKey(event, page) {
-  if (!looked.geometry || page.study.hidden) return false;
+  if (!looked.geometry || page.study.hidden || event.target.type === "range") return false;
   const plane = page.planes[active];
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   const steps = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1, PageUp: 10, PageDown: -10, Home: -1e6, End: 1e6 }[key];

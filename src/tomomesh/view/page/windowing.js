@@ -124,7 +124,7 @@ export function makeContrast() {
   const fields = ["width", "center"].map((name) => el("input", { type: "number", step: "any", "aria-label": `contrast, ${name}`, onchange: () => setContrast(Math.max(Number(fields[0].value), 1e-6), Number(fields[1].value)) }));
   const opacity = el("input", { type: "range", min: 0, max: 1, step: 0.05, value: looked.opacity, "aria-label": "Opacity of what is kept", oninput: () => { looked.opacity = Number(opacity.value); look(); } });
   const element = el("section", { class: "part" }, el("h2", {}, "Display"),
-    el("div", { class: "fields", title: "Drag with the right button on a slice: sideways the width, up and down the level" }, names, el("label", {}, "W ", fields[0]), el("label", {}, "L ", fields[1])),
+    el("div", { class: "fields for-gray", title: "Drag with the right button on a slice: sideways the width, up and down the level" }, names, el("label", {}, "W ", fields[0]), el("label", {}, "L ", fields[1])),
     el("div", { class: "fields" }, el("label", {}, "color over gray ", opacity)));
   const show = () => {
     const known = looked.geometry?.unit === "HU" ? Object.keys(CONTRASTS) : [];

@@ -9,18 +9,18 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
 
 
-class Held:
+class Remembered:
     """The last few answers, each found out once however many ask at a time.
 
     Parameters
     ----------
     most : int
-        How many are held.
+        How many are remembered.
 
     Examples
     --------
-    >>> held = Held(1)
-    >>> held.of("a", lambda: 1), held.of("a", lambda: 2), held.of("b", lambda: 3), held.of("a", lambda: 4)
+    >>> known = Remembered(1)
+    >>> known.of("a", lambda: 1), known.of("a", lambda: 2), known.of("b", lambda: 3), known.of("a", lambda: 4)
     (1, 1, 3, 4)
     """
 
@@ -31,14 +31,13 @@ class Held:
     def of(self, key: Hashable, find: Callable[[], Any]) -> Any:
         """Return the answer to a question; a fault is none, and raised."""
         with self._lock:
-            found = self._found.pop(key) if key in self._found else find()
-            self._found[key] = found
-            while len(self._found) > self._most:
-                del self._found[next(iter(self._found))]
+            found = self._found[key] if key in self._found else find()
+            others = [pair for pair in self._found.items() if pair[0] != key]
+            self._found = dict([*others, (key, found)][-self._most :])  # at once, for those who do not wait
             return found
 
     def known(self, key: Hashable) -> Any:
-        """Return an answer that is held, without waiting.
+        """Return an answer that is remembered, without waiting.
 
         Raises
         ------
@@ -50,4 +49,4 @@ class Held:
     def clear(self) -> None:
         """Forget all, once what is being found out is found."""
         with self._lock:
-            self._found.clear()
+            self._found = {}
