@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import shlex
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import UsageError
 from ..segmentation.networks.slices import of_size
+from ..settings import NetworkSettings, RunSettings, Settings
 from ..som.inputs import Shown, flat
 from ..som.passes import Look, at_times
+from ..som.shapes import SHAPES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -19,7 +22,6 @@ if TYPE_CHECKING:
 
     from ..model.lattice import Lattice
     from ..progress import Progress
-    from ..settings import Settings
     from ..show.plane import Plane
 
     Floats = NDArray[np.float64]
@@ -30,6 +32,10 @@ changes no result."""
 PICTURES = 60
 """Times that a network is looked at online, where an epoch is no pass over all inputs: as many frames as a film of
 ``tomomesh network --film`` has. Nothing depends on it."""
+
+
+NOT_OF_REGIONS = ("way", "slices", "signal", "contours", "space")
+"""Parameters that ``tomomesh network`` does not take: they are of studies."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +132,16 @@ class Course:
     def places(self) -> Floats:
         """The inputs where they are drawn, (n, 2 or 3)."""
         return np.asarray(self.inputs[:, : self.dimensions] / self.scale)
+
+    @property
+    def command(self) -> str:
+        """The command line that repeats it on a test region; "" elsewhere."""
+        region = self.source.get("region")
+        if region not in SHAPES:
+            return ""
+        network = replace(self.settings.network, **{name: getattr(NetworkSettings(), name) for name in NOT_OF_REGIONS})
+        words = Settings(network=network, run=RunSettings(seed=self.settings.run.seed)).words()
+        return shlex.join(["tomomesh", "network", str(region), *words])
 
     @property
     def stops(self) -> list[int]:

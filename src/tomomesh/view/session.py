@@ -86,7 +86,10 @@ class Session:
 
     @property
     def command(self) -> str:
-        """The command line that repeats what the page does."""
+        """The command line that repeats what the page does: without a study, its last training; "" before it."""
+        if self.opened.kind == "nothing":
+            made = self.made.get("train")
+            return "" if made is None else str(made.value.command)
         words = ["tomomesh", self.opened.command, *self.opened.words, *self.settings.words(), "-o", "mesh.stl"]
         return shlex.join(words)
 

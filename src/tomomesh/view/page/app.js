@@ -40,6 +40,7 @@ function showState(now) {
   byId("undo").disabled = !now.undo;
   byId("redo").disabled = !now.redo;
   byId("command").textContent = now.command;
+  byId("command").parentElement.hidden = !now.command;
   for (const [name, { tab }] of shown) tab.hidden = !PARTS[name].applies(now.opened.kind);
   if (!current || shown.get(current).tab.hidden) open([...shown.keys()].find((name) => !shown.get(name).tab.hidden));
   if (now.job) showWork(now.job);

@@ -72,12 +72,19 @@ function listen(wait) {
   socket.onmessage = (message) => {
     const told = JSON.parse(message.data);
     if (told.event === "state") take(told.state);
-    else tell(told.event, told);
+    else hear(told);
   };
   socket.onclose = () => {
     tell("away");
     setTimeout(() => again(open ? 500 : Math.min(2 * wait, 8000)), wait);
   };
+}
+
+/** Pass an event on; the state knows of the work that is underway, and of its end, too. */
+function hear(told) {
+  if (state && told.event === "progress") state.job = told;
+  else if (state && ["done", "stopped", "failed"].includes(told.event)) state.job = null;
+  tell(told.event, told);
 }
 
 async function again(wait) {
