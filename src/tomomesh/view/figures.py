@@ -71,14 +71,14 @@ FIGURES = (
     ),
     Figure(
         "3", "A slice is a matrix",
-        "Each pixel has a gray level k, drawn here as a height. Bone stands up as a rim, the brain lies lower: so a range "
-        "of k cuts one tissue out of the image.",
+        "Each pixel has a gray level k, drawn here as a height. What is bright, as bone in the paper's, stands up; the rest lies "
+        "lower: so a range of k cuts one tissue out of the image.",
         {}, own=True, shows="relief",
     ),
     Figure(
         "4", "The window on the gray levels",
-        "Only pixels with LT < k <= HT are kept (eq. 3), here in color: the skull. Where they lie, and no longer how "
-        "bright they are, is what the network is shown (eq. 4).",
+        "Only pixels with LT < k <= HT are kept (eq. 3), here in blue; the paper's 200 to 255 keep the skull. Where they "
+        "lie, and no longer how bright they are, is what the network is shown (eq. 4).",
         {}, own=True, shows="window",
     ),
     Figure(
@@ -89,14 +89,14 @@ FIGURES = (
     ),
     Figure(
         "6", "A ring on the skull",
-        "Eighty neurons, 10,000 presentations, random start. The ring thins the bone to one closed line, and its links "
-        "cross the openings where there is none. Look for a step between the first and the last neuron.",
+        "Eighty neurons, 10,000 presentations, random start. Where the window is a wall, as the skull is, the ring thins "
+        "it to one closed line, and its links cross the openings; through a solid it winds.",
         {**PAPER, "neurons": 80}, own=True,
     ),
     Figure(
         "Grid", "A grid in a square",
         "Beyond the paper's figures: an 8 x 8 grid unfolds. Its U-matrix shows how far neighbors are apart, its hits how "
-        "many inputs each neuron has won: both grow even.",
+        "many inputs each neuron has won: both grow more even as it does.",
         {**PAPER, "network": "grid", "neurons": 64}, "square",
     ),
     Figure(

@@ -36,11 +36,11 @@ OF_SLICES = ("way", "signal", "bridge", "inputs")
 """Those that no test region takes."""
 TRAIN, SEGMENT = "train", "segment"
 NO_RING = {
-    "voxels": "A run with these choices takes the window's own voxels and trains no network: this is what --way ring "
-    "trains on the slice.",
-    "contours": "A run with these choices trains a ring on each outline (all slices): this is the one that --way ring "
-    "trains on the slice.",
-    "sphere": "A run with these choices trains one network in space: this is what --way ring trains on the slice.",
+    "voxels": "A run with these choices takes the window's own voxels and trains no network: this is what the way "
+    "ring trains on the slice.",
+    "contours": "A run with these choices trains a ring on each outline (all slices): this is the one that the "
+    "way ring trains on the slice.",
+    "sphere": "A run with these choices trains one network in space: this is what the way ring trains on the slice.",
 }
 """What is said where a slice is trained that a run would not train so."""
 

@@ -10,7 +10,10 @@ import * as surface from "./surface.js";
 const PARTS = { study, networks, surface, saving };
 const THEMES = ["auto", "light", "dark"];
 const shown = new Map();
+/** Milliseconds of work that is not shown: the page would only twitch. */
+const SHORT = 300;
 let current = "";
+let working = 0;
 
 const byId = (id) => /** @type {any} */ (document.getElementById(id));
 
@@ -48,7 +51,7 @@ function showState(now) {
 }
 
 function showWork(job) {
-  byId("work").hidden = false;
+  working ||= setTimeout(() => (byId("work").hidden = false), SHORT);
   byId("work-name").textContent = job.stopping ? `${job.name}: stopping ...` : `${job.name}${job.stage ? `: ${job.stage}` : ""}`;
   byId("work-stop").disabled = job.stopping;
   const bar = byId("work-bar");
@@ -59,6 +62,8 @@ function showWork(job) {
 }
 
 function hideWork() {
+  clearTimeout(working);
+  working = 0;
   byId("work").hidden = true;
 }
 

@@ -18,6 +18,7 @@ export function sliceOf({ values, shape, headers }) {
   };
   return {
     rows, columns,
+    count: values.subarray(area).reduce((sum, one) => sum + one, 0),
     spacing: headers.get("x-spacing").split(",").map(Number),
     upward: headers.get("x-upward") === "1",
     gray: paint((n) => [values[n], values[n], values[n], 255]),
@@ -54,7 +55,8 @@ function behind(pen, view, place, colors) {
   const { slice, layers } = view;
   if (slice && layers.image) picture(pen, slice, slice.gray, place);
   if (slice && layers.window) picture(pen, slice, slice.kept, place);
-  if (view.inputs && layers.inputs && !layers.regions && view.inputs.shape[0] > 1) dots(pen, view, place, colors);
+  const pixels = slice && layers.window && view.inputs && view.inputs.shape[0] === slice.count; // they are blue already
+  if (view.inputs && layers.inputs && !layers.regions && !pixels && view.inputs.shape[0] > 1) dots(pen, view, place, colors);
 }
 
 function picture(pen, { rows, columns, upward }, drawn, place) {

@@ -104,13 +104,20 @@ function drawNetwork(pen, codebook, dimensions, edges, bridged, place, colors) {
     stroke(pen, places[edges[2 * n]], places[edges[2 * n + 1]]);
   }
   pen.setLineDash([]);
-  const size = Math.max(2, Math.min(4.5, 60 / Math.sqrt(places.length)));
+  const size = Math.max(1.2, Math.min(4.5, 0.3 * usual(places, edges)));
   const sorted = near > far ? [...places].sort((one, other) => one[2] - other[2]) : places;
   for (const one of sorted) {
     pen.globalAlpha = strength(one[2]);
     disc(pen, one, near > far ? size * (0.5 + 0.5 * pen.globalAlpha) : size, colors);
   }
   pen.globalAlpha = 1;
+}
+
+/** The usual length of a link: neurons are smaller than that, or they would hide it. */
+function usual(places, edges) {
+  const lengths = [];
+  for (let n = 0; n < edges.length; n += 2) lengths.push(Math.hypot(places[edges[n]][0] - places[edges[n + 1]][0], places[edges[n]][1] - places[edges[n + 1]][1]));
+  return lengths.sort((one, other) => one - other)[lengths.length >> 1] || 9;
 }
 
 function stroke(pen, from, to) {

@@ -19,7 +19,7 @@ export function layOut(panel, speeds) {
   const right = el("aside", { class: "net-beside", "aria-label": "Course of the training" }, at.curves, at.maps, at.saving);
   panel.classList.add("net");
   fill(panel, left, middle, right);
-  return Object.assign(at, { fill: (told, play) => filled(at, told, play), sliced: (k) => (at.sliceNumber.textContent = String(k)) });
+  return Object.assign(at, { fill: (told, play) => filled(at, told, play), sliced: () => sliced(at) });
 }
 
 function side() {
@@ -58,7 +58,7 @@ function stage(speeds) {
 function beside() {
   const link = (href, name) => el("a", { href, download: true, class: "net-link" }, name);
   return {
-    curves: el("div", { class: "net-curves" }), maps: el("div", { class: "net-maps" }),
+    curves: el("div", { class: "net-curves" }, el("p", { class: "net-hint" }, "Error, radius and alpha of a training are drawn here.")), maps: el("div", { class: "net-maps" }),
     saving: el("div", { class: "net-buttons", hidden: true }, link("/training.gif", "Save GIF"), link("/training.toml", "Save settings.toml")),
   };
 }
@@ -75,7 +75,12 @@ function filled(at, told, play) {
   at.train.textContent = !here ? "Train" : told.space ? "Train in space" : "Train this slice";
   const most = Math.max(study ? told.study.slices - 1 : 0, 0);
   if (Number(at.slice.max) !== most) Object.assign(at.slice, { max: String(most), value: String(Math.floor(most / 2)) });
-  at.sliceNumber.textContent = `${at.slice.value} of 0 to ${most}`;
+  sliced(at);
+}
+
+/** Say which slice it is. */
+function sliced(at) {
+  at.sliceNumber.textContent = `${at.slice.value} of 0 to ${at.slice.max}`;
 }
 
 function sources(at, told, study) {

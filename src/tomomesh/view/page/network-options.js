@@ -1,6 +1,6 @@
 /** A form of parameters, made of their schema: with help, unit and limits, and only those that matter. */
 import { el, fill } from "./dom.js";
-import { choose, state } from "./store.js";
+import { choose as chosen, state, tell } from "./store.js";
 
 /** Names of parameters as a class reads them. */
 const CALLED = {
@@ -13,6 +13,11 @@ const CALLED = {
 const NOT_HERE = { network: ["none"] };
 const open = new Set();
 
+/** Choose; what is refused is shown as it was. @param {Record<string, any>} changes */
+async function choose(changes) {
+  if (!(await chosen(changes))) tell("state", state);
+}
+
 /** Gather the schemas of all parameters by their bare names. @param {any} schema */
 export function parametersOf(schema) {
   return Object.assign({}, ...Object.values(schema.properties).map((group) => group.properties));
@@ -20,8 +25,8 @@ export function parametersOf(schema) {
 
 /** What a parameter is now: as chosen, else the paper's where all is by the paper, else its default. */
 export function valueOf(name, entry) {
-  const chosen = state.choices[name];
-  if (chosen !== undefined) return chosen;
+  const own = state.choices[name];
+  if (own !== undefined) return own;
   return state.choices.way === "paper" && entry.paper !== undefined ? entry.paper : entry.default;
 }
 
@@ -42,8 +47,8 @@ function row(name, entry) {
   const help = el("p", { id: `${id}-help`, class: "net-help", hidden: !open.has(name) }, `${entry.description}${limits(entry)}.`);
   const asked = el("button", { type: "button", class: "net-asked", "aria-expanded": open.has(name), "aria-controls": help.id, "aria-label": `What is ${CALLED[name]}?`, onclick: () => toggle(name, help, asked) }, "?");
   const label = el("label", { for: id, title: entry.description }, CALLED[name], unit(entry));
-  const chosen = state.choices[name] !== undefined;
-  return el("div", { class: `net-option${chosen ? " chosen" : ""}` }, label, el("span", { class: "net-value" }, ...control(id, name, entry)), asked, help);
+  const own = state.choices[name] !== undefined;
+  return el("div", { class: `net-option${own ? " chosen" : ""}` }, label, el("span", { class: "net-value" }, ...control(id, name, entry)), asked, help);
 }
 
 function toggle(name, help, asked) {

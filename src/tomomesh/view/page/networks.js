@@ -93,7 +93,9 @@ class Part {
     if (this.region !== before) return this.refresh();
     fillOptions(this.at.options, this.parameters, told.options);
     this.working();
-    if (told.study && !this.region && !this.slice && !this.course.now) await this.showSlice();
+    this.captioned();
+    const first = !this.slice && !this.course.now;
+    if (told.study && told.study.slices && !this.region && (first || (this.mode === "slices" && this.chosen !== choices()))) await this.showSlice();
   }
 
   working() {
@@ -153,7 +155,8 @@ class Part {
     const k = Number(this.at.slice.value);
     this.figure = null;
     this.mode = "slices";
-    this.at.sliced(k);
+    this.chosen = choices();
+    this.at.sliced();
     await this.fetchSlice({ of: "study", k });
     if (Number(this.at.slice.value) !== k) return;
     this.networks = this.told.segmented ? await trying(get(`/api/networks/${k}`)) : null;
@@ -187,8 +190,9 @@ class Part {
   }
 
   showFrame(frame) {
-    this.frame = frame;
+    if (this.mode !== "course") this.figure = null;
     this.mode = "course";
+    this.captioned();
     this.redraw();
   }
 
@@ -210,12 +214,12 @@ class Part {
     const now = this.mode === "course" ? course.now : null;
     if (now) draw(at.canvas, { course: now, frame: now.frames[this.play.at], before: now.frames[this.play.at - 1], inputs: course.inputs, slice: course.slice, layers, camera: this.camera });
     else if (this.mode !== "relief" && this.slice) draw(at.canvas, { slice: this.slice, networks: this.networks && this.networks.networks, layers, camera: this.camera });
-    showSide(at, now, this.play);
+    showSide(at, now, this.play, Boolean(course.now));
   }
 
   captioned() {
     const { course, figure, mode, networks } = this;
-    const still = () => told(networks, this.at.slice.value);
+    const still = () => (this.told && this.told.study && this.told.study.fault) || told(networks, this.at.slice.value);
     const words = figure ? `${/^\d/.test(figure.name) ? `Fig. ${figure.name}. ` : ""}${figure.caption}` : mode === "course" ? course.now && course.now.note : still();
     this.at.caption.textContent = words || (course.now || this.slice ? "" : EMPTY);
   }
@@ -235,11 +239,13 @@ class Part {
   }
 }
 
+const choices = () => JSON.stringify(state.choices);
+
 /** Say what the networks of a slice are. */
 function told(networks, k) {
   if (!networks) return "";
   const count = networks.networks.length;
   const stale = networks.fresh ? "" : " The choices have changed since: train all slices again.";
-  if (!count) return `Slice ${k} has no network: too little of the window is on it, or the run takes its voxels.${stale}`;
+  if (!count) return `Slice ${k} has no network: too little of the window is on it, or the run trains none there.${stale}`;
   return `${count === 1 ? "The network" : `The ${count} networks`} of slice ${k}, as a run hands ${count === 1 ? "it" : "them"} on.${stale}`;
 }
