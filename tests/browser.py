@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import pytest
 
@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 WITHOUT_SCREEN = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
-LAPTOP = {"width": 1280, "height": 720}
+WIDTH, HEIGHT = 1280, 720
+"""Of a laptop."""
 
 
 def browser_here() -> str:
@@ -28,15 +29,14 @@ def browser_here() -> str:
 
 
 @contextmanager
-def looking_at(page: Page, *, scheme: str = "light", refused: bool = False) -> Iterator[Any]:
+def looking_at(page: Page, *, scheme: Literal["light", "dark"] = "light", refused: bool = False) -> Iterator[Any]:
     """Open a page in a browser; no script may fail in it, and nothing be asked of anybody else.
 
     Parameters
     ----------
     page : Page
         One that is served, and was not entered.
-    scheme : str
-        light or dark.
+    scheme : {"light", "dark"}
     refused : bool
         Whether the server is to refuse something, which the browser says, too.
     """
@@ -46,7 +46,7 @@ def looking_at(page: Page, *, scheme: str = "light", refused: bool = False) -> I
     faults: list[str] = []
     with sync_playwright() as tools:
         browser = tools.chromium.launch(executable_path=path, args=WITHOUT_SCREEN)
-        seen = browser.new_page(viewport=LAPTOP, color_scheme=scheme)
+        seen = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme=scheme)
         seen.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
         seen.on("pageerror", lambda fault: faults.append(str(fault)))
         seen.on("request", lambda asked: None if _ours(asked.url, page) else faults.append(asked.url))

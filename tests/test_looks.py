@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import law
 from hypothesis import given
 from hypothesis import strategies as st
 
+from conftest import law
 from tomomesh import phantom
 from tomomesh.errors import EmptyError
 from tomomesh.model.lattice import lattice

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from tomomesh.view.course import Course
 
 HEAD = phantom((10, 48, 48), (5.0, 5.0, 14.0))
-RING = {"lower": HEAD.lower, "way": "ring"}
+RING: dict[str, Any] = {"lower": HEAD.lower, "way": "ring"}
 WAYS: dict[str, dict[str, Any]] = {
     "ring": RING,
     "paper": {"lower": HEAD.lower, "way": "paper", "neurons": 40, "iterations": 2500},
@@ -52,7 +52,7 @@ class Telling(Session):
     def __init__(self, opened: Opened | None = None, choices: Any = None) -> None:
         super().__init__(opened or Opened(), choices)
         self.told: list[dict[str, Any]] = []
-        self.events.tell = self.told.append  # type: ignore[method-assign]
+        self.events.tell = self.told.append  # type: ignore[method-assign, assignment]
         self.jobs._tell = self.told.append
 
     def train(self, **asked: Any) -> Course:
@@ -86,12 +86,13 @@ def test_a_slice_is_trained_to_the_last_bit_as_by_the_run(way: str, k: int) -> N
     run = segment(HEAD.volume, **WAYS[way])
     last = json.loads(json.dumps(session.epochs[-1]))["codebook"]  # as the page has it
     assert np.array_equal(np.array(last).reshape(-1, 2), run.source.codebook_on(k))
+    assert course.bridged is not None
     assert np.array_equal(course.bridged, run.source.bridged[np.searchsorted(run.source.slices, k)])
     assert course.note == ""
 
 
 def test_in_space_a_network_is_trained_to_the_last_bit_as_by_the_run() -> None:
-    choices = {"lower": HEAD.lower, "way": "sphere", "neurons": 162}
+    choices: dict[str, Any] = {"lower": HEAD.lower, "way": "sphere", "neurons": 162}
     course = study(**choices).train(space=True)
     run = segment(HEAD.volume, **choices)
     assert np.array_equal(course.frames[-1].codebook, run.source.network.codebook)
@@ -158,7 +159,7 @@ def test_all_slices_are_the_runs() -> None:
 
 
 def test_all_contours_of_a_slice_are_shown() -> None:
-    choices = {"lower": HEAD.lower, "way": "contours"}
+    choices: dict[str, Any] = {"lower": HEAD.lower, "way": "contours"}
     session = study(**choices)
     networks.segment(session, {})
     session.wait()
@@ -181,13 +182,13 @@ def test_a_training_that_is_stopped_keeps_what_was_seen() -> None:
         if event["event"] == "epoch" and event["n"] == 9:
             session.jobs.stop()
 
-    session.events.tell = tell  # type: ignore[method-assign]
+    session.events.tell = tell  # type: ignore[method-assign, assignment]
     networks.train(session, {"slice": 4})
     session.wait()
     assert session.told[-1]["event"] == "stopped"
     told = networks.training(session)["training"]
     assert (told["state"], told["count"]) == ("stopped", 10)
-    session.events.tell = session.told.append  # type: ignore[method-assign]
+    session.events.tell = session.told.append  # type: ignore[method-assign, assignment]
     session.choose({"epochs": 3})
     assert session.train(slice=4).state == "done"
 
@@ -220,9 +221,10 @@ def test_without_a_study_only_regions_are_trained() -> None:
         trainer_of(Telling(), {"slice": 1}, lambda *told: None)
     with pytest.raises(UsageError, match="no such region"):
         trainer_of(Telling(), {"region": "circle"}, lambda *told: None)
+    trainer = trainer_of(Telling(choices={"neurons": 4096}), {"region": "head"}, lambda *told: None)
+    look = trainer.course.look(lambda told: None, lambda *told: None)
     with pytest.raises(EmptyError, match="fewer inputs"):
-        trainer = trainer_of(Telling(choices={"neurons": 4096}), {"region": "head"}, lambda *told: None)
-        trainer.train(trainer.course.look(lambda told: None, lambda *told: None))
+        trainer.train(look)
 
 
 @pytest.mark.parametrize("figure", [one for one in FIGURES if one.choices], ids=lambda one: one.name)
@@ -293,9 +295,9 @@ def test_maps_of_a_sheet_count_every_input(name: str) -> None:
     assert sum(told["hits"]) == len(course.inputs)
     assert len(told["far"]) * 2 == len(told["centers"])
     assert told["hexagonal"] == (name == "hexagonal")
+    session.choose({"network": "ring"})
+    session.train(region="square")
     with pytest.raises(UsageError, match="no U-matrix"):
-        session.choose({"network": "ring"})
-        session.train(region="square")
         pictures.maps(session, 0)
 
 
@@ -310,7 +312,7 @@ def test_the_region_of_the_head_is_a_skull_that_is_open_somewhere() -> None:
 def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     path = tmp_path_factory.mktemp("study") / "head.nii.gz"
     write_nifti(path, np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
-    with served(path, "--lower", HEAD.lower, "--way", "ring") as found:
+    with served(path, "--lower", str(HEAD.lower), "--way", "ring") as found:
         found.enter()
         found.ready()
         yield found

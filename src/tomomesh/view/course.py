@@ -150,7 +150,7 @@ class Course:
         if asked.training == "batch":
             return list(range(1, asked.epochs + 1))
         if asked.least_move == 0 and count > 1:
-            return at_times(asked.iterations, PICTURES).tolist()
+            return [int(stop) for stop in at_times(asked.iterations, PICTURES)]
         return [*range(count, asked.iterations, count), asked.iterations]
 
     def told(self, first: int = 0) -> dict[str, Any]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..settings import NetworkSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,8 @@ TEN = {
 FIGURES = (
     Figure(
         "1a", "Update region of a chain",
-        "An input (cross) is presented again and again. The nearest neuron wins (eq. 1), and those up to two links from "
-        "it follow (eq. 2). The winner is the last but one: in a chain the neighborhood ends with it, so four move.",
+        "An input (cross) is presented again and again. The nearest neuron wins (eq. 1), and those up to two links "
+        "from it follow (eq. 2). The winner is the last but one: in a chain the neighborhood ends with it, so four move.",
         {**TEN, "network": "chain"}, "input",
     ),
     Figure(
@@ -65,38 +67,38 @@ FIGURES = (
     ),
     Figure(
         "2", "A ring learns a triangle",
-        "Fifty neurons start at random places: no start has to be known. While the neighborhood is wide the ring gathers "
-        "and untangles; as it narrows, over 10,000 presentations, the ring spreads to fill the triangle.",
+        "Fifty neurons start at random places: no start has to be known. While the neighborhood is wide the ring "
+        "gathers and untangles; as it narrows, over 10,000 presentations, the ring spreads to fill the triangle.",
         {**PAPER, "neurons": 50}, "triangle",
     ),
     Figure(
         "3", "A slice is a matrix",
-        "Each pixel has a gray level k, drawn here as a height. What is bright, as bone in the paper's, stands up; the rest lies "
-        "lower: so a range of k cuts one tissue out of the image.",
+        "Each pixel has a gray level k, drawn here as a height. What is bright, as bone in the paper's, stands up; the "
+        "rest lies lower: so a range of k cuts one tissue out of the image.",
         {}, own=True, shows="relief",
     ),
     Figure(
         "4", "The window on the gray levels",
-        "Only pixels with LT < k <= HT are kept (eq. 3), here in blue; the paper's 200 to 255 keep the skull. Where they "
-        "lie, and no longer how bright they are, is what the network is shown (eq. 4).",
+        "Only pixels with LT < k <= HT are kept (eq. 3), here in blue; the paper's 200 to 255 keep the skull. Where "
+        "they lie, and no longer how bright they are, is what the network is shown (eq. 4).",
         {}, own=True, shows="window",
     ),
     Figure(
         "5", "From the image to its regions",
-        "Image, window, inputs, training, and at the end the network is compared with the image: each kept pixel has the "
-        "color of the neuron nearest to it. Step through to see the regions take shape.",
+        "Image, window, inputs, training, and at the end the network is compared with the image: each kept pixel has "
+        "the color of the neuron nearest to it. Step through to see the regions take shape.",
         {**PAPER, "neurons": 24}, own=True, shows="regions",
     ),
     Figure(
         "6", "A ring on the skull",
-        "Eighty neurons, 10,000 presentations, random start. Where the window is a wall, as the skull is, the ring thins "
-        "it to one closed line, and its links cross the openings; through a solid it winds.",
+        "Eighty neurons, 10,000 presentations, random start. Where the window is a wall, as the skull is, the ring "
+        "thins it to one closed line, and its links cross the openings; through a solid it winds.",
         {**PAPER, "neurons": 80}, own=True,
     ),
     Figure(
         "Grid", "A grid in a square",
-        "Beyond the paper's figures: an 8 x 8 grid unfolds. Its U-matrix shows how far neighbors are apart, its hits how "
-        "many inputs each neuron has won: both grow more even as it does.",
+        "Beyond the paper's figures: an 8 x 8 grid unfolds. Its U-matrix shows how far neighbors are apart, its hits "
+        "how many inputs each neuron has won: both grow more even as it does.",
         {**PAPER, "network": "grid", "neurons": 64}, "square",
     ),
     Figure(

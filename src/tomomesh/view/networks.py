@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from starlette.responses import Response
 
 from ..errors import TomomeshError, UsageError
 from ..model.contours import Contours
@@ -20,6 +19,8 @@ from .trainers import REGIONS, backdrop, head, in_slices, trainer_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from starlette.responses import Response
+
     from ..progress import Progress
     from ..settings import Settings
     from .course import Course
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     Told = dict[str, Any]
 
 OPTIONS = (
-    "way", "network", "neurons", "signal", "training", "epochs", "iterations", "start", "neighborhood", "radius", "radius_fall",
-    "radius_power", "alpha", "alpha_fall", "alpha_power", "least_move", "trim", "even", "bridge", "inputs", "seed",
+    "way", "network", "neurons", "signal", "training", "epochs", "iterations", "start", "neighborhood", "radius",
+    "radius_fall", "radius_power", "alpha", "alpha_fall", "alpha_power", "least_move", "trim", "even", "bridge", "inputs", "seed",
 )  # fmt: skip
 """What a training may be asked, in the order of the page."""
 OF_SLICES = ("way", "signal", "bridge", "inputs")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,7 +16,6 @@ from ..segmentation.space import pieces_of, shown_of, train_space
 from ..settings import IN_SLICE, SURFACES
 from ..show.plane import Plane, contrast, gray
 from ..som.fit import fit
-from ..som.passes import Look
 from ..som.region import train_region
 from ..som.shapes import SHAPES, shape
 from ..ways.rings import slices_of
@@ -26,18 +24,20 @@ from .course import Backdrop, Course
 from .selected import selected_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from ..model.volume import Volume
     from ..progress import Progress
     from ..segmentation.study import Selected
-    from ..settings import NetworkSettings, Settings
+    from ..settings import Settings
+    from ..som.passes import Look
     from .session import Session
 
     Floats = NDArray[np.float64]
+    Trained = tuple[Floats, NDArray[np.bool_] | None]
 
-Trained = tuple[np.ndarray[Any, Any], "NDArray[np.bool_] | None"]
-"""The neurons as the run hands them on, where they are drawn, and which edges bridge gaps."""
 SINGLE = "input"
 REGIONS = (*SHAPES, "head", SINGLE)
 """Test regions: the paper's, a slice of the built-in head, and a single input, which is presented again and again."""
@@ -49,7 +49,16 @@ SIGNAL = 8
 
 
 class Trainer(NamedTuple):
-    """A training that can be begun: what it is the course of, and what trains it for whoever looks on."""
+    """A training that can be begun.
+
+    Attributes
+    ----------
+    course : Course
+        What is kept of it.
+    train : callable
+        Trains for who looks on; returns the neurons as the run hands them on, where they are drawn, and which edges
+        bridge gaps, where that is known.
+    """
 
     course: Course
     train: Callable[[Look], Trained]

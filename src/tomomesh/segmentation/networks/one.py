@@ -1,11 +1,9 @@
-"""The network of one slice of a study, looked at while it is trained: that which the whole study's training has there."""
+"""The network of one slice of a study, looked at while it is trained: the one that the whole study has there."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from ...errors import EmptyError
 from ...model.sliced import ranges
@@ -13,6 +11,7 @@ from ...progress import Progress, silent
 from .training import train_some
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from ...model.lattice import Lattice
