@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from tomomesh.view.course import Course
+    from tomomesh.view.course import TrainingCourse
 
 HEAD = phantom((10, 48, 48), (5.0, 5.0, 14.0))
 RING: dict[str, Any] = {"lower": HEAD.lower, "way": "ring"}
@@ -55,7 +55,7 @@ class Telling(Session):
         self.events.tell = self.told.append  # type: ignore[method-assign, assignment]
         self.jobs._tell = self.told.append
 
-    def train(self, **asked: Any) -> Course:
+    def train(self, **asked: Any) -> TrainingCourse:
         """Train, and wait for it."""
         networks.train(self, asked)
         self.wait()

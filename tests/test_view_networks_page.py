@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("uvicorn")
 
-from browser import browser_here, looking_at
+from looked_at import looking_at
 from pages import served
 from studies import write_nifti
 from tomomesh import phantom
@@ -39,7 +39,6 @@ TITLES = {
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    browser_here()
     path = tmp_path_factory.mktemp("study") / "head.nii.gz"
     write_nifti(path, np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
     return path
@@ -120,7 +119,6 @@ def test_a_training_is_seen_again_where_the_page_is_opened_anew(of_study: Any) -
 
 
 def test_a_class_plays_the_figures_without_a_study() -> None:
-    browser_here()
     with served() as page, looking_at(page, scheme="dark") as seen:
         seen.wait_for_selector("#net-train:enabled")
         expect(seen.locator("#net-caption")).to_contain_text("Choose a figure")
@@ -140,7 +138,6 @@ def test_a_class_plays_the_figures_without_a_study() -> None:
 
 
 def test_a_sheet_has_maps_and_undo_takes_a_figure_back() -> None:
-    browser_here()
     with served() as page, looking_at(page) as seen:
         seen.locator(".net-figures button", has_text="Grid").first.click()
         seen.wait_for_selector("#net-train:enabled")
@@ -156,7 +153,6 @@ def test_a_sheet_has_maps_and_undo_takes_a_figure_back() -> None:
 
 
 def test_what_is_refused_is_said_and_taken_back() -> None:
-    browser_here()
     with served() as page, looking_at(page, refused=True) as seen:
         seen.fill("#option-neurons", "1")
         seen.press("#option-neurons", "Enter")
@@ -166,7 +162,6 @@ def test_what_is_refused_is_said_and_taken_back() -> None:
 
 
 def test_a_long_training_is_stopped_from_the_page() -> None:
-    browser_here()
     with served("--epochs", "4000", "--neurons", "400") as page, looking_at(page) as seen:
         seen.select_option("#net-source", "square")
         seen.click("#net-train")
@@ -180,7 +175,6 @@ def test_a_long_training_is_stopped_from_the_page() -> None:
 
 
 def test_the_film_and_the_settings_are_saved(tmp_path: Path) -> None:
-    browser_here()
     with served() as page, looking_at(page) as seen:
         seen.locator(".net-figures button", has_text="1a").first.click()
         seen.wait_for_selector("text=Save GIF")

@@ -55,7 +55,7 @@ class Backdrop:
 
 
 @dataclass(frozen=True)
-class Frame:
+class Moment:
     """A network at some time.
 
     Attributes
@@ -85,7 +85,7 @@ class Frame:
 
 
 @dataclass
-class Course:
+class TrainingCourse:
     """A training and what was seen of it.
 
     Attributes
@@ -102,7 +102,7 @@ class Course:
     scale : tuple of float
         What an input's coordinates are divided by to lie where the page draws them.
     backdrop : Backdrop or None
-    frames : list of Frame
+    frames : list of Moment
         The start first.
     bridged : (e,) bool array
         Edges of the lattice that bridge gaps, at the end.
@@ -119,7 +119,7 @@ class Course:
     unit: str = ""
     note: str = ""
     backdrop: Backdrop | None = None
-    frames: list[Frame] = field(default_factory=list)
+    frames: list[Moment] = field(default_factory=list)
     bridged: NDArray[np.bool_] | None = None
     state: str = "running"
 
@@ -188,11 +188,11 @@ class Course:
             progress("train", done, max(done, planned))
             error = float(np.sqrt(shown.match(np.ascontiguousarray(flat(codebook).T))[1], dtype=np.float64).mean())
             drawn = np.asarray(codebook[:, : self.dimensions] / self.scale)
-            self.add(Frame("epoch" if done else "start", drawn, error, radius, alpha), tell)
+            self.add(Moment("epoch" if done else "start", drawn, error, radius, alpha), tell)
 
         return Look(told, 0 if len(self.inputs) == 1 else PICTURES)
 
-    def add(self, frame: Frame, tell: Callable[[dict[str, Any]], None]) -> None:
+    def add(self, frame: Moment, tell: Callable[[dict[str, Any]], None]) -> None:
         """Keep a frame, and tell the page of it."""
         self.frames.append(frame)
         tell({"event": "epoch", "n": len(self.frames) - 1, **frame.told})
@@ -201,9 +201,9 @@ class Course:
         """Keep what the run hands on, where the last epoch is not that already."""
         last, self.bridged, self.state = self.frames[-1], bridged, "done"
         if not np.array_equal(last.codebook, codebook):
-            self.add(Frame("spaced", codebook, last.error, last.radius, last.alpha), tell)
+            self.add(Moment("spaced", codebook, last.error, last.radius, last.alpha), tell)
 
-    def network_of(self, frame: Frame) -> Lattice:
+    def network_of(self, frame: Moment) -> Lattice:
         """Return the network of a frame: a ring of fewer neurons where its slice has few inputs."""
         return of_size(self.lattice, len(frame.codebook))
 

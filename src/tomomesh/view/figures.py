@@ -56,7 +56,8 @@ FIGURES = (
     Figure(
         "1a", "Update region of a chain",
         "An input (cross) is presented again and again. The nearest neuron wins (eq. 1), and those up to two links "
-        "from it follow (eq. 2). The winner is the last but one: in a chain the neighborhood ends with it, so four move.",
+        "from it follow (eq. 2). The winner is the last but one: in a chain the neighborhood ends there, so four "
+        "move.",
         {**TEN, "network": "chain"}, "input",
     ),
     Figure(

@@ -23,14 +23,15 @@ if TYPE_CHECKING:
 
     from ..progress import Progress
     from ..settings import Settings
-    from .course import Course
+    from .course import TrainingCourse
     from .session import Session
 
     Told = dict[str, Any]
 
 OPTIONS = (
     "way", "network", "neurons", "signal", "training", "epochs", "iterations", "start", "neighborhood", "radius",
-    "radius_fall", "radius_power", "alpha", "alpha_fall", "alpha_power", "least_move", "trim", "even", "bridge", "inputs", "seed",
+    "radius_fall", "radius_power", "alpha", "alpha_fall", "alpha_power", "least_move", "trim", "even", "bridge",
+    "inputs", "seed",
 )  # fmt: skip
 """What a training may be asked, in the order of the page."""
 OF_SLICES = ("way", "signal", "bridge", "inputs")
@@ -125,13 +126,13 @@ def _segment(session: Session, progress: Progress) -> Told:
     return {"slices": _slices_with(found.source)}
 
 
-def course_of(session: Session) -> Course | None:
+def course_of(session: Session) -> TrainingCourse | None:
     """Return the last training."""
     made = session.made.get(TRAIN)
     return None if made is None else made.value
 
 
-def _course(session: Session) -> Course:
+def _course(session: Session) -> TrainingCourse:
     course = course_of(session)
     if course is None:
         raise UsageError("nothing has been trained yet", expected="Train first")

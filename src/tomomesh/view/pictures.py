@@ -20,11 +20,11 @@ from .selected import selected_of
 from .trainers import head, plane_of, slice_of
 
 if TYPE_CHECKING:
-    from .course import Course
+    from .course import TrainingCourse
     from .session import Session
 
 
-def _trained(session: Session) -> Course:
+def _trained(session: Session) -> TrainingCourse:
     course = course_of(session)
     if course is None or not course.frames:
         raise UsageError("nothing has been trained yet", expected="Train first")

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from ..errors import UsageError
 from ..segmentation.study import lay_out, select_in
-from ..settings import NetworkSettings, RunSettings
 from .session import Made
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from typing import Any
 
     from ..progress import Progress
@@ -23,8 +20,6 @@ if TYPE_CHECKING:
 _finding = threading.Lock()
 """A page that asks for slice after slice has their window found once."""
 NAME = "selected"
-OTHERS = frozenset(entry.name for group in (NetworkSettings, RunSettings) for entry in fields(group)) - {"slices"}
-"""Parameters that change nothing about what is kept."""
 
 
 def selected_of(session: Session, progress: Progress) -> Selected:
@@ -60,8 +55,8 @@ def laid_out_of(session: Session, settings: Settings) -> LaidOut:
     return lay_out(opened.volume, opened.labels, settings, labelled=settings.window.select is not None)
 
 
-def _key(session: Session) -> Mapping[str, Any]:
-    """Return the choices that matter; the paper's own choose the slices and the window too."""
-    values = session.choices.values
-    kept = {name: value for name, value in values.items() if name not in OTHERS}
-    return kept | {"paper": values.get("way") == "paper"}
+def _key(session: Session) -> dict[str, Any]:
+    """Return what the voxels that are kept follow from."""
+    settings = session.settings
+    of = (settings.read, settings.crop, settings.window, settings.network.slices)
+    return {"settings": of, "volume": id(session.opened.volume)}

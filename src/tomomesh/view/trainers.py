@@ -20,7 +20,7 @@ from ..som.region import train_region
 from ..som.shapes import SHAPES, shape
 from ..ways.rings import slices_of
 from ..ways.space import shown_in_space
-from .course import Backdrop, Course
+from .course import Backdrop, TrainingCourse
 from .selected import selected_of
 
 if TYPE_CHECKING:
@@ -53,14 +53,14 @@ class Trainer(NamedTuple):
 
     Attributes
     ----------
-    course : Course
+    course : TrainingCourse
         What is kept of it.
     train : callable
         Trains for who looks on; returns the neurons as the run hands them on, where they are drawn, and which edges
         bridge gaps, where that is known.
     """
 
-    course: Course
+    course: TrainingCourse
     train: Callable[[Look], Trained]
 
 
@@ -99,7 +99,9 @@ def on_slice(kept: Selected, k: int, settings: Settings, progress: Progress) -> 
     taken, run = in_slices(settings), settings.run
     one = OneSlice.of(slices_of(kept, taken), k, threads=run.threads, progress=progress)
     pixel = one.slices.pixel_mm
-    course = Course(f"Slice {k}", {"slice": k}, taken, one.lattice, one.shown, pixel, "mm", backdrop=backdrop(kept, k))
+    course = TrainingCourse(
+        f"Slice {k}", {"slice": k}, taken, one.lattice, one.shown, pixel, "mm", backdrop=backdrop(kept, k)
+    )
     return Trainer(course, one.train)
 
 
@@ -115,7 +117,7 @@ def in_space(kept: Selected, settings: Settings) -> Trainer:
         found = train_space(shown.places, asked, outlined=shown.outlined, seed=run.seed, look=look)
         return found.codebook, None
 
-    course = Course("The window in space", {"space": True}, taken, graph, places, (1.0, 1.0, 1.0), "mm")
+    course = TrainingCourse("The window in space", {"space": True}, taken, graph, places, (1.0, 1.0, 1.0), "mm")
     return Trainer(course, train)
 
 
@@ -138,7 +140,7 @@ def on_region(name: str, settings: Settings) -> Trainer:
     inputs, area, back = head() if name == "head" else (*shape(name), None)
     scale = (1.0,) * inputs.shape[1] if back is None else back.plane.spacing_mm
     unit = "sides" if back is None else "mm"
-    course = Course(_titled(name), {"region": name}, settings, graph, inputs, scale, unit, backdrop=back)
+    course = TrainingCourse(_titled(name), {"region": name}, settings, graph, inputs, scale, unit, backdrop=back)
 
     def train(look: Look) -> Trained:
         found = train_region(inputs, asked, seed=settings.run.seed, pixel_area=area, look=look)
@@ -159,7 +161,9 @@ def _on_one_input(settings: Settings) -> Trainer:
     start = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     inputs = 0.15 * start[[min(SIGNAL, len(graph) - 1)]]
     once = replace(asked, training="online", trim=0.0, least_move=0.0)
-    course = Course("A single input", {"region": SINGLE}, replace(settings, network=once), graph, inputs, (1.0, 1.0))
+    course = TrainingCourse(
+        "A single input", {"region": SINGLE}, replace(settings, network=once), graph, inputs, (1.0, 1.0)
+    )
 
     def train(look: Look) -> Trained:
         rng = np.random.default_rng(settings.run.seed)

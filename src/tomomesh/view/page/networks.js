@@ -157,7 +157,9 @@ class Part {
     this.mode = "slices";
     this.chosen = choices();
     this.at.sliced();
+    const waiting = setTimeout(() => (this.at.caption.textContent = "Finding what is kept of the study ..."), 400);
     await this.fetchSlice({ of: "study", k });
+    clearTimeout(waiting);
     if (Number(this.at.slice.value) !== k) return;
     this.networks = this.told.segmented ? await trying(get(`/api/networks/${k}`)) : null;
     this.captioned();
