@@ -137,6 +137,18 @@ def test_a_class_plays_the_figures_without_a_study() -> None:
         assert "LT < k <= HT" in seen.inner_text("#net-caption")
 
 
+def test_no_epoch_is_lost_where_the_page_cannot_follow() -> None:
+    with served("--epochs", "3000", "--neurons", "9", "--trim", "0") as page, looking_at(page) as seen:
+        seen.select_option("#net-source", "triangle")
+        seen.click("#net-train")
+        seen.wait_for_selector("text=Save GIF")
+        expect(seen.locator("#net-frames")).to_have_attribute("max", re.compile("^300[01]$"))
+        seen.focus("#net-canvas")
+        seen.keyboard.press("End")
+        seen.keyboard.press("ArrowLeft")
+        until(seen, "Epoch 3000 of 3000")
+
+
 def test_a_sheet_has_maps_and_undo_takes_a_figure_back() -> None:
     with served() as page, looking_at(page) as seen:
         seen.locator(".net-figures button", has_text="Grid").first.click()
@@ -168,7 +180,8 @@ def test_a_long_training_is_stopped_from_the_page() -> None:
         seen.wait_for_selector("#work-stop:visible")
         assert seen.is_disabled("#net-train")
         seen.click("#work-stop")
-        seen.wait_for_selector("#net-train:enabled")
+        seen.wait_for_selector("text=Save GIF")  # all is received
+        assert seen.is_enabled("#net-train")
         seen.focus("#net-canvas")
         seen.keyboard.press("End")
         until(seen, re.compile(r"^Epoch \d+ of \d+, stopped$"))

@@ -13,7 +13,7 @@ from ..progress import silent
 from ..settings import MATTERS
 from .figures import FIGURES
 from .routes import get, levels, post
-from .selected import laid_out_of, selected_of
+from .selected import opened_volume, selected_of, slices_of
 from .trainers import REGIONS, backdrop, head, in_slices, trainer_of
 
 if TYPE_CHECKING:
@@ -118,10 +118,8 @@ def _segment(session: Session, progress: Progress) -> Told:
     """Train all slices: the very call of ``tomomesh segment``."""
     from ..pipeline import segment as run
 
-    volume, labels, choices = session.opened.volume, session.opened.labels, session.choices.values
-    if volume is None:
-        raise UsageError("no study is open, or it is still being read", expected="tomomesh view STUDY")
-    found = run(volume, session.settings, labels=labels, progress=progress, **choices)
+    choices, labels = session.choices.values, session.opened.labels
+    found = run(opened_volume(session), session.settings, labels=labels, progress=progress, **choices)
     session.keep(SEGMENT, found, choices)
     return {"slices": _slices_with(found.source)}
 
@@ -211,7 +209,7 @@ def _study(session: Session) -> Told | None:
     if session.opened.volume is None:
         return None
     try:
-        laid = laid_out_of(session, session.settings)
+        laid = slices_of(session)
     except TomomeshError as fault:
         return {"slices": 0, "fault": str(fault)}
     return {"slices": laid.volume.shape[0], "plane": laid.plane}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..errors import UsageError
@@ -12,9 +13,9 @@ from .session import Made
 if TYPE_CHECKING:
     from typing import Any
 
+    from ..model.volume import Volume
     from ..progress import Progress
     from ..segmentation.study import LaidOut, Selected
-    from ..settings import Settings
     from .session import Session
 
 _finding = threading.Lock()
@@ -35,24 +36,38 @@ def selected_of(session: Session, progress: Progress) -> Selected:
         made = session.made.get(NAME)
         if made is None or made.choices != key:
             progress("window", 0, 1)
-            made = session.made[NAME] = Made(select_in(laid_out_of(session, settings), settings).value, key)
+            labelled = settings.window.select is not None
+            laid = lay_out(opened_volume(session), session.opened.labels, settings, labelled=labelled)
+            made = session.made[NAME] = Made(select_in(laid, settings).value, key)
             progress("window", 1, 1)
     found: Selected = made.value
     return found
 
 
-def laid_out_of(session: Session, settings: Settings) -> LaidOut:
-    """Return a study as it is looked at.
+def slices_of(session: Session) -> LaidOut:
+    """Return the slices of a study as they are looked at, without looking for labels in them.
 
     Raises
     ------
     TomomeshError
         Of the kind that fits.
     """
-    opened = session.opened
-    if opened.volume is None:
+    settings = session.settings
+    window = replace(settings.window, select=None, fill_slices=False)
+    return lay_out(opened_volume(session), None, replace(settings, window=window), labelled=False)
+
+
+def opened_volume(session: Session) -> Volume:
+    """Return the study.
+
+    Raises
+    ------
+    UsageError
+        Where there is none, or not yet.
+    """
+    if session.opened.volume is None:
         raise UsageError("no study is open, or it is still being read", expected="tomomesh view STUDY")
-    return lay_out(opened.volume, opened.labels, settings, labelled=settings.window.select is not None)
+    return session.opened.volume
 
 
 def _key(session: Session) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import UsageError
 from ..settings import Settings
 from .events import Events
-from .jobs import Jobs
+from .jobs import ENDS, Jobs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -77,7 +77,7 @@ class Session:
         self.choices = Choices().then(choices or {})
         self.made: dict[str, Made] = {}
         self.events = Events()
-        self.jobs = Jobs(self.events.tell)
+        self.jobs = Jobs(self._hear)
 
     @property
     def settings(self) -> Settings:
@@ -135,6 +135,12 @@ class Session:
     def tell(self) -> None:
         """Tell all pages where things stand."""
         self.events.tell({"event": "state", "state": self.state})
+
+    def _hear(self, event: dict[str, Any]) -> None:
+        """Tell all pages of work, and where things stand once it has ended: an answer on its way may say it goes on."""
+        self.events.tell(event)
+        if event["event"] in ENDS:
+            self.tell()
 
     def _now(self, choices: Choices) -> dict[str, Any]:
         self.choices = choices

@@ -1,6 +1,8 @@
 /** What lies behind a network: the slice, what is kept of it, the inputs. */
 
 const KEPT = [86, 180, 233, 120];
+/** Inputs in space that are drawn at most: they are turned with every frame. */
+const MOST = 6000;
 
 /**
  * Make a slice of what /training/picture hands out.
@@ -76,7 +78,8 @@ function dots(pen, { inputs, course, slice }, place, colors) {
   const size = slice ? 2 : Math.max(1.5, Math.min(4, 160 / Math.sqrt(inputs.shape[0])));
   pen.fillStyle = colors.inputs;
   pen.globalAlpha = course.dimensions === 3 ? 0.35 : 0.9;
-  for (let n = 0; n < inputs.values.length; n += course.dimensions) {
+  const step = course.dimensions === 3 ? Math.ceil(inputs.shape[0] / MOST) : 1;
+  for (let n = 0; n < inputs.values.length; n += step * course.dimensions) {
     const three = inputs.values.subarray(n, n + course.dimensions);
     const [x, y] = place.project ? place.project(three[0], three[1], three[2]) : three;
     const [left, top] = place.at(x, y);

@@ -1,6 +1,6 @@
 /** Networks: one is trained while a class looks on; those of all slices; the paper's figures; what is saved. */
 import { get, numbers, post } from "./api.js";
-import { eachFrame, fill } from "./dom.js";
+import { eachFrame } from "./dom.js";
 import { draw } from "./network-canvas.js";
 import { sliceOf } from "./network-backdrop.js";
 import { courseOf } from "./network-course.js";
@@ -8,7 +8,7 @@ import { layOut } from "./network-layout.js";
 import { fillOptions, parametersOf } from "./network-options.js";
 import { player, SPEEDS } from "./network-player.js";
 import { showSide } from "./network-side.js";
-import { choose, on, state, tell, trying } from "./store.js";
+import { choose, on, state, trying } from "./store.js";
 
 export const title = "Networks";
 export const keys = [
@@ -221,7 +221,8 @@ class Part {
 
   captioned() {
     const { course, figure, mode, networks } = this;
-    const still = () => (this.told && this.told.study && this.told.study.fault) || told(networks, this.at.slice.value);
+    for (const one of this.at.figures.children) one.setAttribute("aria-pressed", String(Boolean(figure) && one.textContent === figure.name));
+    const still = () => (this.told && this.told.study && this.told.study.fault) || said(networks, this.at.slice.value);
     const words = figure ? `${/^\d/.test(figure.name) ? `Fig. ${figure.name}. ` : ""}${figure.caption}` : mode === "course" ? course.now && course.now.note : still();
     this.at.caption.textContent = words || (course.now || this.slice ? "" : EMPTY);
   }
@@ -244,7 +245,7 @@ class Part {
 const choices = () => JSON.stringify(state.choices);
 
 /** Say what the networks of a slice are. */
-function told(networks, k) {
+function said(networks, k) {
   if (!networks) return "";
   const count = networks.networks.length;
   const stale = networks.fresh ? "" : " The choices have changed since: train all slices again.";

@@ -27,7 +27,8 @@ export const choose = (changes) => changed(post("/api/choose", changes));
 
 export const undo = () => changed(post("/api/undo"));
 export const redo = () => changed(post("/api/redo"));
-export const stop = () => changed(post("/api/cancel"));
+/** Have the work end: events tell that it does, and none may be undone by the answer, which is older. */
+export const stop = () => trying(post("/api/cancel"));
 
 /**
  * Do what may be refused, and say so where it is.
