@@ -182,7 +182,7 @@ def test_a_training_that_is_stopped_keeps_what_was_seen() -> None:
         if event["event"] == "epoch" and event["n"] == 9:
             session.jobs.stop()
 
-    session.events.tell = tell  # type: ignore[method-assign, assignment]
+    session.events.tell = tell  # type: ignore[method-assign]
     networks.train(session, {"slice": 4})
     session.wait()
     assert session.told[-1]["event"] == "stopped"

@@ -150,7 +150,7 @@ def on_region(name: str, settings: Settings) -> Trainer:
 
 
 def _titled(name: str) -> str:
-    return "A slice of the built-in head" if name == "head" else f"A {name}"
+    return "The built-in head" if name == "head" else f"A {name}"
 
 
 def _on_one_input(settings: Settings) -> Trainer:

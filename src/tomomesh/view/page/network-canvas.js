@@ -104,7 +104,7 @@ function drawNetwork(pen, codebook, dimensions, edges, bridged, place, colors) {
     stroke(pen, places[edges[2 * n]], places[edges[2 * n + 1]]);
   }
   pen.setLineDash([]);
-  const size = Math.max(1.2, Math.min(4.5, 0.3 * usual(places, edges)));
+  const size = Math.max(2, Math.min(4.5, 0.3 * usual(places, edges)));
   const sorted = near > far ? [...places].sort((one, other) => one[2] - other[2]) : places;
   for (const one of sorted) {
     pen.globalAlpha = strength(one[2]);

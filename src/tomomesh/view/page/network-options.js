@@ -46,7 +46,7 @@ function row(name, entry) {
   const id = `option-${name}`;
   const help = el("p", { id: `${id}-help`, class: "net-help", hidden: !open.has(name) }, `${entry.description}${limits(entry)}.`);
   const asked = el("button", { type: "button", class: "net-asked", "aria-expanded": open.has(name), "aria-controls": help.id, "aria-label": `What is ${CALLED[name]}?`, onclick: () => toggle(name, help, asked) }, "?");
-  const label = el("label", { for: id, title: entry.description }, CALLED[name], unit(entry));
+  const label = el("label", { for: id, title: entry.description }, CALLED[name], unit(name, entry));
   const own = state.choices[name] !== undefined;
   return el("div", { class: `net-option${own ? " chosen" : ""}` }, label, el("span", { class: "net-value" }, ...control(id, name, entry)), asked, help);
 }
@@ -57,7 +57,7 @@ function toggle(name, help, asked) {
   asked.setAttribute("aria-expanded", String(open.has(name)));
 }
 
-const unit = (entry) => (entry.unit ? el("span", { class: "net-unit" }, ` ${entry.unit}`) : null);
+const unit = (name, entry) => (entry.unit && entry.unit !== CALLED[name].toLowerCase() ? el("span", { class: "net-unit" }, ` ${entry.unit}`) : null);
 
 function limits(entry) {
   const { minimum, maximum, exclusiveMinimum } = number(entry);

@@ -3,6 +3,7 @@ import { get } from "./api.js";
 import { curve } from "./curves.js";
 import { fill } from "./dom.js";
 import { drawMaps } from "./network-maps.js";
+import { ofFrame } from "./network-words.js";
 import { trying } from "./store.js";
 
 const SHEETS = ["grid", "hexagonal", "cylinder", "torus"];
@@ -18,27 +19,11 @@ export function showSide(at, course, play, trained) {
   at.toggle.disabled = !trained;
   at.toggle.textContent = play.playing ? "Pause" : "Play";
   at.player.dataset.shown = now ? String(now.n) : "";
-  at.step.textContent = now ? said(course, now) : "";
+  at.step.textContent = now ? ofFrame(course, now) : "";
   at.title.textContent = course ? `${course.title}: ${course.topology} of ${course.neurons} neurons, ${course.inputs.toLocaleString("en")} input${course.inputs === 1 ? "" : "s"}` : at.source.value === "slice" ? `Slice ${at.slice.value} of the study` : "";
   if (course) at.saving.hidden = course.state === "running";
   curves(at, course, play, frames.slice(0, play.at + 1).filter(Boolean));
   maps(at, course, play, now);
-}
-
-/** Say which epoch is shown, of how many. */
-function said(course, { n, kind }) {
-  const { steps, training, state } = course;
-  if (kind === "start") return "Start";
-  if (kind === "spaced") return "As the run hands it on";
-  const stopped = state === "stopped" && n === course.count - 1 ? ", stopped" : "";
-  if (n >= steps.length) return `Epoch ${n} of ${epochs(course)}, strays left out${stopped}`;
-  if (training === "online") return `Presentation ${steps[n].toLocaleString("en")} of ${steps[steps.length - 1].toLocaleString("en")}${stopped}`;
-  return `Epoch ${n} of ${epochs(course)}${stopped}`;
-}
-
-/** Count the epochs: those that are planned, or those that there were. */
-function epochs({ frames, steps, state }) {
-  return state === "running" ? steps.length - 1 : frames.filter((one) => one.kind === "epoch").length;
 }
 
 function curves(at, course, play, frames) {

@@ -8,6 +8,7 @@ import { layOut } from "./network-layout.js";
 import { fillOptions, parametersOf } from "./network-options.js";
 import { player, SPEEDS } from "./network-player.js";
 import { showSide } from "./network-side.js";
+import { EMPTY, ofSlice } from "./network-words.js";
 import { choose, on, state, trying } from "./store.js";
 
 export const title = "Networks";
@@ -15,7 +16,6 @@ export const keys = [
   ["Space", "play or pause"], ["Left, Right", "one epoch back or forth"], ["Home, End", "the start, the last epoch"],
   ["Up, Down", "the slice above or below"], ["T", "train"],
 ];
-const EMPTY = "Choose a figure of the paper, or what to train on and how: every epoch of the training is shown here.";
 export const applies = (kind) => kind === "study" || kind === "nothing";
 
 /** @param {HTMLElement} panel */
@@ -222,7 +222,7 @@ class Part {
   captioned() {
     const { course, figure, mode, networks } = this;
     for (const one of this.at.figures.children) one.setAttribute("aria-pressed", String(Boolean(figure) && one.textContent === figure.name));
-    const still = () => (this.told && this.told.study && this.told.study.fault) || said(networks, this.at.slice.value);
+    const still = () => (this.told && this.told.study && this.told.study.fault) || ofSlice(networks, this.at.slice.value);
     const words = figure ? `${/^\d/.test(figure.name) ? `Fig. ${figure.name}. ` : ""}${figure.caption}` : mode === "course" ? course.now && course.now.note : still();
     this.at.caption.textContent = words || (course.now || this.slice ? "" : EMPTY);
   }
@@ -243,12 +243,3 @@ class Part {
 }
 
 const choices = () => JSON.stringify(state.choices);
-
-/** Say what the networks of a slice are. */
-function said(networks, k) {
-  if (!networks) return "";
-  const count = networks.networks.length;
-  const stale = networks.fresh ? "" : " The choices have changed since: train all slices again.";
-  if (!count) return `Slice ${k} has no network: too little of the window is on it, or the run trains none there.${stale}`;
-  return `${count === 1 ? "The network" : `The ${count} networks`} of slice ${k}, as a run hands ${count === 1 ? "it" : "them"} on.${stale}`;
-}
