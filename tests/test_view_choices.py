@@ -43,10 +43,6 @@ OTHERS = st.fixed_dictionaries({}, optional=VALUES)
 CHOICES = st.tuples(WINDOWS, OTHERS).map(lambda both: both[0] | both[1])
 
 
-def nothing(*_: object) -> None:
-    """Write nothing."""
-
-
 def parsed(command: str) -> Namespace:
     return build_parser().parse_args(joined(shlex.split(command)[1:]))
 
@@ -54,7 +50,7 @@ def parsed(command: str) -> Namespace:
 @law(100)
 @given(CHOICES)
 def test_the_command_line_repeats_the_choices(choices: dict[str, Any]) -> None:
-    session = Session(Opened("study", ("a study/of mine.nii",)), nothing, choices)
+    session = Session(Opened("study", ("a study/of mine.nii",)), choices)
     chosen = parsed(session.command)
     assert chosen.command == "reconstruct"
     assert chosen.study == ["a study/of mine.nii"]
@@ -83,14 +79,14 @@ def test_at_the_ends_there_is_nothing_to_take_back() -> None:
 
 
 def test_a_choice_of_none_is_the_default_again() -> None:
-    session = Session(Opened(), nothing, {"neurons": 40})
+    session = Session(Opened(), {"neurons": 40})
     assert session.choose({"neurons": None})["choices"] == {}
     assert session.settings == Settings()
     assert session.undo()["choices"] == {"neurons": 40}
 
 
 def test_the_state_says_whether_what_was_made_is_of_these_choices() -> None:
-    session = Session(Opened(), nothing, {"neurons": 40})
+    session = Session(Opened(), {"neurons": 40})
     session.keep("reconstruct", object(), session.choices.values)
     assert session.state["made"] == {"reconstruct": True}
     assert session.choose({"neurons": 41})["made"] == {"reconstruct": False}

@@ -43,5 +43,5 @@ def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
             webbrowser.open(address)
 
     folder = None if chosen.browse is None else browsed(chosen.browse)
-    session = Session(opened, write_one, given, Reach(opened.words, folder))
+    session = Session(opened, given, Reach(opened.words, folder), write=write_one)
     serve(session, started, host="127.0.0.1" if chosen.host in LOCAL else chosen.host, port=chosen.port)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..settings import NetworkSettings
+    from ..som.passes import Look
 
 MOST = 40_000
 """Inputs a network in space is shown at most: every n-th, in the order of slices, rows and columns, beyond. Measured on
@@ -61,8 +62,25 @@ def pieces_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], int]:
     return kept[labels], int(kept.sum())
 
 
+def shown_of(inputs: NDArray[np.float64], neurons: int) -> NDArray[np.float64]:
+    """Return the inputs that so many neurons are shown: at most `MOST`, evenly taken, and as many as there are neurons.
+
+    Raises
+    ------
+    EmptyError
+        With fewer inputs than neurons.
+    """
+    if len(inputs) < neurons:
+        raise EmptyError(
+            "the window has fewer places than the network has neurons", found=f"{len(inputs)} places",
+            expected=f"at least {neurons}", hint="a wider window, or fewer --neurons",
+        )  # fmt: skip
+    shown = inputs[:: -(-len(inputs) // MOST)]
+    return shown if len(shown) >= neurons else inputs
+
+
 def train_space(
-    inputs: NDArray[np.float64], settings: NetworkSettings, *, outlined: bool, seed: int = 0
+    inputs: NDArray[np.float64], settings: NetworkSettings, *, outlined: bool, seed: int = 0, look: Look | None = None
 ) -> SpaceNetwork:
     """Train one network on places in patient millimeters.
 
@@ -75,6 +93,8 @@ def train_space(
     outlined : bool
         Whether they are a boundary. Then none counts as stray: what lies far off is in a bay.
     seed : int
+    look : Look, optional
+        Who is told of the start and of each epoch.
 
     Returns
     -------
@@ -86,17 +106,14 @@ def train_space(
         With fewer inputs than neurons.
     """
     graph = lattice(settings.topology, settings.neuron_count)
-    if len(inputs) < len(graph):
-        raise EmptyError(
-            "the window has fewer places than the network has neurons", found=f"{len(inputs)} places",
-            expected=f"at least {len(graph)}", hint="a wider window, or fewer --neurons",
-        )  # fmt: skip
-    shown = inputs[:: -(-len(inputs) // MOST)]
-    shown = shown if len(shown) >= len(graph) else inputs
+    shown = shown_of(inputs, len(graph))
     start = "axes" if (settings.topology, settings.start) == ("torus", "ellipse") else settings.start
     asked = replace(settings, start=start, trim=0.0 if outlined else settings.trim)
     origin = shown.mean(axis=0)
-    fitted = fit(shown - origin, graph, asked, np.random.default_rng(seed))
+    if look is not None:
+        told = look.told
+        look = replace(look, told=lambda codebook, *rest: told(codebook + origin, *rest))
+    fitted = fit(shown - origin, graph, asked, np.random.default_rng(seed), look=look)
     return SpaceNetwork(graph, fitted.codebook + origin, outlined, len(shown), int((~fitted.kept).sum()))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..kernels.som.neighborhoods import BUBBLE, GAUSSIAN, LATERAL
 from .inputs import Shown, flat, match, median
-from .passes import Watch, train_batch, train_online
+from .passes import Look, Watch, train_batch, train_online
 from .schedules import Fall, falling, radius_power
 from .starts import CLOSED, start_positions
 
@@ -72,6 +72,7 @@ def fit(
     alpha_fall: Fall | None = None,
     radius_fall: Fall | None = None,
     record: bool = False,
+    look: Look | None = None,
 ) -> Fitted:
     """Fit a network to inputs.
 
@@ -97,6 +98,8 @@ def fit(
         is left, 1 to 0.
     record : bool
         Whether the history holds the error of every epoch of online training, too; in batch that costs nothing.
+    look : Look, optional
+        Who is told of the start and of each epoch, in place of `callback`.
 
     Returns
     -------
@@ -109,7 +112,9 @@ def fit(
     """
     shown = Shown.of(inputs, weights)
     codebook = _placed(shown, lattice, settings.start if start is None else start, rng)
-    watch = Watch(settings.least_move, callback, record, shown.axes)
+    if look is None and callback is not None:
+        look = Look(lambda codebook, done, radius, alpha: callback(codebook, done - 1) if done else None)
+    watch = Watch(settings.least_move, look, record, shown.axes)
     online = settings.training == "online"
     steps = settings.iterations if online else settings.epochs
     first, last = _radii(shown, lattice, settings, pixel_area)
@@ -117,8 +122,10 @@ def fit(
     if online:
         rate_fall = alpha_fall or settings.alpha_fall
         alpha = falling(*settings.alpha, steps, fall=rate_fall, power=settings.alpha_power)
+        watch.tell(codebook, 0, radius[0], alpha[0])
         history = train_online(codebook, shown, lattice, shape_of(settings), alpha, radius, rng, watch)
     else:
+        watch.tell(codebook, 0, radius[0], 1.0)
         history = train_batch(codebook, shown, lattice, shape_of(settings), radius, watch)
     near = _without_strays(codebook, shown, settings.trim)
     if not near.all():

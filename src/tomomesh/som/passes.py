@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +32,25 @@ GATHERED = 4_000_000
 
 
 @dataclass(frozen=True)
+class Look:
+    """How a training is looked at, which changes nothing about it.
+
+    Attributes
+    ----------
+    told : callable
+        Called as ``told(codebook, done, radius, alpha)`` before the first epoch and after each, of which so many are
+        then done, with a codebook (u, d) of its own; raise in it to stop.
+    times : int
+        Online: how often it is called, the closer together the earlier, as t^2, for a random start untangles within
+        the first presentations; 0 is after as many presentations as there are inputs, as it also is where the least
+        move may end the training.
+    """
+
+    told: Callable[[Floats, int, float, float], None]
+    times: int = 0
+
+
+@dataclass(frozen=True)
 class Watch:
     """Who looks on.
 
@@ -38,8 +58,7 @@ class Watch:
     ----------
     tolerance : float
         The training ends after an epoch in which no neuron moved farther, once the radius has settled.
-    callback : callable or None
-        Told the codebook (u, d) and the number of the epoch.
+    look : Look or None
     record : bool
         Whether every epoch is measured, where that costs time.
     axes : int
@@ -47,14 +66,31 @@ class Watch:
     """
 
     tolerance: float
-    callback: Callable[[Floats, int], None] | None
+    look: Look | None
     record: bool
     axes: int
 
-    def tell(self, codebook: Floats, epoch: int) -> None:
+    @property
+    def watched(self) -> bool:
+        """Whether anything is asked for between the first and the last presentation."""
+        return self.record or self.look is not None or self.tolerance > 0
+
+    def tell(self, codebook: Floats, done: int, radius: float, alpha: float) -> None:
         """Show a copy of the codebook (d, u)."""
-        if self.callback is not None:
-            self.callback(codebook[: self.axes].T.copy(), epoch)
+        if self.look is not None:
+            self.look.told(codebook[: self.axes].T.copy(), done, float(radius), float(alpha))
+
+    def stops(self, presentations: int, inputs: int) -> NDArray[np.int64]:
+        """Return after which presentations a network is looked at online, rising, the last among them."""
+        if self.look is not None and self.look.times and self.tolerance == 0:
+            return at_times(presentations, self.look.times)
+        each = inputs if self.watched else presentations
+        return np.append(np.arange(each, presentations, each), presentations)
+
+
+def at_times(presentations: int, times: int) -> NDArray[np.int64]:
+    """Return so many numbers of presentations, or fewer, that lie the closer together the smaller they are, as t^2."""
+    return np.unique(np.ceil(presentations * (np.arange(1, times + 1) / times) ** 2).astype(np.int64))
 
 
 def train_online(
@@ -88,15 +124,13 @@ def train_online(
         Empty where nothing asks for it.
     """
     order = _drawn(shown, len(radius), rng)
-    watched = watch.record or watch.callback is not None or watch.tolerance > 0
-    epoch = len(shown) if watched else len(order)
+    stops = watch.stops(len(order), len(shown))
     rows: list[tuple[float, float, float, float]] = []
-    for start in range(0, len(order), epoch):
-        stop = min(start + epoch, len(order))
+    for start, stop in pairwise([0, *stops.tolist()]):
         before = codebook.copy()
         _present(codebook, shown, lattice, shape, order[start:stop], alpha[start:stop], radius[start:stop])
-        if watched:
-            watch.tell(codebook, len(rows))
+        if watch.watched:
+            watch.tell(codebook, len(rows) + 1, radius[stop - 1], alpha[stop - 1])
             move = float(np.sqrt(((codebook - before) ** 2).sum(axis=0).max()))
             rows.append((_error(codebook, shown) if watch.record else np.nan, move, radius[stop - 1], alpha[stop - 1]))
             if move <= watch.tolerance and radius[stop - 1] <= radius[-1] * (1 + SETTLED):
@@ -157,13 +191,13 @@ def train_batch(
         weigh(weights, reach, 1.0, shape)
     settled = int(np.argmax(radius <= radius[-1] * (1 + SETTLED)))
     rows, box = np.empty((len(radius), 2)), _box(shown, shape)
-    step = len(radius) if watch.callback is None else 1
+    step = len(radius) if watch.look is None else 1
     done = 0
     while done < len(radius):
         some = slice(done, done + step)
         falls = (lattice.hops, neighborhoods[some], box, watch.tolerance, settled - done, rows[some])
         done += _run(codebook, shown, falls)
-        watch.tell(codebook, first_epoch + done - 1)
+        watch.tell(codebook, first_epoch + done, radius[done - 1], 1.0)
         if rows[done - 1, 1] <= watch.tolerance and done > settled:
             break
     return History(rows[:done, 0], rows[:done, 1], radius[:done], np.ones(done))

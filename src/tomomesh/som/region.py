@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ..model.lattice import Lattice
     from ..settings import NetworkSettings
     from .history import History
+    from .passes import Look
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,9 @@ class TrainedNetwork:
 
 
 def train_region(
-    inputs: NDArray[np.float64], settings: NetworkSettings, *, seed: int = 0, pixel_area: float = 1.0
-) -> TrainedNetwork:
+    inputs: NDArray[np.float64], settings: NetworkSettings, *, seed: int = 0, pixel_area: float = 1.0,
+    look: Look | None = None,
+) -> TrainedNetwork:  # fmt: skip
     """Train a network on inputs of any dimension.
 
     Parameters
@@ -59,6 +61,8 @@ def train_region(
     seed : int
     pixel_area : float
         Area that one input stands for.
+    look : Look, optional
+        Who is told of the start and of each epoch.
 
     Returns
     -------
@@ -82,7 +86,8 @@ def train_region(
             hint="a wider window, or fewer --neurons",
         )
     start = start_positions(inputs, graph, settings.start, np.random.default_rng(seed))
-    fitted = fit(inputs, graph, settings, np.random.default_rng(seed), pixel_area=pixel_area, record=True)
+    rng = np.random.default_rng(seed)
+    fitted = fit(inputs, graph, settings, rng, pixel_area=pixel_area, record=True, look=look)
     codebook = fitted.codebook
     if settings.even:
         codebook, _ = even_spacing(codebook, graph, bridged_edges(codebook, graph, settings.bridge))

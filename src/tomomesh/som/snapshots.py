@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .fit import fit, radii, start_positions
-from .schedules import falling, radius_power
+from .fit import fit
+from .passes import Look, at_times
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from ..model.lattice import Lattice
@@ -72,14 +70,17 @@ def snapshots(
     -------
     Snapshots
     """
-    start = start_positions(inputs, lattice, settings.start, np.random.default_rng(seed))
+    seen: list[Floats] = []
+    look = Look(lambda codebook, done, radius, alpha: seen.append(codebook), most - 1)
     online = settings.training == "online"
-    watch = _online if online else _in_batch
-    steps, codebooks = watch(inputs, lattice, settings, np.random.default_rng(seed), pixel_area, most - 1)
+    asked = replace(settings, least_move=0.0) if online else settings
+    fitted = fit(inputs, lattice, asked, np.random.default_rng(seed), pixel_area=pixel_area, look=look)
+    steps = at_times(settings.iterations, most - 1) if online else np.arange(1, len(seen))
+    seen[len(steps) :] = [fitted.codebook]  # online, the passes of the re-fit are one with the last piece
     chosen = thinned(len(steps), most - 1)
     return Snapshots(
-        np.stack([start, *(codebooks[n] for n in chosen)]),
-        np.array([0, *(steps[n] for n in chosen)], np.int64),
+        np.stack([seen[0], *(seen[n + 1] for n in chosen)]),
+        np.array([0, *steps[chosen]], np.int64),
         "presentations" if online else "epochs",
     )
 
@@ -87,42 +88,3 @@ def snapshots(
 def thinned(count: int, most: int) -> NDArray[np.int64]:
     """Choose at most so many of some numbers from 0 at equal steps, the last among them."""
     return np.unique(np.linspace(count - 1, 0, min(count, most)).round().astype(np.int64))
-
-
-def _in_batch(
-    inputs: Floats, lattice: Lattice, settings: NetworkSettings, rng: np.random.Generator, pixel_area: float, most: int
-) -> tuple[list[int], list[Floats]]:
-    seen: list[Floats] = []
-    fit(inputs, lattice, settings, rng, pixel_area=pixel_area, callback=lambda codebook, epoch: seen.append(codebook))
-    return list(range(1, len(seen) + 1)), seen
-
-
-def _online(
-    inputs: Floats, lattice: Lattice, settings: NetworkSettings, rng: np.random.Generator, pixel_area: float, most: int
-) -> tuple[list[int], list[Floats]]:
-    """Train piece by piece: each piece goes on with the same generator, rates and radii; the last one trims."""
-    count = settings.iterations
-    reach = radii(inputs, lattice, settings, pixel_area)
-    rate_left = _left(*settings.alpha, count, settings.alpha_fall, settings.alpha_power)
-    reach_left = _left(*reach, count, settings.radius_fall, radius_power(settings))
-    stops = np.unique(np.ceil(count * (np.arange(1, most + 1) / most) ** 2).astype(np.int64))
-    seen: list[Floats] = []
-    for first, stop in zip([0, *stops[:-1]], stops, strict=True):
-        piece = replace(settings, iterations=int(stop - first), least_move=0.0,
-                        trim=settings.trim if stop == count else 0.0)  # fmt: skip
-        fitted = fit(
-            inputs, lattice, piece, rng, pixel_area=pixel_area, start=seen[-1] if seen else None,
-            alpha_fall=_piece(rate_left, first, stop), radius_fall=_piece(reach_left, first, stop),
-        )  # fmt: skip
-        seen.append(fitted.codebook)
-    return stops.tolist(), seen
-
-
-def _left(first: float, last: float, steps: int, fall: str, power: float) -> Floats:
-    """Return what is left of a fall at each step, 1 to 0."""
-    whole = falling(first, last, steps, fall=fall, power=power)
-    return (whole - last) / (first - last) if first != last else np.zeros(steps)
-
-
-def _piece(left: Floats, first: int, stop: int) -> Callable[[Floats], Floats]:
-    return lambda times: left[first:stop]

@@ -10,7 +10,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from ..settings import Settings
-from . import events, saving, slices, studies, surfaces, windows
+from . import events, networks, pictures, saving, slices, studies, surfaces, windows
 from .routes import get, post
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ def application(session: Session) -> Starlette:
         *windows.ROUTES,
         *surfaces.ROUTES,
         *saving.ROUTES,
+        *networks.ROUTES,
+        *pictures.ROUTES,
         Route("/", _page),
         Route("/{name}", _page),
     ]

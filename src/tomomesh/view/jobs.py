@@ -21,6 +21,10 @@ OFTEN = 0.1
 """Seconds from one word of progress to the next: a page shows no more."""
 
 
+ENDS = ("done", "stopped", "failed")
+"""Events with which work ends."""
+
+
 class Stopped(BaseException):
     """The user has stopped the work: no fault, so no handler of faults may keep it."""
 

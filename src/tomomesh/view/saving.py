@@ -24,7 +24,7 @@ SETTINGS = "settings"
 def _formats(session: Session) -> dict[str, list[str]]:
     """List what can be saved of what there is, each with its formats, the usual one first."""
     formats = {SETTINGS: [".toml"]}
-    if WORK in session.made:
+    if WORK in session.made and session.write is not None:
         formats |= {"mesh": [*io.MESH_WRITERS], "points": [*io.POINT_WRITERS], "report": [".json"]}
         if surface_of(session).segmentation is not None:
             formats |= {"mask": [*io.LABEL_WRITERS], "labels": [*io.LABEL_WRITERS]}
@@ -42,6 +42,7 @@ def _save(session: Session, name: str) -> Response:
             io.write_settings(session.settings, path)
         else:
             made = session.made[WORK]
+            assert session.write is not None
             session.write(what, made.value, Settings().replace(**made.choices), path)
         data = path.read_bytes()
     headers = {"content-disposition": f'attachment; filename="{what}{suffix}"'}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import TomomeshError, UsageError
 from ..settings import Settings
 from .events import Events
-from .jobs import Jobs
+from .jobs import ENDS, Jobs
 from .opened import Opened, opened_as
 from .reach import Reach
 from .remembered import Remembered
@@ -78,7 +78,7 @@ class Session:
         What was made of it, by the name of the work (``segment``, ``reconstruct``), each with the choices of that time.
     jobs : Jobs
     events : Events
-    write : callable
+    write : callable, optional
         Writes a file of a surface as the command line does: what of it, the surface, its settings, the path.
     reach : Reach
         What may be opened.
@@ -87,15 +87,16 @@ class Session:
     """
 
     def __init__(
-        self, opened: Opened, write: Write, choices: Mapping[str, Any] | None = None, reach: Reach | None = None
-    ) -> None:
+        self, opened: Opened, choices: Mapping[str, Any] | None = None, reach: Reach | None = None,
+        *, write: Write | None = None,
+    ) -> None:  # fmt: skip
         self.opened, self.write, self.reach = opened, write, reach or Reach()
         self._turns, self._told = 0, count(1)
         self.surveys, self.selections = Remembered(1), Remembered(3)
         self.choices = Choices().then(choices or {})
         self.made: dict[str, Made] = {}
         self.events = Events()
-        self.jobs = Jobs(self.events.tell)
+        self.jobs = Jobs(self._hear)
 
     @property
     def settings(self) -> Settings:
@@ -104,7 +105,10 @@ class Session:
 
     @property
     def command(self) -> str:
-        """The command line that repeats what the page does."""
+        """The command line that repeats what the page does: without a study, its last training; "" before it."""
+        if self.opened.kind == "nothing":
+            made = self.made.get("train")
+            return "" if made is None else str(made.value.command)
         words = ["tomomesh", self.opened.command, *self.opened.words, *self.settings.words(), "-o", "mesh.stl"]
         return shlex.join(words)
 
@@ -184,6 +188,12 @@ class Session:
     def tell(self) -> None:
         """Tell all pages where things stand."""
         self.events.tell({"event": "state", "state": self.state})
+
+    def _hear(self, event: dict[str, Any]) -> None:
+        """Tell all pages of work, and where things stand once it has ended: an answer on its way may say it goes on."""
+        self.events.tell(event)
+        if event["event"] in ENDS:
+            self.tell()
 
     def _now(self, choices: Choices) -> dict[str, Any]:
         """Take choices; where they change how a study is read, it is read again."""

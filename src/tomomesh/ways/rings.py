@@ -11,7 +11,7 @@ from ..measure.rings import assess_contours
 from ..model.lattice import other_number
 from ..results import Enclosed, Segmentation
 from ..segmentation.contours.inputs import share_of_holes, slices_with_several
-from ..segmentation.networks.slices import ByLayer
+from ..segmentation.networks.slices import ByLayer, Slices
 from ..segmentation.networks.training import regions, train_study
 from ..segmentation.networks.under_rings import surface_under
 from ..segmentation.sample import sample
@@ -58,6 +58,14 @@ def segment_by_rings(kept: Selected, settings: Settings, progress: Progress) -> 
         stages=(partial(_rings_measured, trained.value, study.spacing_mm[:2]),),
     )  # fmt: skip
     return folded(found, trained, _networks_found(trained.value, kept, settings), placed, sampling_found(placed.value))
+
+
+def slices_of(kept: Selected, settings: Settings) -> Slices:
+    """Return what the networks of a study are shown, one slice as in all of them."""
+    return Slices.of(
+        kept.chosen.runs, _layers(kept, settings), levels_of(kept, settings), settings.network,
+        kept.study.spacing_mm[:2], settings.run.seed, 0,
+    )  # fmt: skip
 
 
 def surface_by_rings(found: Segmentation[Networks], settings: Settings, progress: Progress) -> Stage[Surface]:

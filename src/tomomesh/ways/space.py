@@ -100,7 +100,7 @@ def segment_in_space(kept: Selected, settings: Settings, progress: Progress) -> 
     run = settings.run
     pieces = measured("window", pieces_of, kept.mask)
     mask, count = pieces.value
-    shown = measured("points", _shown, kept, mask, settings)
+    shown = measured("points", shown_in_space, kept, mask, settings)
     voxels, places, outlined = shown.value.voxels, shown.value.places, shown.value.outlined
     progress("networks", 0, 1)
     trained = measured("networks", train_space, places, settings.network, outlined=outlined, seed=run.seed)
@@ -116,7 +116,8 @@ def segment_in_space(kept: Selected, settings: Settings, progress: Progress) -> 
     return folded(found, pieces, shown, trained, told, points_found(sampling.points, sampling.spacing_mm))
 
 
-def _shown(kept: Selected, mask: NDArray[np.bool_], settings: Settings) -> Shown:
+def shown_in_space(kept: Selected, mask: NDArray[np.bool_], settings: Settings) -> Shown:
+    """Return what a network is shown of the pieces (K, J, I) of a window that it is to stand for."""
     voxels = kept.study.to_mm(np.argwhere(mask)[:, ::-1].astype(np.float64))
     if not sees_boundary(mask, settings.network):
         follows = outline_followed(mask, kept.study, threads=settings.run.threads).as_closed("space")

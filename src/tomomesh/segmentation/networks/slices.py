@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ...model.volume import Volume
     from ...settings import NetworkSettings
     from ...som.fit import Fitted
+    from ...som.passes import Look
     from ..window import Limit
 
 LOOKED_AT = 6
@@ -100,8 +101,9 @@ class Slices:
         return 0.0 if self.levels is not None else self.pixel_mm[0] * self.pixel_mm[1]
 
     def fitted(
-        self, k: int, shown: NDArray[np.float64], graph: Lattice, below: NDArray[np.float64] | None = None
-    ) -> Fitted:
+        self, k: int, shown: NDArray[np.float64], graph: Lattice, below: NDArray[np.float64] | None = None,
+        look: Look | None = None,
+    ) -> Fitted:  # fmt: skip
         """Train the network of a slice, a smaller one where the inputs are few; one that follows another begins there.
 
         One that follows another has its own place near the other's.
@@ -112,7 +114,7 @@ class Slices:
         if below is not None and settings.radius is None:
             _, last = radii(shown, graph, settings, self.pixel_area)
             settings = replace(settings, radius=(max(NEAR, last), last))
-        return fit(shown, graph, settings, rng, pixel_area=self.pixel_area, start=below)
+        return fit(shown, graph, settings, rng, pixel_area=self.pixel_area, start=below, look=look)
 
     def spaced(self, fitted: Fitted, graph: Lattice) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Return the neurons in pixels, and which edges bridge gaps; rings unshrunk, lines evenly spaced if asked for.
@@ -120,7 +122,7 @@ class Slices:
         A ring that was trained with fewer neurons than there are in `graph` gets as many along its curve.
         """
         settings, codebook = self.settings, np.ascontiguousarray(fitted.codebook[:, :2])
-        own = graph if len(codebook) == len(graph) else lattice("ring", len(codebook))
+        own = of_size(graph, len(codebook))
         gaps = bridged_edges(codebook, own, settings.bridge)
         ring = graph.name == "ring"
         if ring and settings.training == "batch" and shape_of(settings) == GAUSSIAN:
@@ -135,6 +137,16 @@ class Slices:
         """Return half the width of the band that the inputs of a ring fill: their area over the ring's length."""
         length = float(side_lengths(fitted.codebook[:, :2])[~gaps].sum())
         return float(fitted.kept.sum()) * self.pixel_area / (2 * self.times_shown * max(length, 1e-300))
+
+    @property
+    def network(self) -> Lattice:
+        """The network of every slice."""
+        settings = self.settings
+        return lattice(settings.topology, self.enough() if settings.neurons_follow else settings.neuron_count)
+
+    def least(self, graph: Lattice) -> int:
+        """Return how many inputs a slice needs for a network."""
+        return SIDES_EACH * FEWEST if self.settings.neurons_follow else len(graph)
 
     def enough(self) -> int:
         """Return how many neurons a ring needs to follow the outlines of all slices; see `neurons_for`.
@@ -155,6 +167,11 @@ class Slices:
             ring, gaps = self.spaced(self.fitted(k, shown, graph), graph)
             asked = min(neurons_for(ring * self.pixel_mm, gaps, min(self.pixel_mm)), most)
         return asked
+
+
+def of_size(graph: Lattice, neurons: int) -> Lattice:
+    """Return the network of a slice: the study's, or a ring of fewer neurons where its inputs are few."""
+    return graph if neurons == len(graph) else lattice("ring", neurons)
 
 
 def neurons_for(ring: NDArray[np.float64], gaps: NDArray[np.bool_], pixel: float) -> int:

@@ -9,12 +9,10 @@ import numpy as np
 
 from ...errors import EmptyError
 from ...kernels.threads import in_blocks
-from ...model.lattice import lattice
 from ...model.networks import Networks
 from ...model.sliced import parts_of
 from ...progress import Progress, silent
 from ...som.fit import match
-from ..contours.inputs import FEWEST, SIDES_EACH
 from ..signal import pixels_of
 from .slices import Slices
 
@@ -81,8 +79,8 @@ def train_study(
         Where no slice has pixels enough.
     """
     slices = Slices.of(mask, layers, levels, settings, pixel_mm, seed, first)
-    graph = lattice(settings.topology, slices.enough() if settings.neurons_follow else settings.neuron_count)
-    least = SIDES_EACH * FEWEST if settings.neurons_follow else len(graph)
+    graph = slices.network
+    least = slices.least(graph)
     count, parts, below = mask.shape[0], [], None
     for start, stop in parts_of(mask):
         told = partial(_tell, progress, start, count)

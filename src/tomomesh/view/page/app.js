@@ -10,7 +10,10 @@ import * as surface from "./surface.js";
 const PARTS = { study, networks, surface, saving };
 const THEMES = ["auto", "light", "dark"];
 const shown = new Map();
+/** Milliseconds of work that is not shown: the page would only twitch. */
+const SHORT = 300;
 let current = "";
+let working = 0;
 
 const byId = (id) => /** @type {any} */ (document.getElementById(id));
 
@@ -41,13 +44,14 @@ function showState(now) {
   byId("redo").disabled = !now.redo;
   byId("command").textContent = now.command;
   for (const [name, { tab }] of shown) tab.hidden = !PARTS[name].applies(now.opened.kind, now.opened);
+  byId("command").parentElement.hidden = !now.command;
   if (!current || shown.get(current).tab.hidden) open([...shown.keys()].find((name) => !shown.get(name).tab.hidden));
   if (now.job) showWork(now.job);
   else hideWork();
 }
 
 function showWork(job) {
-  byId("work").hidden = false;
+  working ||= setTimeout(() => (byId("work").hidden = false), SHORT);
   byId("work-name").textContent = job.stopping ? `${job.name}: stopping ...` : `${job.name}${job.stage ? `: ${job.stage}` : ""}`;
   byId("work-stop").disabled = job.stopping;
   const bar = byId("work-bar");
@@ -58,6 +62,8 @@ function showWork(job) {
 }
 
 function hideWork() {
+  clearTimeout(working);
+  working = 0;
   byId("work").hidden = true;
 }
 

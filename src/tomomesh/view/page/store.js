@@ -4,7 +4,6 @@ import { get, post } from "./api.js";
 /** @type {any} */
 export let state = null;
 const listeners = new Map();
-const ENDS = ["done", "failed", "stopped"];
 
 /**
  * Be told of events: "state", "progress", "done", "failed", "stopped", "epoch", "fault", "away", "back".
@@ -28,7 +27,8 @@ export const choose = (changes) => changed(post("/api/choose", changes));
 
 export const undo = () => changed(post("/api/undo"));
 export const redo = () => changed(post("/api/redo"));
-export const stop = () => changed(post("/api/cancel"));
+/** Have the work end: events tell that it does, and none may be undone by the answer, which is older. */
+export const stop = () => trying(post("/api/cancel"));
 
 /**
  * Do what may be refused, and say so where it is.
@@ -74,13 +74,19 @@ function listen(wait) {
   socket.onmessage = (message) => {
     const told = JSON.parse(message.data);
     if (told.event === "state") take(told.state);
-    else tell(told.event, told);
-    if (ENDS.includes(told.event) && state) take({ ...state, job: null });
+    else hear(told);
   };
   socket.onclose = () => {
     tell("away");
     setTimeout(() => again(open ? 500 : Math.min(2 * wait, 8000)), wait);
   };
+}
+
+/** Pass an event on; the state knows of the work that is underway, and of its end, too. */
+function hear(told) {
+  if (state && told.event === "progress") state.job = told;
+  else if (state && ["done", "stopped", "failed"].includes(told.event)) state.job = null;
+  tell(told.event, told);
 }
 
 async function again(wait) {
