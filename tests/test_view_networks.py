@@ -310,7 +310,7 @@ def test_the_region_of_the_head_is_a_skull_that_is_open_somewhere() -> None:
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    path = tmp_path_factory.mktemp("study") / "head.nii.gz"
+    path = tmp_path_factory.mktemp("study") / "head.nii"
     write_nifti(path, np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
     with served(path, "--lower", str(HEAD.lower), "--way", "ring") as found:
         found.enter()

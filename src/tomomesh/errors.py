@@ -57,6 +57,11 @@ class TomomeshError(Exception):
         ]
         super().__init__(" ".join(part for part in parts if part))
 
+    @property
+    def told(self) -> dict[str, Any]:
+        """What programs are told of it: the exit code of its kind, and the line."""
+        return {"exit_code": self.exit_code, "error": str(self)}
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Let other processes hand it on as it is, and not make another sentence of it."""
         return _restored, (type(self), str(self), self.flags)

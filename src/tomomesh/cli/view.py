@@ -30,6 +30,7 @@ def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
 
     require_view()
     from ..view.opened import Opened, kind_of
+    from ..view.reach import Reach, browsed
     from ..view.server import serve
     from ..view.session import Session
 
@@ -40,4 +41,6 @@ def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
         if not chosen.no_browser:
             webbrowser.open(address)
 
-    serve(Session(opened, given), started, host="127.0.0.1" if chosen.host in LOCAL else chosen.host, port=chosen.port)
+    folder = None if chosen.browse is None else browsed(chosen.browse)
+    session = Session(opened, given, Reach(opened.words, folder))
+    serve(session, started, host="127.0.0.1" if chosen.host in LOCAL else chosen.host, port=chosen.port)

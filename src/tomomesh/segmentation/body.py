@@ -146,8 +146,15 @@ def _holders(volume: Volume, body: Coarse, dense: Mask) -> Coarse:
     foreign = runs.only(runs.sizes * np.prod(spacing) > 4 / 3 * np.pi * THICK**3)[:]
     if foreign.any():
         reach = max(float(spacing.min()), min(RIM, RIM_VOXELS * min(volume.spacing_mm)))
-        foreign = scipy.ndimage.distance_transform_edt(~foreign, spacing) <= reach
+        foreign = scipy.ndimage.binary_dilation(foreign, _ball(reach, spacing))
     return Coarse(foreign, every, body.cut)
+
+
+def _ball(radius: float, spacing: NDArray[np.float64]) -> Mask:
+    """Return the voxels whose centers lie within a distance of that of the middle one."""
+    reach = [int(radius / edge) + 1 for edge in spacing]
+    sides = [np.arange(-far, far + 1) * edge for far, edge in zip(reach, spacing, strict=True)]
+    return np.asarray(np.sqrt(sum(side**2 for side in np.meshgrid(*sides, indexing="ij"))) <= radius)
 
 
 def thick_components(mask: RunMask, volume: Volume, cut: Cut) -> Components:

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import math
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..model.volume import AXES
-from .labels import labels_in
+from .labels import labels_counted
 from .otsu import REACH, otsu_levels
-from .padding import all_padding
-from .slabwise.levels import levels_of
-from .window import PRESETS_HU, may_be_ct, otsu_thresholds
+from .padding import padding_in
+from .slabwise.cut import HERE
+from .window import PRESETS_HU, beside, may_be_ct, otsu_in
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
+    from ..model.boxes import Box
     from ..model.volume import Volume
+    from .padding import Padding
+    from .slabwise.cut import Cut
     from .slabwise.levels import Levels
 
 BARS = 32
@@ -40,12 +45,15 @@ THICK = 5
 """Pixels that slices may be apart without a remark. Only a remark depends on it: steps are then seen in a mesh."""
 
 
-def survey(volume: Volume) -> dict[str, Any]:
+def survey(volume: Volume, bars: int | None = None) -> dict[str, Any]:
     """Describe a study without any patient data.
 
     Parameters
     ----------
     volume : Volume
+        In memory; it is looked at slab by slab, and nothing of its size is made.
+    bars : int, optional
+        The most that the histogram may have, each as many levels wide where these are whole; 32 where not given.
 
     Returns
     -------
@@ -53,9 +61,11 @@ def survey(volume: Volume) -> dict[str, Any]:
         Size, spacing, frame, tilt, the range and histogram of the gray levels, suggested windows and the share of the
         voxels in each, the labels of a label map, the reader's notes, and remarks on what a mesh of it will show.
     """
-    voxels, padded = volume.voxels, all_padding(volume)
-    measured = levels_of(voxels if padded is None else voxels[~padded])
+    cut = HERE.of(volume.voxels)
+    padded = padding_in(cut, volume.padding, guessed=True)
+    measured = cut.levels if padded is None else beside(cut, padded)
     low, high = _drawn_from(measured)
+    lowest, highest = cut.ends
     return {
         "slices_rows_columns": list(volume.shape),
         "layers": volume.layers,
@@ -68,17 +78,19 @@ def survey(volume: Volume) -> dict[str, Any]:
         "corner_mm": volume.affine[:3, 3].tolist(),
         "affine": volume.affine.tolist(),
         "size_mm": (np.array(volume.spacing_mm) * volume.shape[::-1]).tolist(),
-        "type": str(voxels.dtype),
+        "type": str(volume.voxels.dtype),
         "gray_unit": volume.unit,
-        "lowest": float(voxels.min()),
-        "highest": float(voxels.max()),
-        "histogram": measured.histogram(low, high, BARS).tolist() if high > low else [measured.size],
+        "lowest": lowest,
+        "highest": highest,
+        "histogram": measured.histogram(low, high, _bars(volume, high - low, bars)).tolist()
+        if high > low
+        else [measured.size],
         "histogram_from": low,
         "histogram_to": high,
-        "windows": _windows(volume, measured, padded),
-        "labels": labels_in(voxels),
+        "windows": _windows(volume, cut, measured, padded),
+        "labels": labels_counted(cut),
         "notes": list(volume.notes),
-        "remarks": list(_remarks(volume, padded)),
+        "remarks": list(_remarks(volume, cut, padded)),
     }
 
 
@@ -98,25 +110,43 @@ def _drawn_from(measured: Levels) -> tuple[float, float]:
     return (first, last) if 0 < FAR * (last - first) < high - low else (low, high)
 
 
-def _windows(volume: Volume, measured: Levels, padded: NDArray[np.bool_] | None) -> dict[str, dict[str, Any]]:
+def _bars(volume: Volume, reach: float, most: int | None) -> int:
+    """Return how many bars a histogram has."""
+    whole = volume.voxels.dtype.kind in "bui" and reach > 1
+    return BARS if most is None else int(reach // math.ceil(reach / most)) if whole else most
+
+
+def _windows(volume: Volume, cut: Cut, measured: Levels, padded: Padding | None) -> dict[str, dict[str, Any]]:
     """Suggest windows: Otsu's, those above three and four classes, and for what may be a CT the presets."""
-    limits: dict[str, Any] = {"otsu": otsu_thresholds(volume, padded)}
+    limits: dict[str, Any] = {"otsu": otsu_in(cut, padded)}
     if volume.layers == 1:
         for classes in (3, 4):
             limit = otsu_levels(measured, classes)[-1]
             limits |= {} if limit in limits.values() else {f"otsu of {classes}": limit}
     windows = {name: (limit, np.inf) for name, limit in limits.items()}
-    ct = may_be_ct(volume, volume.voxels.min()) and (volume.unit == "HU" or measured.bulk()[0] < AIR)
+    ct = may_be_ct(volume, cut.ends[0]) and (volume.unit == "HU" or measured.bulk()[0] < AIR)
     windows |= PRESETS_HU if ct else {}
-    return {name: _window(volume.voxels, *bounds) for name, bounds in windows.items()}
+    taken = _taken(volume, cut, [*windows.values()])
+    planes = {LETTERS[axis][end]: np.moveaxis(volume.voxels, 2 - axis, 0)[end] for axis in (2, 1, 0) for end in (0, -1)}
+    pairs = zip(windows.items(), taken, strict=True)
+    return {name: _window(planes, *bounds, share) for (name, bounds), share in pairs}
 
 
-def _window(voxels: NDArray[Any], lower: Any, upper: float) -> dict[str, Any]:
-    """Say which share of the voxels a window takes, and at which ends of the study it is cut off."""
-    inside = (voxels > lower) & (voxels <= upper)
-    ends = [(2 - n, end) for n in range(3) for end in (0, -1)]
-    cut = [LETTERS[axis][end] for axis, end in ends if inside.take(end, 2 - axis).mean() > CUT_OFF]
-    return {"lower": _finite(lower), "upper": _finite(upper), "share": float(np.mean(inside)), "cut_off_at": cut}
+def _taken(volume: Volume, cut: Cut, windows: Sequence[tuple[Any, float]]) -> list[float]:
+    """Return the shares of the levels in some windows, whose lower bounds are one a layer in a study in color."""
+    if volume.layers == 1:
+        found = np.array(cut.levels.within(windows))
+    else:
+        layers = range(volume.layers)
+        found = np.sum([cut.layer(n).within([(low[n], high) for low, high in windows]) for n in layers], axis=0)
+    return list((found / math.prod(volume.voxels.shape)).tolist())
+
+
+def _window(planes: dict[str, NDArray[Any]], lower: Any, upper: float, share: float) -> dict[str, Any]:
+    """Tell of a window, and at which ends of the study, whose planes these are, it is cut off."""
+    inside = {end: (plane > lower) & (plane <= upper) for end, plane in planes.items()}
+    cut = [end for end, held in inside.items() if held.mean() > CUT_OFF]
+    return {"lower": _finite(lower), "upper": _finite(upper), "share": share, "cut_off_at": cut}
 
 
 def _finite(limit: Any) -> Any:
@@ -125,12 +155,14 @@ def _finite(limit: Any) -> Any:
     return found if np.ndim(limit) else found[0]
 
 
-def _remarks(volume: Volume, padded: NDArray[np.bool_] | None) -> Iterator[str]:
+def _remarks(volume: Volume, cut: Cut, padded: Padding | None) -> Iterator[str]:
     """Say what a mesh of the study will show that nobody may expect."""
     if padded is not None:
-        held = volume.voxels[padded]
-        levels = f"{held.min():g}" if held.min() == held.max() else f"{held.min():g} to {held.max():g}"
-        yield f"{padded.mean():.1%} of the voxels are padding, {levels}: it counts as background"
+        lows, highs, counts = zip(*cut.each(partial(_padding_of, padded=padded)), strict=True)
+        low, high = min(lows), max(highs)
+        levels = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+        share = sum(counts) / math.prod(volume.voxels.shape)
+        yield f"{share:.1%} of the voxels are padding, {levels}: it counts as background"
     columns, rows, step = np.sqrt((volume.grid.affine[:3, :3] ** 2).sum(axis=0))
     if abs(columns - rows) > OBLONG * min(columns, rows):
         yield f"pixels are not square, {columns:.4g} x {rows:.4g} mm: the mesh keeps the distances"
@@ -139,6 +171,12 @@ def _remarks(volume: Volume, padded: NDArray[np.bool_] | None) -> Iterator[str]:
         yield f"slices are {apart:.1f} pixels apart: what lies between them is interpolated"
     if 1 in volume.shape:
         yield "one slice: the mesh will be a slab of its thickness"
+
+
+def _padding_of(levels: NDArray[Any], box: Box, *, padded: Padding) -> tuple[float, float, int]:
+    """Return the lowest and the highest level of the padding of a slab, and how many voxels it takes."""
+    held = levels[padded.within(levels, box)]
+    return (float(held.min()), float(held.max()), held.size) if held.size else (np.inf, -np.inf, 0)
 
 
 def _stored_axes(volume: Volume) -> str:

@@ -207,12 +207,12 @@ def otsu_thresholds(volume: Volume, padded: NDArray[np.bool_] | None = None) -> 
 def otsu_in(cut: Cut, padded: Padding | None = None) -> Limit:
     """Return Otsu's threshold of a gray study in slabs, without its padding, or those of the layers of a color one."""
     if cut.voxels.ndim == 3:
-        return otsu_threshold(cut.levels if padded is None else _beside(cut, padded))
+        return otsu_threshold(cut.levels if padded is None else beside(cut, padded))
     layers = [cut.layer(n) for n in range(cut.voxels.shape[3])]
     return np.array([otsu_threshold(one) if one.ends[0] < one.ends[1] else -np.inf for one in layers])
 
 
-def _beside(cut: Cut, padded: Padding) -> Levels:
+def beside(cut: Cut, padded: Padding) -> Levels:
     """Look at the levels that are no padding."""
     return gathered(lambda work: cut.sum(partial(_unpadded, work, padded)), cut.voxels.dtype)
 

@@ -10,7 +10,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from ..settings import Settings
-from . import events, networks, pictures
+from . import events, networks, pictures, slices, studies, windows
 from .routes import get, post
 
 if TYPE_CHECKING:
@@ -35,6 +35,9 @@ def application(session: Session) -> Starlette:
         post("/api/redo", lambda session, body: session.redo()),
         post("/api/cancel", _cancel),
         *events.ROUTES,
+        *studies.ROUTES,
+        *slices.ROUTES,
+        *windows.ROUTES,
         *networks.ROUTES,
         *pictures.ROUTES,
         Route("/", _page),

@@ -11,13 +11,16 @@ from ..errors import UnreadableError
 from ..io.files.source import suffix_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from ..model.mesh import TriMesh
     from ..model.points import PointSet
     from ..model.volume import Volume
     from ..progress import Progress
     from ..settings import Settings
 
-KINDS = ("study", "points", "mesh")
+WHOLE = (".nii", ".nii.gz")
+"""Suffixes of label maps with names that are read whole, whichever labels are wanted; of others, only those are."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,12 @@ class Opened:
         The study, and a label map beside it; None while it is being read.
     points : PointSet or None
     mesh : TriMesh or None
+    names : mapping of int to str
+        What the labels of a label map are called.
+    refused : str
+        Why it could not be read, in one line.
+    flags : tuple of str
+        The options with which it may be.
     """
 
     kind: str = "nothing"
@@ -42,6 +51,9 @@ class Opened:
     labels: Volume | None = field(default=None, repr=False)
     points: PointSet | None = field(default=None, repr=False)
     mesh: TriMesh | None = field(default=None, repr=False)
+    names: Mapping[int, str] = field(default_factory=dict)
+    refused: str = ""
+    flags: tuple[str, ...] = ()
 
     @property
     def command(self) -> str:
@@ -53,10 +65,20 @@ class Opened:
         """Whether it has been read."""
         return (self.volume or self.points or self.mesh) is not None
 
+    def reads_otherwise(self, before: Settings, after: Settings) -> bool:
+        """Tell whether other settings read a study otherwise."""
+        if self.kind != "study":
+            return False
+        part = bool(self.refused or self.names) and suffix_of(self.words[0]) not in WHOLE
+        return before.read != after.read or (part and before.window.select != after.window.select)
+
     @property
     def told(self) -> dict[str, Any]:
         """What the page is told of it."""
-        return {"kind": self.kind, "name": Path(self.words[0]).name if self.words else "", "ready": self.ready}
+        name = Path(self.words[0]).resolve().name if self.words else ""
+        return {
+            "kind": self.kind, "name": name, "ready": self.ready, "refused": self.refused, "flags": list(self.flags),
+        }  # fmt: skip
 
 
 def kind_of(path: str) -> str:
@@ -85,10 +107,15 @@ def opened_as(kind: str, path: str, settings: Settings, progress: Progress) -> O
     """
     progress("read", 0, 1)
     read: dict[str, Any] = {
-        "study": lambda: {"volume": io.read_volume(path, settings=settings.read, select=settings.window.select)},
+        "study": lambda: _study(path, settings),
         "points": lambda: {"points": io.read_points(path, settings=settings.cloud)},
         "mesh": lambda: {"mesh": io.read_mesh(path)},
     }
     found = read[kind]()
     progress("read", 1, 1)
     return Opened(kind, (path,), **found)
+
+
+def _study(path: str, settings: Settings) -> dict[str, Any]:
+    volume = io.read_volume(path, settings=settings.read, select=settings.window.select)
+    return {"volume": volume, "names": io.label_names(path)}

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import socket
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import uvicorn
 
 from .app import application
 from .doors import Doors
-from .opened import opened_as
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..progress import Progress
     from .session import Session
 
 HERE = "127.0.0.1"
@@ -54,18 +52,10 @@ def serve(session: Session, started: Callable[[str], None], *, host: str = HERE,
     def begun() -> None:
         started(f"http://{host}:{bound}/?token={doors.token}")
         if session.opened.words and not session.opened.ready:
-            session.jobs.start("read", lambda progress: read(session, progress))
+            session.read(session.opened)
 
     try:
         _Server(config, begun).run([listening])
     finally:
         session.jobs.stop()
         listening.close()
-
-
-def read(session: Session, progress: Progress) -> dict[str, Any]:
-    """Read what a session names."""
-    opened = session.opened
-    session.opened = opened_as(opened.kind, opened.words[0], session.settings, progress)
-    session.tell()
-    return {}

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
-from ..errors import UsageError
+from ..errors import TomomeshError, UsageError
 from ..settings import Settings
 from .events import Events
 from .jobs import ENDS, Jobs
+from .opened import Opened, opened_as
+from .reach import Reach
+from .remembered import Remembered
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from .opened import Opened
+    from ..progress import Progress
 
 MOST = 200
 """Choices that can be taken back."""
@@ -70,10 +74,16 @@ class Session:
         What was made of it, by the name of the work (``segment``, ``reconstruct``), each with the choices of that time.
     jobs : Jobs
     events : Events
+    reach : Reach
+        What may be opened.
+    surveys, selections : Remembered
+        What was found out about what is opened, and what some choices keep of it.
     """
 
-    def __init__(self, opened: Opened, choices: Mapping[str, Any] | None = None) -> None:
-        self.opened = opened
+    def __init__(self, opened: Opened, choices: Mapping[str, Any] | None = None, reach: Reach | None = None) -> None:
+        self.opened, self.reach = opened, reach or Reach()
+        self._turns, self._told = 0, count(1)
+        self.surveys, self.selections = Remembered(1), Remembered(3)
         self.choices = Choices().then(choices or {})
         self.made: dict[str, Made] = {}
         self.events = Events()
@@ -95,10 +105,11 @@ class Session:
 
     @property
     def state(self) -> dict[str, Any]:
-        """What the page has to know at any time."""
+        """What the page has to know at any time; ``told`` grows, so that an answer on its way cannot undo a newer."""
         job = self.jobs.now
         return {
-            "opened": self.opened.told,
+            "told": next(self._told),
+            "opened": {**self.opened.told, "turn": self._turns, "browses": self.reach.folder is not None},
             "choices": {name: _plain(value) for name, value in self.choices.values.items()},
             "undo": len(self.choices.before),
             "redo": len(self.choices.after),
@@ -126,10 +137,43 @@ class Session:
         self.made[name] = Made(value, dict(choices))
         self.tell()
 
-    def open(self, opened: Opened) -> None:
-        """Look at something else: what was chosen and made before goes."""
-        self.opened, self.choices = opened, Choices()
+    def open(self, opened: Opened, choices: Mapping[str, Any] | None = None) -> None:
+        """Look at something else, and read it: what was chosen and made before goes."""
+        self._check_idle()
+        self.choices = Choices().then(choices or {})
         self.made.clear()
+        self.read(opened)
+
+    def read(self, opened: Opened) -> None:
+        """Read what is named, beside the page.
+
+        Raises
+        ------
+        UsageError
+            Where other work is underway.
+        """
+        self._check_idle()
+        self._look_at(Opened(opened.kind, opened.words))
+        if opened.words:
+            self.jobs.start("read", self._read)
+
+    def _check_idle(self) -> None:
+        if (job := self.jobs.now) is not None:
+            raise UsageError("work is underway", found=job.name, hint="the same once it is done, or stop it")
+
+    def _read(self, progress: Progress) -> dict[str, Any]:
+        opened = self.opened
+        try:
+            self._look_at(opened_as(opened.kind, opened.words[0], self.settings, progress))
+        except TomomeshError as fault:
+            self._look_at(replace(opened, refused=str(fault), flags=fault.flags))
+            raise
+        return {}
+
+    def _look_at(self, opened: Opened) -> None:
+        self.opened, self._turns = opened, self._turns + 1
+        self.surveys.clear()
+        self.selections.clear()
         self.tell()
 
     def tell(self) -> None:
@@ -143,7 +187,12 @@ class Session:
             self.tell()
 
     def _now(self, choices: Choices) -> dict[str, Any]:
+        """Take choices; where they change how a study is read, it is read again."""
+        if again := self.opened.reads_otherwise(self.settings, Settings().replace(**choices.values)):
+            self._check_idle()
         self.choices = choices
+        if again:
+            self.read(self.opened)
         self.tell()
         return self.state
 

@@ -10,7 +10,7 @@ from ...errors import EmptyError, FormatError, GeometryError, ResourceError, Tom
 from .next_step import first_try, next_step
 
 if TYPE_CHECKING:
-    from ...io import Listing, Series
+    from ...io import Listing
     from ...model.volume import Volume
     from ...settings import Settings
 
@@ -44,9 +44,8 @@ def inspected(study: str | tuple[str, ...], settings: Settings, *, typed: str = 
     """
     listing = io.list_series(study, settings=settings.read)
     found, fault = _surveyed(study, settings, listing)
-    series = [_series(one, alone=len(listing.series) == 1) for one in listing.series]
-    found |= {"series": series, "segments": dict(listing.segments), "left_out": dict(listing.left_out)}
-    found["refused"] = _refusal(fault)
+    found |= {"series": listing.told, "segments": dict(listing.segments), "left_out": dict(listing.left_out)}
+    found["refused"] = None if fault is None else fault.told
     if typed and isinstance(study, str):
         _rename(found, study, shlex.split(typed)[0])
     path = f"./{study}" if str(study).startswith("-") else str(study)  # else it would look like an option
@@ -86,27 +85,3 @@ def _way(volume: Volume, settings: Settings) -> dict[str, Any] | None:
         return dict(take_way(select_study(volume, None, settings).value, settings).stats["way"])
     except EmptyError:
         return None
-
-
-def _series(series: Series, *, alone: bool) -> dict[str, Any]:
-    """Describe a series; its description, which people write freely, only where there is a choice to make."""
-    rows, columns = series.size
-    return {
-        "number": series.number,
-        "description": None if alone else series.description,
-        "modality": series.modality,
-        "slices": series.slices,
-        "rows": rows,
-        "columns": columns,
-        "pixel_mm": series.pixel_mm,
-        "distances_mm": series.slice_spacing.distances_mm,
-        "tilt_deg": series.slice_spacing.tilt_deg,
-        "missing": series.slice_spacing.missing,
-        "gaps_mm": series.slice_spacing.gaps_mm,
-        "repeats": series.slice_spacing.repeats,
-        "refused": _refusal(series.refused),
-    }
-
-
-def _refusal(fault: TomomeshError | None) -> dict[str, Any] | None:
-    return None if fault is None else {"exit_code": fault.exit_code, "error": str(fault)}

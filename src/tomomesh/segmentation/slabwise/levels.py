@@ -96,6 +96,10 @@ class LevelCounts:
         """Count levels that are held."""
         return [int(self.counts[int(level) - self.base]) for level in levels]
 
+    def within(self, windows: Sequence[tuple[float, float]]) -> list[int]:
+        """Count the levels above a first bound and up to a second, for several windows."""
+        return [int(self.numbers[(self.present > low) & (self.present <= high)].sum()) for low, high in windows]
+
     def without(self, level: float) -> LevelCounts:
         """Return all but a level."""
         return LevelCounts(np.where(np.arange(len(self.counts)) + self.base == level, 0, self.counts), self.base)
@@ -153,6 +157,12 @@ class Ordered:
     def count(self, levels: Sequence[float]) -> list[int]:
         """Count levels."""
         return [int(count) for count in self.total(partial(_count, sought=levels))]
+
+    def within(self, windows: Sequence[tuple[float, float]]) -> list[int]:
+        """Count the levels above a first bound and up to a second, for several windows."""
+        gone = [(level_of(key, self.kind), number) for key, number in self.absent.items()]
+        less = [sum(number for level, number in gone if low < level <= high) for low, high in windows]
+        return [int(count) for count in self.total(partial(_within, windows=windows)) - np.array(less)]
 
     def without(self, level: float) -> Ordered:
         """Return all but a level."""
@@ -212,6 +222,10 @@ class Ordered:
 
 def _count(levels: NDArray[Any], *, sought: Sequence[float]) -> Ints:
     return np.array([np.count_nonzero(levels == level) for level in sought])
+
+
+def _within(levels: NDArray[Any], *, windows: Sequence[tuple[float, float]]) -> Ints:
+    return np.array([np.count_nonzero((levels > low) & (levels <= high)) for low, high in windows])
 
 
 def _histogram(levels: NDArray[Any], *, low: float, high: float, bins: int) -> Ints:

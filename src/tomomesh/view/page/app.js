@@ -6,7 +6,7 @@ import * as saving from "./saving.js";
 import * as study from "./study.js";
 import * as surface from "./surface.js";
 
-/** Each has `title`, `keys` ([key, what it does]), `applies(kind)`, and `mount(panel)`, which returns {show, hide, key}. */
+/** Each has `title`, `keys` ([key, what it does]), `applies(kind, opened)`, and `mount(panel)`, which returns {show, hide, key}. */
 const PARTS = { study, networks, surface, saving };
 const THEMES = ["auto", "light", "dark"];
 const shown = new Map();
@@ -44,7 +44,7 @@ function showState(now) {
   byId("redo").disabled = !now.redo;
   byId("command").textContent = now.command;
   byId("command").parentElement.hidden = !now.command;
-  for (const [name, { tab }] of shown) tab.hidden = !PARTS[name].applies(now.opened.kind);
+  for (const [name, { tab }] of shown) tab.hidden = !PARTS[name].applies(now.opened.kind, now.opened);
   if (!current || shown.get(current).tab.hidden) open([...shown.keys()].find((name) => !shown.get(name).tab.hidden));
   if (now.job) showWork(now.job);
   else hideWork();

@@ -52,6 +52,7 @@ async function changed(asked) {
 }
 
 function take(now) {
+  if (state && now.told < state.told) return;
   state = now;
   tell("state", now);
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -84,6 +84,26 @@ class Series:
     slice_spacing: SliceSpacing
     refused: TomomeshError | None
 
+    @property
+    def told(self) -> dict[str, Any]:
+        """All of it, ready for JSON."""
+        rows, columns = self.size
+        return {
+            "number": self.number,
+            "description": self.description,
+            "modality": self.modality,
+            "slices": self.slices,
+            "rows": rows,
+            "columns": columns,
+            "pixel_mm": self.pixel_mm,
+            "distances_mm": self.slice_spacing.distances_mm,
+            "tilt_deg": self.slice_spacing.tilt_deg,
+            "missing": self.slice_spacing.missing,
+            "gaps_mm": self.slice_spacing.gaps_mm,
+            "repeats": self.slice_spacing.repeats,
+            "refused": None if self.refused is None else self.refused.told,
+        }
+
 
 @dataclass(frozen=True)
 class Listing:
@@ -104,6 +124,12 @@ class Listing:
     left_out: tuple[tuple[str, int], ...] = ()
     files: int = 0
     segments: tuple[tuple[int, str], ...] = ()
+
+    @property
+    def told(self) -> list[dict[str, Any]]:
+        """The series, ready for JSON; descriptions, which people write freely, only where there is a choice to make."""
+        alone = len(self.series) == 1
+        return [one.told | ({"description": None} if alone else {}) for one in self.series]
 
 
 def list_dicom(files: list[Path], settings: ReadSettings, *, study: str, others: Counter[str]) -> Listing:

@@ -1,0 +1,195 @@
+"""What the chosen settings keep of a study, as a run would keep it: its components, and those on a slice."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import TomomeshError
+from ..isosurface.runs import Runs
+from ..model.volume import AXES, order_along
+from ..segmentation.study import select_study
+from .routes import get, levels
+from .slices import axis_of
+from .studies import opened_volume
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from starlette.responses import Response
+
+    from ..model.volume import Volume
+    from ..segmentation.study import Selected
+    from ..settings import Settings
+    from ..stage import Stage
+    from .session import Session
+
+    Longs = NDArray[np.int64]
+
+LISTED = 24
+"""Components that are told one by one. As many as a page has room for."""
+OTHERS = 255
+"""The number that all components share which have none of their own."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What some settings keep of a study.
+
+    Attributes
+    ----------
+    runs : Runs
+        The voxels that are kept, the slices first, and their components.
+    grid : Volume
+        The part of the study that was looked at, without its voxels.
+    order : (int, int, int)
+        Which of the study's axes (K, J, I) its slices, rows and columns are.
+    corner : (3,) int64 array
+        The study's voxel (K, J, I) that is the first of the part.
+    told : dict
+        What the report has of it.
+    """
+
+    runs: Runs
+    grid: Volume
+    order: tuple[int, int, int]
+    corner: Longs
+    told: dict[str, Any]
+
+    @classmethod
+    def of(cls, volume: Volume, labels: Volume | None, settings: Settings) -> Kept:
+        """Choose the voxels; errors are those of `segmentation.study.select_study`."""
+        chosen: Stage[Selected] = select_study(volume, labels, settings)
+        selected = chosen.value
+        order = order_along(AXES.index(selected.plane))
+        corner = np.rint(volume.to_indices(selected.study.affine[None, :3, 3])[0, ::-1]).astype(np.int64)
+        told = {**chosen.stats, "warnings": list(chosen.warnings)}
+        return cls(Runs.of(selected.chosen.runs, corners=True), selected.study.bare(), order, corner, told)
+
+    @cached_property
+    def largest(self) -> Longs:
+        """The components from the largest on, of equals in their order."""
+        return np.argsort(-self.runs.sizes, kind="stable")
+
+    @cached_property
+    def numbers(self) -> NDArray[np.int16]:
+        """The number of each component, from 1 for the largest on."""
+        numbers = np.full(len(self.largest), OTHERS, np.int16)
+        numbers[self.largest[: OTHERS - 1]] = np.arange(1, min(len(self.largest), OTHERS - 1) + 1)
+        return numbers
+
+    @cached_property
+    def _rows(self) -> tuple[Longs, Longs]:
+        return np.divmod(self.runs.mask.rows, self.runs.mask.shape[1])
+
+    def plane(self, axis: int, place: int, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """Draw the components' numbers on a slice (rows, columns) across one of the study's axes (K, J, I)."""
+        drawn = np.zeros(size, np.uint8)
+        across, place = self.order.index(axis), place - int(self.corner[axis])
+        if 0 <= place < self.runs.mask.shape[across]:
+            found = self._drawn(across, place)
+            rows, columns = (one for one in range(3) if one != axis)
+            turned = self.order.index(rows) > self.order.index(columns)
+            found = found.T if turned else found
+            first, second = self.corner[rows], self.corner[columns]
+            drawn[first : first + found.shape[0], second : second + found.shape[1]] = found
+        return drawn
+
+    def _drawn(self, across: int, place: int) -> NDArray[np.uint8]:
+        """Draw them across one of the axes of the part."""
+        mask, (slices, rows) = self.runs.mask, self._rows
+        if across == 2:
+            met = np.flatnonzero((mask.starts <= place) & (place < mask.stops))
+            drawn = np.zeros(mask.shape[:2], np.uint8)
+            drawn[slices[met], rows[met]] = self.numbers[self.runs.parts[met]]
+            return drawn
+        met, lines = (slices, rows) if across == 0 else (rows, slices)
+        held = np.flatnonzero(met == place)
+        change = np.zeros((mask.shape[1 - across], mask.shape[2] + 1), np.int16)
+        numbers = self.numbers[self.runs.parts[held]]
+        change[lines[held], mask.starts[held]] = numbers
+        change[lines[held], mask.stops[held]] = -numbers
+        return np.cumsum(change, axis=1, dtype=np.int16)[:, :-1].astype(np.uint8)
+
+    def listed(self) -> list[dict[str, Any]]:
+        """Tell the largest components: number, voxels, mm3, the box in the patient, and a voxel inside (K, J, I)."""
+        return [self._listed(n + 1, int(part)) for n, part in enumerate(self.largest[:LISTED])]
+
+    def _listed(self, number: int, part: int) -> dict[str, Any]:
+        held = np.flatnonzero(self.runs.parts == part)
+        (slices, rows), mask = self._rows, self.runs.mask
+        starts, stops = mask.starts[held], mask.stops[held]
+        low = [slices[held].min(), rows[held].min(), starts.min()]
+        high = [slices[held].max(), rows[held].max(), stops.max() - 1]
+        middle = held[len(held) // 2]
+        inside = np.array([slices[middle], rows[middle], (mask.starts[middle] + mask.stops[middle]) // 2])
+        voxels = int(self.runs.sizes[part])
+        return {
+            "number": number,
+            "voxels": voxels,
+            "volume_mm3": voxels * self.grid.voxel_mm3,
+            "roi": box_of(self.grid, np.array(low), np.array(high)),
+            "inside": (inside[np.argsort(self.order)] + self.corner).tolist(),
+        }
+
+
+def box_of(volume: Volume, low: Longs, high: Longs) -> list[float]:
+    """Return a box (X0 X1 Y0 Y1 Z0 Z1) in the patient, mm, half a voxel around those (K, J, I) from some to others."""
+    sides = np.stack([low - 0.5, high + 0.5])[:, ::-1]
+    corners = np.stack(np.meshgrid(*sides.T, indexing="ij"), axis=-1).reshape(-1, 3)
+    places = volume.to_mm(corners)
+    return [round(float(side), 3) for pair in zip(places.min(axis=0), places.max(axis=0), strict=True) for side in pair]
+
+
+def _matters(settings: Settings) -> Any:
+    """Return the settings that choose voxels."""
+    return settings.read, settings.crop, settings.window, settings.network.slices, settings.cubes.shared_walls
+
+
+def _key(settings: Settings) -> str:
+    return hashlib.sha256(repr(_matters(settings)).encode()).hexdigest()[:16]
+
+
+def kept(session: Session) -> tuple[str, Kept]:
+    """Return what the choices of now keep, and the key by which it is known; what is known is not made again.
+
+    Raises
+    ------
+    TomomeshError
+        As `segmentation.study.select_study`, and where no study is open.
+    LookupError
+        Where other choices were made meanwhile, so that nobody waits for this.
+    """
+    opened_volume(session)
+    asked = _key(session.settings)
+
+    def choose() -> Kept:
+        if _key(session.settings) != asked:
+            raise LookupError(asked)
+        return Kept.of(opened_volume(session), session.opened.labels, session.settings)
+
+    return asked, session.selections.of(asked, choose)
+
+
+def _kept(session: Session) -> dict[str, Any]:
+    """Tell what the choices keep, component by component; or why they keep nothing, which is no fault of the page."""
+    opened_volume(session)
+    try:
+        key, found = kept(session)
+    except TomomeshError as fault:
+        return {"refused": str(fault), "flags": list(fault.flags)}
+    return {"key": key, **found.told, "components": found.listed(), "count": len(found.largest)}
+
+
+def _plane(session: Session, plane: str, k: str, key: str) -> Response:
+    """Return the components' numbers on a slice, of a selection that was told."""
+    found: Kept = session.selections.known(key)
+    shape, axis = opened_volume(session).shape, axis_of(plane)
+    rows, columns = (size for other, size in enumerate(shape) if other != axis)
+    return levels(found.plane(axis, int(k), (rows, columns)))
+
+
+ROUTES = [get("/api/kept", _kept), get("/kept/{plane}/{k}", _plane)]

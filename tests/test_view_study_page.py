@@ -1,0 +1,279 @@
+"""The study in a real browser, by mouse and by keyboard, and the command line that repeats what was done."""
+
+from __future__ import annotations
+
+import shlex
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("starlette")
+pytest.importorskip("uvicorn")
+pytest.importorskip("websockets")
+
+from browsers import SOFTWARE, chromium
+from pages import HERE, Page, served
+from studies import AFFINES, sampled, setting, write_nifti, write_series
+from tomomesh import phantom
+from tomomesh.cli.commands import settings_of
+from tomomesh.cli.options import build_parser
+from tomomesh.cli.options.parameters import joined
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from tomomesh.settings import Settings
+
+HEAD = phantom((27, 64, 64), (3.75, 3.75, 5.4))
+LABELS = np.select([HEAD.volume.voxels > 200, HEAD.volume.voxels > 100], [2, 1], 0).astype(np.uint8)
+SLICE = "Number(document.querySelector(`.plane-${name} canvas`).dataset.slice)"
+DRAWN = ".plane-axial canvas[data-slice]"
+
+
+class Shown:
+    """A page in a browser, with whatever it complains of and asks for."""
+
+    def __init__(self, browser: Any, page: Page, **options: Any) -> None:
+        self.tab = browser.new_page(viewport={"width": 1280, "height": 720}, **options)
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        self.tab.on("console", lambda message: self.complaints.append(message.text))
+        self.tab.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.tab.on("request", lambda request: self.requests.append(request.url))
+        self.tab.goto(f"{page.address}?token={page.token}")
+
+    def require_quiet(self) -> None:
+        assert self.complaints == []
+        assert all(f"//{HERE}:" in url or url.startswith(("data:", "blob:")) for url in self.requests)
+
+    @property
+    def settings(self) -> Settings:
+        """The settings of the command line that is shown."""
+        words = shlex.split(self.tab.inner_text("#command"))
+        return settings_of(build_parser().parse_args(joined(words[1:])))
+
+    def until(self, what: Callable[[Settings], bool]) -> Settings:
+        """Wait until the command line holds."""
+        for _ in range(200):
+            if what(self.settings):
+                return self.settings
+            self.tab.wait_for_timeout(50)
+        raise AssertionError(self.tab.inner_text("#command"))
+
+    def wait(self, script: str, value: Any = None) -> None:
+        """Wait until a script holds; the page's policy lets none be evaluated by the page itself."""
+        for _ in range(200):
+            if self.tab.evaluate(script, value):
+                return
+            self.tab.wait_for_timeout(50)
+        raise AssertionError(script)
+
+    def slice(self, plane: str) -> int:
+        """Return the slice that a plane shows, once it is drawn."""
+        canvas = self.tab.locator(f".plane-{plane} canvas")
+        self.wait(
+            "(name) => { const canvas = document.querySelector(`.plane-${name} canvas`);"
+            " return canvas.dataset.slice === canvas.getAttribute('aria-valuenow'); }", plane,
+        )  # fmt: skip
+        return int(canvas.get_attribute("data-slice"))
+
+    def drag(self, selector: str, start: tuple[float, float], end: tuple[float, float], **options: Any) -> None:
+        """Drag from one place of an element to another, in parts of its sides."""
+        box = self.tab.locator(selector).bounding_box()
+        places = [(box["x"] + x * box["width"], box["y"] + y * box["height"]) for x, y in (start, end)]
+        self.tab.mouse.move(*places[0])
+        self.tab.mouse.down(**options)
+        self.tab.mouse.move(*places[1], steps=5)
+        self.tab.mouse.up(**options)
+
+    def colors(self, plane: str) -> int:
+        """Count the pixels of a plane that are not gray."""
+        count: int = self.tab.evaluate(
+            """(name) => {
+              const canvas = document.querySelector(`.plane-${name} canvas`);
+              const copy = new OffscreenCanvas(canvas.width, canvas.height);
+              const pen = copy.getContext("2d", { willReadFrequently: true });
+              pen.drawImage(canvas, 0, 0);
+              const pixels = pen.getImageData(0, 0, canvas.width, canvas.height).data;
+              let found = 0;
+              for (let n = 0; n < pixels.length; n += 4) found += Math.abs(pixels[n] - pixels[n + 2]) > 40;
+              return found;
+            }""", plane,
+        )  # fmt: skip
+        return count
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as launch:
+        yield launch(*SOFTWARE)
+
+
+@contextmanager
+def shown(browser: Any, *arguments: str | Path, **options: Any) -> Iterator[Shown]:
+    with served(*arguments) as page:
+        found = Shown(browser, page, **options)
+        yield found
+        found.require_quiet()
+        found.tab.close()
+
+
+@pytest.fixture
+def head(browser: Any, tmp_path: Path) -> Iterator[Shown]:
+    path = write_nifti(tmp_path / "head.nii", np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
+    with shown(browser, path, "--lower", str(HEAD.lower)) as page:
+        page.tab.wait_for_selector(".rows .row")
+        yield page
+
+
+def test_slices_move_by_wheel_keys_and_crosshair(head: Shown) -> None:
+    assert [head.slice(plane) for plane in ("axial", "coronal", "sagittal")] == [13, 32, 32]
+    box = head.tab.locator(".plane-axial canvas").bounding_box()
+    head.tab.mouse.move(box["x"] + 200, box["y"] + 90)
+    head.tab.mouse.wheel(0, -100)
+    head.wait("document.querySelector('.plane-axial canvas').dataset.slice === '14'")
+    for key, plane, found in (
+        ("a", "axial", 14), ("ArrowUp", "axial", 15), ("ArrowLeft", "axial", 14), ("PageDown", "axial", 4),
+        ("Home", "axial", 0), ("End", "axial", 26), ("s", "sagittal", 32), ("PageUp", "sagittal", 42),
+        ("Shift+ArrowUp", "axial", 26), ("Shift+ArrowDown", "axial", 25), ("Shift+ArrowRight", "coronal", 33),
+    ):  # fmt: skip
+        head.tab.keyboard.press(key)
+        head.wait(f"([name, k]) => {SLICE} === k", [plane, found])
+    head.tab.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    for plane in ("coronal", "sagittal"):
+        head.wait(f"(name) => [31, 32].includes({SLICE})", plane)
+    assert " at " in head.tab.inner_text(".under")
+
+
+def test_the_window_follows_handles_keys_numbers_and_suggestions(head: Shown) -> None:
+    tab, before = head.tab, head.settings.window.lower
+    handle = tab.locator(".handle.lower").bounding_box()
+    tab.mouse.move(handle["x"] + 7, handle["y"] + 60)
+    tab.mouse.down()
+    tab.mouse.move(handle["x"] - 90, handle["y"] + 60, steps=5)
+    head.wait("(lower) => Number(document.querySelector('.plane-axial canvas').dataset.lower) < lower", before)
+    assert head.settings.window.lower == before  # drawn, not chosen yet
+    tab.mouse.up()
+    dragged = head.until(lambda found: found.window.lower != before).window.lower
+    assert isinstance(dragged, float)
+    tab.focus(".handle.lower")
+    tab.keyboard.press("ArrowRight")
+    tab.keyboard.press("ArrowRight")
+    assert head.until(lambda found: found.window.lower != dragged).window.lower == dragged + 2
+    tab.focus(".handle.upper")
+    tab.keyboard.press("PageDown")
+    head.until(lambda found: found.window.upper is not None)
+    tab.fill("[aria-label='upper bound']", "180")
+    tab.keyboard.press("Enter")
+    head.until(lambda found: found.window.upper == 180)
+    tab.click(".chips button >> nth=1")
+    head.until(lambda found: found.window.upper is None)
+    tab.click(".chips button >> nth=0")
+    assert head.until(lambda found: found.window.lower is None).window.upper is None
+    for _ in range(3):
+        tab.keyboard.press("Control+z")
+    head.until(lambda found: found.window.upper is not None and found.window.upper != 180)
+
+
+def test_what_is_kept_is_colored_and_a_contrast_changes_no_choice(head: Shown) -> None:
+    head.slice("axial")
+    kept = head.colors("axial")
+    assert kept > 4000
+    before = head.tab.inner_text("#command")
+    width = head.tab.input_value("[aria-label='contrast, width']")
+    head.drag(".plane-coronal canvas", (0.4, 0.4), (0.6, 0.5), button="right")
+    head.wait("(width) => document.querySelector(\"[aria-label='contrast, width']\").value !== width", width)
+    head.tab.fill("[aria-label='Opacity of what is kept']", "0")
+    head.tab.wait_for_timeout(200)
+    assert head.colors("axial") < kept / 4  # the crosshair's lines
+    assert head.tab.inner_text("#command") == before
+
+
+def test_a_box_and_a_range_of_slices_are_the_part_that_is_kept(head: Shown) -> None:
+    head.tab.keyboard.press("b")
+    head.drag(".plane-axial canvas", (0.4, 0.3), (0.6, 0.7))
+    roi = head.until(lambda found: found.crop.roi is not None).crop.roi
+    assert roi is not None
+    ends = HEAD.volume.to_mm(np.array([[-0.5, -0.5, -0.5], [63.5, 63.5, 26.5]]))
+    whole = ends.T.ravel().tolist()
+    assert roi[4:] == pytest.approx(whole[4:], abs=1e-3)
+    assert whole[0] < roi[0] < roi[1] < whole[1]
+    head.tab.fill("[aria-label='last slice']", "20")
+    head.tab.keyboard.press("Enter")
+    head.until(lambda found: found.crop.slice_range == (0, 20))
+    head.tab.click("text=All of the study")
+    assert head.until(lambda found: found.crop.roi is None).crop.slice_range is None
+
+
+def test_components_are_kept_and_dropped(browser: Any, tmp_path: Path) -> None:
+    stored = np.zeros((12, 40, 40), np.int16)
+    stored[2:10, 5:20, 5:20], stored[2:10, 25:35, 25:35] = 1000, 1000
+    stored += np.random.default_rng(0).integers(0, 99, stored.shape, np.int16)
+    path = write_nifti(tmp_path / "two.nii", stored, AFFINES["axial"])
+    with shown(browser, path, "--lower", "500") as page:
+        page.tab.wait_for_selector(".rows .row")
+        assert page.tab.locator(".rows .row").count() == 2
+        page.tab.click(".rows .row >> nth=1 >> text=only this")
+        roi = page.until(lambda found: found.window.keep == "largest").crop.roi
+        assert roi is not None
+        page.wait("document.querySelectorAll('.rows .row').length === 1")
+        page.tab.keyboard.press("Control+z")
+        page.wait("document.querySelectorAll('.rows .row').length === 2")
+        page.tab.click(".rows .row .name >> nth=1")
+        page.tab.focus(".plane-axial canvas")
+        page.tab.wait_for_timeout(300)
+        page.tab.keyboard.press("Enter")
+        page.until(lambda found: found.window.keep == "largest" and found.crop.roi is None)
+
+
+def test_labels_are_chosen_in_the_list_and_in_a_slice(browser: Any, tmp_path: Path) -> None:
+    path = write_nifti(tmp_path / "labels.nii", LABELS, HEAD.volume.affine)
+    with shown(browser, path) as page:
+        page.tab.wait_for_selector(".rows .row")
+        page.tab.click(".rows .row >> nth=1")
+        page.until(lambda found: found.window.select == (2,))
+        page.wait("document.querySelector('.told').textContent.includes('voxels')")
+        page.tab.keyboard.press("p")
+        page.tab.locator(".plane-axial canvas").click()
+        page.until(lambda found: found.window.select in ((1, 2), (2,)))
+        assert not page.tab.locator(".for-gray").is_visible()
+
+
+def test_a_series_is_opened_from_the_table(browser: Any, tmp_path: Path) -> None:
+    for n in (1, 2):
+        edit = setting(SeriesInstanceUID=f"1.2.{n}", SeriesNumber=n, SeriesDescription=f"<b>series {n}</b>")
+        write_series(tmp_path / "study" / str(n), sampled(AFFINES["axial"]), AFFINES["axial"], edit)
+    with shown(browser, tmp_path / "study") as page:
+        page.tab.wait_for_selector(".series")
+        assert "2 series" in page.tab.inner_text(".refused >> nth=0")
+        assert "<b>series 2</b>" in page.tab.inner_text(".series")
+        page.tab.click(".series tbody tr >> nth=1 >> text=Open")
+        page.tab.wait_for_selector(DRAWN)
+        assert page.settings.read.series == 2
+
+
+def test_a_refused_study_says_its_line_and_what_to_try(browser: Any, tmp_path: Path) -> None:
+    write_series(tmp_path / "gap", sampled(AFFINES["axial"]), AFFINES["axial"], slices=[0, 1, 3, 4])
+    with shown(browser, tmp_path / "gap") as page:
+        page.tab.wait_for_selector(".opening .first")
+        assert "slices are missing" in page.tab.inner_text(".refused >> nth=0")
+        page.tab.click("text=Read it with --fill-gaps")
+        page.tab.wait_for_selector(DRAWN)
+        assert page.settings.read.fill_gaps
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_scrolls_and_all_can_be_read(browser: Any, tmp_path: Path, scheme: str) -> None:
+    path = write_nifti(tmp_path / "head.nii", np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
+    with shown(browser, path, color_scheme=scheme) as page:
+        page.tab.wait_for_selector(".rows .row")
+        size = page.tab.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+        assert size == [1280, 720]
+        unnamed = page.tab.evaluate(
+            """[...document.querySelectorAll("#study button, #study input, #study select, #study [role=slider]")]
+              .filter((one) => !(one.textContent.trim() || one.ariaLabel || one.closest("label"))).length"""
+        )
+        assert unnamed == 0
