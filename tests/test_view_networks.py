@@ -21,12 +21,13 @@ from tomomesh.cli import main
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.settings import Settings
 from tomomesh.som.measures import quantization_error
-from tomomesh.view import networks, pictures
-from tomomesh.view.course import MOST, PICTURES
-from tomomesh.view.figures import FIGURES
+from tomomesh.view.networks import asked as networks
+from tomomesh.view.networks import pictures
+from tomomesh.view.networks.course import MOST, PICTURES
+from tomomesh.view.networks.figures import FIGURES
+from tomomesh.view.networks.trainers import REGIONS, head, trainer_of
 from tomomesh.view.opened import Opened
 from tomomesh.view.session import Session
-from tomomesh.view.trainers import REGIONS, head, trainer_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,7 +10,8 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from ..settings import Settings
-from . import events, networks, pictures, slices, studies, windows
+from . import events, slices, studies, windows
+from .networks import asked, pictures
 from .routes import get, post
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def application(session: Session) -> Starlette:
         *studies.ROUTES,
         *slices.ROUTES,
         *windows.ROUTES,
-        *networks.ROUTES,
+        *asked.ROUTES,
         *pictures.ROUTES,
         Route("/", _page),
         Route("/{name}", _page),
