@@ -44,7 +44,8 @@ CHOICES = st.tuples(WINDOWS, OTHERS).map(lambda both: both[0] | both[1])
 
 
 def parsed(command: str) -> Namespace:
-    return build_parser().parse_args(joined(shlex.split(command)[1:]))
+    chosen: Namespace = build_parser().parse_args(joined(shlex.split(command)[1:]))
+    return chosen
 
 
 @law(100)

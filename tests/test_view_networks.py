@@ -21,12 +21,13 @@ from tomomesh.cli import main
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.settings import Settings
 from tomomesh.som.measures import quantization_error
-from tomomesh.view import networks, pictures
-from tomomesh.view.course import MOST, PICTURES
-from tomomesh.view.figures import FIGURES
+from tomomesh.view.networks import asked as networks
+from tomomesh.view.networks import pictures
+from tomomesh.view.networks.course import MOST, PICTURES
+from tomomesh.view.networks.figures import FIGURES
+from tomomesh.view.networks.trainers import REGIONS, head, trainer_of
 from tomomesh.view.opened import Opened
 from tomomesh.view.session import Session
-from tomomesh.view.trainers import REGIONS, head, trainer_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -310,7 +311,7 @@ def test_the_region_of_the_head_is_a_skull_that_is_open_somewhere() -> None:
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    path = tmp_path_factory.mktemp("study") / "head.nii.gz"
+    path = tmp_path_factory.mktemp("study") / "head.nii"
     write_nifti(path, np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
     with served(path, "--lower", str(HEAD.lower), "--way", "ring") as found:
         found.enter()

@@ -34,7 +34,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def page(study: Path) -> Iterator[Page]:
-    with served(study, "--lower", HEAD.lower) as page:
+    with served(study, "--lower", str(HEAD.lower)) as page:
         page.enter()
         page.ready()
         yield page
@@ -119,7 +119,7 @@ def test_what_there_is_not(made: Page) -> None:
 
 
 def test_stopped_work_leaves_nothing(study: Path) -> None:
-    with served(study, "--lower", HEAD.lower) as page:
+    with served(study, "--lower", str(HEAD.lower)) as page:
         page.enter()
         page.ready()
         page.state("/api/reconstruct", {})

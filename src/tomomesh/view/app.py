@@ -10,7 +10,8 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from ..settings import Settings
-from . import events, networks, pictures, saving, slices, studies, surfaces, windows
+from . import events, saving, slices, studies, surfaces, windows
+from .networks import asked, pictures
 from .routes import get, post
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def application(session: Session) -> Starlette:
         *windows.ROUTES,
         *surfaces.ROUTES,
         *saving.ROUTES,
-        *networks.ROUTES,
+        *asked.ROUTES,
         *pictures.ROUTES,
         Route("/", _page),
         Route("/{name}", _page),

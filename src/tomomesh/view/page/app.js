@@ -43,8 +43,9 @@ function showState(now) {
   byId("undo").disabled = !now.undo;
   byId("redo").disabled = !now.redo;
   byId("command").textContent = now.command;
-  for (const [name, { tab }] of shown) tab.hidden = !PARTS[name].applies(now.opened.kind, now.opened);
   byId("command").parentElement.hidden = !now.command;
+  for (const [name, { tab }] of shown) tab.hidden = !PARTS[name].applies(now.opened.kind, now.opened);
+  if (!current && now.opened.kind === "nothing" && !now.opened.browses) open("networks"); // a class needs no study
   if (!current || shown.get(current).tab.hidden) open([...shown.keys()].find((name) => !shown.get(name).tab.hidden));
   if (now.job) showWork(now.job);
   else hideWork();

@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
-from ..segmentation.networks.slices import of_size
-from ..settings import NetworkSettings, RunSettings, Settings
-from ..som.inputs import Shown, flat
-from ..som.passes import Look, at_times
-from ..som.shapes import SHAPES
+from ...errors import UsageError
+from ...segmentation.networks.slices import of_size
+from ...settings import NetworkSettings, RunSettings, Settings
+from ...som.inputs import Shown, flat
+from ...som.passes import Look, at_times
+from ...som.shapes import SHAPES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
-    from ..model.lattice import Lattice
-    from ..progress import Progress
-    from ..show.plane import Plane
+    from ...model.lattice import Lattice
+    from ...progress import Progress
+    from ...show.plane import Plane
 
     Floats = NDArray[np.float64]
 

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import TomomeshError, UsageError
-from ..model.contours import Contours
-from ..model.networks import Networks
-from ..progress import silent
-from ..settings import MATTERS
+from ...errors import TomomeshError, UsageError
+from ...model.contours import Contours
+from ...model.networks import Networks
+from ...progress import silent
+from ...settings import MATTERS
+from ..routes import get, levels, post
 from .figures import FIGURES
-from .routes import get, levels, post
 from .selected import opened_volume, selected_of, slices_of
 from .trainers import REGIONS, backdrop, head, in_slices, trainer_of
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
     from starlette.responses import Response
 
-    from ..progress import Progress
-    from ..settings import Settings
+    from ...progress import Progress
+    from ...settings import Settings
+    from ..session import Session
     from .course import TrainingCourse
-    from .session import Session
 
     Told = dict[str, Any]
 
@@ -108,7 +108,7 @@ def _noted(session: Session, asked: Told, progress: Progress) -> str:
     """Say where a run would not train the slice so."""
     if "slice" not in asked:
         return ""
-    from ..ways.choice import take_way
+    from ...ways.choice import take_way
 
     taken = take_way(selected_of(session, progress), session.settings)
     return NO_RING.get(taken.value.network.way, "")
@@ -116,7 +116,7 @@ def _noted(session: Session, asked: Told, progress: Progress) -> str:
 
 def _segment(session: Session, progress: Progress) -> Told:
     """Train all slices: the very call of ``tomomesh segment``."""
-    from ..pipeline import segment as run
+    from ...pipeline import segment as run
 
     choices, labels = session.choices.values, session.opened.labels
     found = run(opened_volume(session), session.settings, labels=labels, progress=progress, **choices)

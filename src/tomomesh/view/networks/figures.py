@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
-from ..settings import NetworkSettings
+from ...settings import NetworkSettings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

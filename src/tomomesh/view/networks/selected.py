@@ -6,17 +6,17 @@ import threading
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..errors import UsageError
-from ..segmentation.study import lay_out, select_in
-from .session import Made
+from ...errors import UsageError
+from ...segmentation.study import lay_out, select_in
+from ..session import Made
 
 if TYPE_CHECKING:
     from typing import Any
 
-    from ..model.volume import Volume
-    from ..progress import Progress
-    from ..segmentation.study import LaidOut, Selected
-    from .session import Session
+    from ...model.volume import Volume
+    from ...progress import Progress
+    from ...segmentation.study import LaidOut, Selected
+    from ..session import Session
 
 _finding = threading.Lock()
 """A page that asks for slice after slice has their window found once."""

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from starlette.responses import Response
 
-from ..errors import UsageError
-from ..progress import silent
-from ..show.drawing.page import png
-from ..show.film import film, film_slice
-from ..show.maps import SHEETS, laid_flat, u_matrix
-from ..show.relief import draw_relief
-from ..som.fit import match
-from .networks import course_of
-from .routes import get
+from ...errors import UsageError
+from ...progress import silent
+from ...show.drawing.page import png
+from ...show.film import film, film_slice
+from ...show.maps import SHEETS, laid_flat, u_matrix
+from ...show.relief import draw_relief
+from ...som.fit import match
+from ..routes import get
+from .asked import course_of
 from .selected import selected_of
 from .trainers import head, plane_of, slice_of
 
 if TYPE_CHECKING:
+    from ..session import Session
     from .course import TrainingCourse
-    from .session import Session
 
 
 def _trained(session: Session) -> TrainingCourse:

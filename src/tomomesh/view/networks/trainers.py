@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
-from ..model.lattice import lattice
-from ..segmentation.networks.one import OneSlice
-from ..segmentation.signal import pixels_of
-from ..segmentation.space import pieces_of, shown_of, train_space
-from ..settings import IN_SLICE, SURFACES
-from ..show.plane import Plane, contrast, gray
-from ..som.fit import fit
-from ..som.region import train_region
-from ..som.shapes import SHAPES, shape
-from ..ways.rings import slices_of
-from ..ways.space import shown_in_space
+from ...errors import UsageError
+from ...model.lattice import lattice
+from ...segmentation.networks.one import OneSlice
+from ...segmentation.signal import pixels_of
+from ...segmentation.space import pieces_of, shown_of, train_space
+from ...settings import IN_SLICE, SURFACES
+from ...show.plane import Plane, contrast, gray
+from ...som.fit import fit
+from ...som.region import train_region
+from ...som.shapes import SHAPES, shape
+from ...ways.rings import slices_of
+from ...ways.space import shown_in_space
 from .course import Backdrop, TrainingCourse
 from .selected import selected_of
 
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..model.volume import Volume
-    from ..progress import Progress
-    from ..segmentation.study import Selected
-    from ..settings import Settings
-    from ..som.passes import Look
-    from .session import Session
+    from ...model.volume import Volume
+    from ...progress import Progress
+    from ...segmentation.study import Selected
+    from ...settings import Settings
+    from ...som.passes import Look
+    from ..session import Session
 
     Floats = NDArray[np.float64]
     Trained = tuple[Floats, NDArray[np.bool_] | None]
@@ -183,7 +183,7 @@ class Pictured(NamedTuple):
 @lru_cache(maxsize=1)
 def head() -> Pictured:
     """Return the skull on a slice of the built-in head."""
-    from ..head_phantom import phantom
+    from ...head_phantom import phantom
 
     made = phantom(HEAD, PIXEL_MM)
     plane = made.volume.voxels[HEAD_SLICE]
@@ -201,7 +201,7 @@ def backdrop(kept: Selected, k: int) -> Backdrop:
 
 def slice_of(study: Volume, k: int) -> NDArray[Any]:
     """Return the levels of a slice (J, I) or (J, I, L)."""
-    from ..model.sliced import some_of
+    from ...model.sliced import some_of
 
     return np.asarray(some_of(study.voxels, k, k + 1)[0])
 
