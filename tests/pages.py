@@ -73,6 +73,7 @@ class Page:
             if state["job"] is None and (state["opened"]["ready"] or state["opened"]["kind"] == "nothing"):
                 return state
             assert self.process.poll() is None
+            assert not state["opened"]["refused"], state["opened"]["refused"]
 
 
 @contextmanager

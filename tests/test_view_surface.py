@@ -27,7 +27,7 @@ HEAD = phantom((14, 40, 40), (6.0, 6.0, 11.0))
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("study") / "head.nii.gz"
+    path = tmp_path_factory.mktemp("study") / "head.nii"
     write_nifti(path, np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
     return path
 
