@@ -156,8 +156,10 @@ class TestOption:
         assert set(COMMANDS) <= set(commands)
         usual = {other for others in USUAL.values() for other in others}
         assert not {f"--{other}" for other in usual} & set(commands["reconstruct"]._option_string_actions)
-        for command in commands.values():
-            known = [others for name, others in USUAL.items() if f"--{name}" in command._option_string_actions]
+        for name, command in commands.items():
+            if name == "view":  # takes studies and points, whose organs go by two options
+                continue
+            known = [others for option, others in USUAL.items() if f"--{option}" in command._option_string_actions]
             assert max(sum(other in others for others in known) for other in usual) <= 1
 
 

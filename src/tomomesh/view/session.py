@@ -94,7 +94,7 @@ class Session:
         self._turns, self._told = 0, count(1)
         self.surveys, self.selections = Remembered(1), Remembered(3)
         self.choices = Choices().then(choices or {})
-        self.made: dict[str, Made] = {}
+        self.made: dict[str, Outcome] = {}
         self.events = Events()
         self.jobs = Jobs(self._hear)
 
@@ -143,7 +143,7 @@ class Session:
 
     def keep(self, name: str, value: Any, choices: Mapping[str, Any]) -> None:
         """Keep what was made with some choices."""
-        self.made[name] = Made(value, dict(choices))
+        self.made[name] = Outcome(value, dict(choices))
         self.tell()
 
     def open(self, opened: Opened, choices: Mapping[str, Any] | None = None) -> None:
@@ -207,7 +207,7 @@ class Session:
 
 
 @dataclass(frozen=True)
-class Made:
+class Outcome:
     """What some work has made, and the choices that it was made with."""
 
     value: Any

@@ -41,10 +41,10 @@ class Kept:
 
     Attributes
     ----------
+    selected : Selected
+        The part of the study that was looked at, its slices first, and the voxels that are kept.
     runs : Runs
-        The voxels that are kept, the slices first, and their components.
-    grid : Volume
-        The part of the study that was looked at, without its voxels.
+        These, and their components.
     order : (int, int, int)
         Which of the study's axes (K, J, I) its slices, rows and columns are.
     corner : (3,) int64 array
@@ -53,8 +53,8 @@ class Kept:
         What the report has of it.
     """
 
+    selected: Selected
     runs: Runs
-    grid: Volume
     order: tuple[int, int, int]
     corner: Longs
     told: dict[str, Any]
@@ -67,7 +67,7 @@ class Kept:
         order = order_along(AXES.index(selected.plane))
         corner = np.rint(volume.to_indices(selected.study.affine[None, :3, 3])[0, ::-1]).astype(np.int64)
         told = {**chosen.stats, "warnings": list(chosen.warnings)}
-        return cls(Runs.of(selected.chosen.runs, corners=True), selected.study.bare(), order, corner, told)
+        return cls(selected, Runs.of(selected.chosen.runs, corners=True), order, corner, told)
 
     @cached_property
     def largest(self) -> Longs:
@@ -130,8 +130,8 @@ class Kept:
         return {
             "number": number,
             "voxels": voxels,
-            "volume_mm3": voxels * self.grid.voxel_mm3,
-            "roi": box_of(self.grid, np.array(low), np.array(high)),
+            "volume_mm3": voxels * self.selected.study.voxel_mm3,
+            "roi": box_of(self.selected.study, np.array(low), np.array(high)),
             "inside": (inside[np.argsort(self.order)] + self.corner).tolist(),
         }
 

@@ -12,8 +12,9 @@ from ...model.networks import Networks
 from ...progress import silent
 from ...settings import MATTERS
 from ..routes import get, levels, post
+from ..studies import opened_volume
 from .figures import FIGURES
-from .selected import opened_volume, selected_of, slices_of
+from .selected import selected_of, slices_of
 from .trainers import REGIONS, backdrop, head, in_slices, trainer_of
 
 if TYPE_CHECKING:
