@@ -28,7 +28,7 @@ class SurfacePart {
     this.made = 0;
     this.viewer = null;
     this.build(panel);
-    on("state", () => this.update());
+    for (const event of ["state", "progress"]) on(event, () => this.update());
     on("done", ({ name }) => { if (name === "reconstruct") this.load(); });
     on("theme", () => this.viewer?.setDark(isDark()));
     this.cut = eachFrame(() => this.cutNow());
