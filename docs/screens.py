@@ -58,7 +58,10 @@ def work(tab: Any, address: str) -> None:
     keep(tab, "view-study")
     tab.click("#tab-networks")
     tab.click("#net-train")
-    tab.wait_for_selector("#net-caption:has-text('As the run hands it on')")
+    tab.wait_for_selector("#net-train:disabled")
+    tab.wait_for_selector("#net-train:enabled")
+    tab.focus("#net-canvas")
+    tab.keyboard.press("End")
     keep(tab, "view-networks")
     tab.click("#tab-surface")
     tab.click("text=Make the surface")
@@ -68,10 +71,10 @@ def work(tab: Any, address: str) -> None:
 
 
 @contextmanager
-def served(*arguments: str | Path) -> Iterator[str]:
+def served(study: Path, *words: str) -> Iterator[str]:
     """Serve the page, and give its address."""
-    words = [sys.executable, "-m", "tomomesh", "view", *map(str, arguments), "--no-browser"]
-    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, cwd=Path(arguments[0]).parent)
+    command = [sys.executable, "-m", "tomomesh", "view", study.name, *words, "--no-browser"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=study.parent)
     assert process.stderr is not None
     try:
         found = re.search(r"http\S+", process.stderr.readline())
