@@ -1,13 +1,15 @@
-"""What is looked at: a study, points, a mesh, or nothing yet."""
+"""What is looked at: a study, points, a mesh, the folder of a run, or nothing yet."""
 
 from __future__ import annotations
 
+import json
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import io
-from ..errors import UnreadableError
+from ..errors import EmptyError, FormatError, TomomeshError, UnreadableError
 from ..io.files.source import suffix_of
 
 if TYPE_CHECKING:
@@ -19,6 +21,12 @@ if TYPE_CHECKING:
     from ..progress import Progress
     from ..settings import Settings
 
+REPORT, SETTINGS, MESH, POINTS = "report.json", "settings.toml", "mesh", "points"
+"""What a run calls what it leaves in a folder."""
+SLICES = (".dcm", ".ima", "")
+"""Suffixes of slices: where they lie, a mesh and a report lie beside their study."""
+LONGEST = 64 << 20
+"""Bytes of a report that is read: one of a mesh of a million pieces has 20 MB."""
 WHOLE = (".nii", ".nii.gz")
 """Suffixes of label maps with names that are read whole, whichever labels are wanted; of others, only those are."""
 
@@ -30,13 +38,17 @@ class Opened:
     Attributes
     ----------
     kind : str
-        study, points, mesh, or nothing where nothing was opened.
+        study, points, mesh, run (the folder that a run has left), or nothing where nothing was opened.
     words : tuple of str
         What names it on a command line.
     volume, labels : Volume or None
         The study, and a label map beside it; None while it is being read.
     points : PointSet or None
     mesh : TriMesh or None
+    report : mapping
+        What the run that made the mesh has measured; empty where that is not known.
+    repeats : tuple of str
+        What is known of the command that made the mesh.
     names : mapping of int to str
         What the labels of a label map are called.
     refused : str
@@ -51,14 +63,18 @@ class Opened:
     labels: Volume | None = field(default=None, repr=False)
     points: PointSet | None = field(default=None, repr=False)
     mesh: TriMesh | None = field(default=None, repr=False)
+    report: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    repeats: tuple[str, ...] = ()
     names: Mapping[int, str] = field(default_factory=dict)
     refused: str = ""
     flags: tuple[str, ...] = ()
 
-    @property
-    def command(self) -> str:
-        """The command that makes a surface of it."""
-        return {"points": "surface", "mesh": "check"}.get(self.kind, "reconstruct")
+    def command(self, settings: Settings) -> tuple[str, ...]:
+        """Return the words of the command that makes a surface of it, or checks the one that it is."""
+        if self.kind in ("mesh", "run"):
+            return self.repeats or (("check", *self.words) if self.kind == "mesh" else ())
+        name = "surface" if self.kind == "points" else "reconstruct"
+        return (name, *self.words, *settings.words(), "-o", "mesh.stl")
 
     @property
     def ready(self) -> bool:
@@ -91,10 +107,36 @@ def kind_of(path: str) -> str:
     """
     if not Path(path).exists():
         raise UnreadableError("there is no such file or folder", file=path)
+    if Path(path).is_dir():
+        return "run" if is_run(path) else "study"
     suffix = suffix_of(path)
-    if suffix in io.MESH_READERS and suffix not in io.VOLUME_READERS:
+    if _is_mesh(path):
         return "mesh"
     return "points" if suffix in io.POINT_READERS and suffix not in io.VOLUME_READERS else "study"
+
+
+def meshes_of(folder: str | Path) -> list[Path]:
+    """Return the meshes of a folder, by name."""
+    with suppress(OSError):
+        return sorted(path for path in Path(folder).iterdir() if _is_mesh(path) and path.is_file())
+    return []
+
+
+def is_run(folder: str) -> bool:
+    """Tell whether a folder is what a run has left: meshes with a report or settings, or meshes and no study."""
+    if not meshes_of(folder) or any(suffix_of(path) in SLICES for path in Path(folder).iterdir() if path.is_file()):
+        return False
+    if any(Path(folder, name).is_file() for name in (REPORT, SETTINGS)):
+        return True
+    try:
+        io.find_studies(Path(folder))
+    except TomomeshError:  # there are none
+        return True
+    return False
+
+
+def _is_mesh(path: str | Path) -> bool:
+    return suffix_of(path) in {*io.MESH_READERS} - {*io.VOLUME_READERS}
 
 
 def opened_as(kind: str, path: str, settings: Settings, progress: Progress) -> Opened:
@@ -109,11 +151,68 @@ def opened_as(kind: str, path: str, settings: Settings, progress: Progress) -> O
     read: dict[str, Any] = {
         "study": lambda: _study(path, settings),
         "points": lambda: {"points": io.read_points(path, settings=settings.cloud)},
-        "mesh": lambda: {"mesh": io.read_mesh(path)},
+        "mesh": lambda: _mesh(Path(path)),
+        "run": lambda: _run(Path(path)),
     }
-    found = read[kind]()
+    try:
+        found = read[kind]()
+    except EmptyError:  # a file whose kind may hold points alone
+        if kind != "mesh":
+            raise
+        kind, found = "points", read["points"]()
     progress("read", 1, 1)
     return Opened(kind, (path,), **found)
+
+
+def _run(folder: Path) -> dict[str, Any]:
+    """Read the mesh of a run and its points, where they are there; of several meshes the one that has the run's name.
+
+    Raises
+    ------
+    FormatError
+        Where it cannot be told which mesh is meant.
+    """
+    found = meshes_of(folder)
+    named = [path for path in found if path.stem == MESH] or found
+    if len(named) > 1:
+        raise FormatError("the folder holds several meshes", found=str(len(found)), hint="open one of them")
+    points = [path for path in folder.glob(f"{POINTS}.*") if suffix_of(path) in io.POINT_READERS]
+    read = _mesh(named[0])
+    with suppress(TomomeshError):  # the mesh is there all the same
+        read["points"] = io.read_points(points[0]) if points and read["report"] else None
+    return read
+
+
+def _mesh(path: Path) -> dict[str, Any]:
+    """Read a mesh, and the report and the settings beside it, where they are of this mesh."""
+    mesh = io.read_mesh(path)
+    reports = filter(None, map(_document, (path.with_suffix(".json"), path.with_name(REPORT))))
+    report = next((one for one in reports if _tells_of(one, mesh)), {})
+    return {"mesh": mesh, "report": report, "repeats": _repeats(path, report)}
+
+
+def _document(path: Path) -> dict[str, Any]:
+    with suppress(OSError, ValueError, RecursionError):
+        if path.stat().st_size <= LONGEST:
+            found = json.loads(path.read_bytes())
+            return found if isinstance(found, dict) else {}
+    return {}
+
+
+def _tells_of(report: Mapping[str, Any], mesh: TriMesh) -> bool:
+    """Tell whether a report is of a mesh: it has as many faces, and as many vertices."""
+    quality = report.get("quality")
+    counts = (len(mesh.faces), len(mesh.vertices))
+    return isinstance(quality, dict) and (quality.get("faces"), quality.get("vertices")) == counts
+
+
+def _repeats(path: Path, report: Mapping[str, Any]) -> tuple[str, ...]:
+    """Tell what repeats the run of a mesh; a report names no files, so that what it was made of stays to be named."""
+    settings = next((one for one in (path.with_suffix(".toml"), path.with_name(SETTINGS)) if one.is_file()), None)
+    if not report or settings is None:
+        return ("check", str(path))
+    made = ("reconstruct", "STUDY") if "study" in report else ("surface", "POINTS")
+    return (*made, "--settings", str(settings), "-o", path.name)
 
 
 def _study(path: str, settings: Settings) -> dict[str, Any]:

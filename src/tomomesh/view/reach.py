@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .. import io
 from ..errors import FormatError, UnreadableError, UsageError
 from ..io.files.source import regular_files, suffix_of
-from .opened import kind_of
+from .opened import kind_of, meshes_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -38,12 +38,17 @@ class Reach:
         UsageError
             For one that may not, whether there is such a file or not.
         """
-        if path in self.named or self._in_folder(path):
+        if path in self.named or path in self._meshes or self._in_folder(path):
             return path
         raise UsageError(
             "only files that were named on the command line can be opened", found="another path",
             hint="tomomesh view --browse FOLDER, for all in a folder",
         )  # fmt: skip
+
+    @property
+    def _meshes(self) -> list[str]:
+        """The meshes of folders of runs that were named."""
+        return [str(mesh) for path in self.named if kind_of(path) == "run" for mesh in meshes_of(path)]
 
     def _in_folder(self, path: str) -> bool:
         if self.folder is None:
@@ -56,7 +61,7 @@ class Reach:
     def listed(self) -> list[dict[str, Any]]:
         """List what may be opened: paths, names, what each is, and its number where a folder holds several series."""
         named = [{"path": path, "name": Path(path).resolve().name, "kind": kind_of(path), "series": None}
-                 for path in self.named]  # fmt: skip
+                 for path in (*self.named, *self._meshes)]  # fmt: skip
         return named + ([] if self.folder is None else [*_studies(self.folder), *_surfaces(self.folder)])
 
 

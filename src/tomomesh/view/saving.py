@@ -25,7 +25,7 @@ def _formats(session: Session) -> dict[str, list[str]]:
     """List what can be saved of what there is, each with its formats, the usual one first."""
     formats = {SETTINGS: [".toml"]}
     if WORK in session.made and session.write is not None:
-        formats |= {"mesh": [*io.MESH_WRITERS], "points": [*io.POINT_WRITERS], "report": [".json"]}
+        formats |= {"mesh": [*io.MESH_WRITERS], "points": [*io.POINT_WRITERS], "report": [".html", ".json"]}
         if surface_of(session).segmentation is not None:
             formats |= {"mask": [*io.LABEL_WRITERS], "labels": [*io.LABEL_WRITERS]}
     return formats
@@ -43,7 +43,8 @@ def _save(session: Session, name: str) -> Response:
         else:
             made = session.made[WORK]
             assert session.write is not None
-            session.write(what, made.value, Settings().replace(**made.choices), path)
+            settings = Settings().replace(**made.choices)
+            session.write(what, made.value, settings, path, session.opened.command(settings))
         data = path.read_bytes()
     headers = {"content-disposition": f'attachment; filename="{what}{suffix}"'}
     return Response(data, media_type="application/octet-stream", headers=headers)

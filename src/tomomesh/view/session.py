@@ -16,13 +16,13 @@ from .reach import Reach
 from .remembered import Remembered
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from ..progress import Progress
     from ..results import Surface
 
-    Write = Callable[[str, Surface, Settings, Path], None]
+    Write = Callable[[str, Surface, Settings, Path, Sequence[str]], None]
 
 MOST = 200
 """Choices that can be taken back."""
@@ -79,7 +79,8 @@ class Session:
     jobs : Jobs
     events : Events
     write : callable, optional
-        Writes a file of a surface as the command line does: what of it, the surface, its settings, the path.
+        Writes a file of a surface as the command line does: what of it, the surface, its settings, the
+        path, and the words of the command that repeats it.
     reach : Reach
         What may be opened.
     surveys, selections : Remembered
@@ -109,8 +110,8 @@ class Session:
         if self.opened.kind == "nothing":
             made = self.made.get("train")
             return "" if made is None else str(made.value.command)
-        words = ["tomomesh", self.opened.command, *self.opened.words, *self.settings.words(), "-o", "mesh.stl"]
-        return shlex.join(words)
+        words = self.opened.command(self.settings)
+        return shlex.join(["tomomesh", *words]) if words else ""
 
     @property
     def state(self) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def _series(session: Session) -> dict[str, Any]:
 
 
 def _open(session: Session, body: Any) -> dict[str, Any]:
-    """Open a study, points or a mesh that may be opened; ``path``, and the number of its ``series``."""
+    """Open a study, points, a mesh or a run that may be opened; ``path``, and the number of its ``series``."""
     if not isinstance(body, dict) or not isinstance(body.get("path"), str):
         raise UsageError("nothing to open was named", expected='{"path": ..., "series": ...}')
     path = session.reach.check(body["path"])

@@ -13,8 +13,10 @@ from ..errors import UsageError
 from ..html.places import problems_of
 from ..html.scene import Scene, scene_of_mesh, scene_of_points, scene_of_quads
 from ..html.three import three_js
+from ..measure.intersections import self_intersections
 from ..measure.report import assess
 from ..measure.section import section
+from ..measure.winding import linings
 from ..model.mesh import TriMesh
 from ..model.volume import AXES
 from ..pipeline import reconstruct, reconstruct_points
@@ -24,9 +26,10 @@ from . import coloring
 from .routes import get, levels, post
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from ..progress import Progress
+    from .opened import Opened
     from .session import Session
 
 WORK = "reconstruct"
@@ -88,18 +91,30 @@ def mesh_of(session: Session) -> TriMesh:
 
 def _report(session: Session) -> dict[str, Any]:
     """Tell what was measured, and what of it a user should know first, with its places."""
-    opened = session.opened.mesh
-    report: Mapping[str, Any] = surface_of(session).report if opened is None else {"quality": assess(opened)}
-    crossing = None if opened is not None else surface_of(session).crossing
-    mesh = mesh_of(session)
-    problems = problems_of(report, mesh, crossing if crossing is None or len(crossing) == len(mesh.faces) else None)
-    return {"report": report, "problems": [asdict(one) for one in problems], "stages": _stages(session)}
+    if session.opened.mesh is not None:
+        return {**session.surveys.of("report", partial(_checked, session.opened)), "stages": _stages(session)}
+    surface = surface_of(session)
+    crossing = surface.crossing
+    known = crossing is not None and len(crossing) == len(surface.mesh.faces)
+    problems = problems_of(surface.report, surface.mesh, crossing if known else None)
+    return {"report": surface.report, "problems": [asdict(one) for one in problems], "stages": _stages(session)}
+
+
+def _checked(opened: Opened) -> dict[str, Any]:
+    """Tell of a mesh that was opened: what its run has measured, or what `tomomesh check` does."""
+    assert opened.mesh is not None
+    report = opened.report or assess(opened.mesh, cavities=linings(opened.mesh))
+    crosses = report.get("quality", report).get("self_intersections")
+    problems = problems_of(report, opened.mesh, self_intersections(opened.mesh) if crosses else None)
+    return {"report": report, "problems": [asdict(one) for one in problems]}
 
 
 def _stages(session: Session) -> list[dict[str, Any]]:
     """List the steps that there are of this surface, and how much is in each."""
-    if session.opened.mesh is not None:
-        return [{"name": "fitted", "faces": len(session.opened.mesh.faces)}]
+    opened = session.opened
+    if opened.mesh is not None:
+        points = [] if opened.points is None else [{"name": "points", "faces": len(opened.points)}]
+        return [*points, {"name": "fitted", "faces": len(opened.mesh.faces)}]
     surface = surface_of(session)
     counts = {
         "points": len(surface.points), "cuberille": len(surface.cuberille.quads),
@@ -114,7 +129,8 @@ def _stages(session: Session) -> list[dict[str, Any]]:
 def _mesh(session: Session, stage: str, color: str = "") -> Response:
     """Send a stage as the viewer reads it, with the numbers that color it."""
     if session.opened.mesh is not None:
-        shown: Any = session.opened.mesh
+        points = session.opened.points if stage == "points" else None
+        shown: Any = session.opened.mesh if points is None else scene_of_points(points.positions)
     elif stage in STAGES:
         shown = STAGES[stage](surface_of(session))
     else:

@@ -11,11 +11,14 @@ import numpy as np
 
 from ... import io
 from ...io.files.source import suffix_of
+from ...progress import Progress, silent
 from ...stage import Stage
 from .checks import make_folder
 from .parts import frame_of_part
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from ...model.points import PointSet
@@ -33,19 +36,17 @@ def write_surface(
 
     See `tomomesh.io.write_mesh` for `fits`.
     """
-    stage_one, part = surface.segmentation, surface.part
+    stage_one = surface.segmentation
     frame = frame_asked(surface, chosen.output, settings)
     in_file = _write_mesh(chosen, surface, frame, settings, fits)
-    told: dict[str, dict[str, Any]] = {"written": {"unit": in_file.unit, "frame": in_file.name}}
+    told: dict[str, dict[str, Any]] = {}
     if getattr(chosen, "points", None):
         write_points(surface.points, stage_one, chosen.points, settings, surface.place)
     if stage_one is not None:
         write_stage_one(chosen, stage_one)
     if getattr(chosen, "mask_out", None):
         told["mask"] = _write_mask(surface, chosen.mask_out, settings)
-    surface = replace(surface, stages=(*surface.stages, Stage(None, told)))
-    if part is None:
-        _tell_cavities(surface.report, frame, in_file)
+    surface = _with_frames(surface, frame, in_file, told)
     write_documents(chosen, surface.report, settings)
     html = getattr(chosen, "html", None)
     drawn = draw(chosen.figures, stage_one, surface, settings, progress, kept=bool(html))
@@ -56,8 +57,20 @@ def write_surface(
     return surface
 
 
-def write_one(what: str, surface: Surface, settings: Settings, path: Path) -> None:
-    """Write one file of a surface by itself: its mesh, points, labels, mask or report."""
+def _with_frames(surface: Surface, frame: io.Frame, in_file: io.Frame, told: dict[str, dict[str, Any]]) -> Surface:
+    """Return the surface with a report that tells in which numbers its mesh was written, and what else was told."""
+    written = {"written": {"unit": in_file.unit, "frame": in_file.name}}
+    surface = replace(surface, stages=(*surface.stages, Stage(None, written | told)))
+    if surface.part is None:
+        _tell_cavities(surface.report, frame, in_file)
+    return surface
+
+
+def write_one(what: str, surface: Surface, settings: Settings, path: Path, words: Sequence[str]) -> None:
+    """Write one file of a surface by itself: its mesh, points, labels, mask or report.
+
+    The report is that of the command whose words are given.
+    """
     if what == "mesh":
         chosen = Namespace(output=path, patient=False)
         _write_mesh(chosen, surface, frame_asked(surface, path, settings), settings, None)
@@ -66,10 +79,24 @@ def write_one(what: str, surface: Surface, settings: Settings, path: Path) -> No
     elif what == "mask":
         _write_mask(surface, path, settings)
     elif what == "report":
-        io.write_document(surface.report, path)
+        _write_report(surface, settings, path, words)
     else:
         assert surface.segmentation is not None
         io.write_labels(surface.segmentation.labels, surface.segmentation.volume, path)
+
+
+def _write_report(surface: Surface, settings: Settings, path: Path, words: Sequence[str]) -> None:
+    """Write the report of a surface as a page or as JSON."""
+    from .html import write_surface_html
+
+    output = words[-1]
+    frame = frame_asked(surface, output, settings)
+    surface = _with_frames(surface, frame, io.frame_in_file(output, unit=frame.unit, frame=frame.name), {})
+    if suffix_of(path) == ".html":
+        chosen = Namespace(output=output, html=path, words=(*words, "--html", path.name))
+        write_surface_html(chosen, surface, draw(None, surface.segmentation, surface, settings, silent, kept=True))
+    else:
+        io.write_document(surface.report, path)
 
 
 def _write_mesh(
@@ -178,7 +205,7 @@ def draw(
     stage_one: Segmentation[Any] | None,
     surface: Surface | None,
     settings: Settings,
-    progress: Bars,
+    progress: Progress,
     *,
     kept: bool = False,
 ) -> dict[str, bytes]:

@@ -12,7 +12,7 @@ const WHAT = {
   points: ["The points", "neurons, bridged gaps and caps"],
   mask: ["The voxels inside the mesh", "a label map on the study's own grid"],
   labels: ["The regions of the networks", "a label map on the study's own grid"],
-  report: ["The report", "every number that was measured"],
+  report: ["The report", "as a page that opens anywhere (html), or its numbers (json)"],
   settings: ["The settings", "for --settings, to repeat or to hand on"],
 };
 

@@ -19,7 +19,7 @@ export const keys = [
   ["+, -, Ctrl + wheel", "zoom; drag with the middle button"], ["C, P, B", "what a click does: crosshair, pick, box"], ["Enter", "pick what is under the crosshair"],
   ["right button", "contrast: sideways the width, up and down the level"],
 ];
-export const applies = (kind, opened) => kind === "study" || kind === "nothing" || opened.browses;
+export const applies = (kind, opened) => kind === "study" || kind === "nothing" || opened.browses || (kind === "run" && !opened.ready);
 
 const TOOLS = { cross: "Crosshair (C)", pick: "Pick (P)", box: "Box (B)" };
 const HELD = 72;
@@ -179,7 +179,7 @@ function showAll(page) {
   page.study.hidden = !there;
   page.showOpening.hidden = !(state.opened.browses || "series" in state.choices);
   page.study.classList.toggle("labels", isLabels());
-  page.opening.element.hidden = there || state.opened.kind === "study" && !state.opened.ready && !state.opened.refused;
+  page.opening.element.hidden = there || ["study", "run"].includes(state.opened.kind) && !state.opened.ready && !state.opened.refused;
   if (!page.opening.element.hidden) page.opening.show();
   if (!looked.geometry) return;
   for (const part of Object.values(page.parts)) part.show();

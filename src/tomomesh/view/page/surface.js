@@ -28,7 +28,7 @@ class SurfacePart {
     this.made = 0;
     this.viewer = null;
     this.build(panel);
-    on("state", () => this.update());
+    for (const event of ["state", "progress"]) on(event, () => this.update());
     on("done", ({ name }) => { if (name === "reconstruct") this.load(); });
     on("theme", () => this.viewer?.setDark(isDark()));
     this.cut = eachFrame(() => this.cutNow());
@@ -80,13 +80,22 @@ class SurfacePart {
 
   update() {
     const { opened, made, job } = state;
-    this.make.hidden = opened.kind === "mesh";
+    this.make.hidden = isMesh(opened);
     this.make.disabled = Boolean(job) || !opened.ready;
     this.make.textContent = "reconstruct" in made ? "Make it again" : "Make the surface";
     const stale = made.reconstruct === false;
     this.hint.textContent = stale ? "Choices have changed since this surface was made." : this.size || "";
     this.cutting.hidden = opened.kind !== "study";
-    if (!("reconstruct" in made) && opened.kind !== "mesh" && this.stages.length) this.clear();
+    this.empty.textContent = opened.refused || (opened.ready ? "No surface yet." : "Reading ...");
+    if (opened.turn !== this.turn) this.turnTo(opened);
+    if (!("reconstruct" in made) && !isMesh(opened) && this.stages.length) this.clear();
+  }
+
+  /** Show what else was opened, where it is a mesh that has been read. */
+  turnTo(opened) {
+    this.turn = opened.turn;
+    if (this.stages.length) this.clear();
+    if (isMesh(opened) && opened.ready) this.load();
   }
 
   clear() {
@@ -95,13 +104,16 @@ class SurfacePart {
     this.viewer = null;
     this.empty.hidden = false;
     fill(this.told);
+    fill(this.steps);
+    this.size = "";
   }
 
   async load() {
-    const known = state && ("reconstruct" in state.made || (state.opened.kind === "mesh" && state.opened.ready));
+    const known = state && ("reconstruct" in state.made || (isMesh(state.opened) && state.opened.ready));
     const found = known && (await trying(get("/api/report")));
     if (!found) return;
     this.stages = found.stages;
+    for (const option of this.color.options) option.hidden = isMesh(state.opened) && ["distance", "filled"].includes(option.value);
     this.step.max = this.stages.length - 1;
     this.step.value = this.step.max;
     fill(this.steps, ...this.stages.map(({ name }) => el("span", {}, NAMES[name])));
@@ -109,7 +121,6 @@ class SurfacePart {
     if (state.opened.kind === "study") this.planes = (await trying(get("/api/planes")))?.planes;
     await this.showStage();
   }
-
 
   async showStage() {
     const stage = this.stages[Number(this.step.value)];
@@ -167,6 +178,11 @@ class SurfacePart {
 async function bytesOf(answer) {
   if (answer.ok) return answer.arrayBuffer();
   throw new Error((await answer.json()).error);
+}
+
+/** Whether what is opened is a mesh, alone or in the folder of its run. */
+function isMesh({ kind }) {
+  return kind === "mesh" || kind === "run";
 }
 
 function isDark() {
