@@ -14,6 +14,7 @@ from ...io.files.source import suffix_of
 from ...stage import Stage
 from .checks import make_folder
 from .parts import frame_of_part
+from .slicer import write_scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,6 +37,8 @@ def write_surface(
     stage_one, part = surface.segmentation, surface.part
     frame = frame_asked(surface, chosen.output, settings)
     in_file = _write_mesh(chosen, surface, frame, settings, fits)
+    if getattr(chosen, "slicer", None) and stage_one is not None:
+        write_scene(chosen, frame, settings, color=stage_one.volume.layers > 1)
     told: dict[str, dict[str, Any]] = {"written": {"unit": in_file.unit, "frame": in_file.name}}
     if getattr(chosen, "points", None):
         write_points(surface.points, stage_one, chosen.points, settings, surface.place)
