@@ -215,7 +215,7 @@ class Surface(Reported):
         return f"Surface({self.way or 'no way'}, {len(mesh.faces):,} faces, {len(mesh.vertices):,} vertices)"
 
     def to_napari_layers(self) -> list[Layer]:
-        """Return what napari draws, as its layer data tuples: ``viewer.add_layer(napari.layers.Layer.create(*one))``.
+        """Return what napari draws, as its layer data tuples, which its layers are created from.
 
         Returns
         -------

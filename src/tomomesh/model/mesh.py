@@ -101,7 +101,7 @@ class TriMesh:
         return total / np.where(length > 0, length, 1.0)
 
     def to_pyvista(self) -> Any:
-        """Return a `pyvista.PolyData` of the same vertices and faces, in arrays of its own.
+        """Return PyVista's ``PolyData`` of the same vertices and faces, in arrays of its own.
 
         Raises
         ------
@@ -111,7 +111,7 @@ class TriMesh:
         return _package("pyvista").PolyData.from_regular_faces(self.vertices.copy(), self.faces.copy())
 
     def to_trimesh(self) -> Any:
-        """Return a `trimesh.Trimesh` of the same vertices and faces, in arrays of its own; none is merged or dropped.
+        """Return trimesh's ``Trimesh`` of the same vertices and faces, in arrays of its own; none is merged or dropped.
 
         Examples
         --------
