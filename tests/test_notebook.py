@@ -63,6 +63,19 @@ def test_measures_what_it_says(executed: NotebookNode) -> None:
     assert 11 <= found["slices_with_gaps"] <= 12
 
 
+def test_a_result_shows_itself(written: NotebookNode, executed: NotebookNode) -> None:
+    """In 3-D where it is run; the copy in the repository is without the frame, and so without three.js."""
+    kept, made = (
+        next(cell.outputs[0].data for cell in notebook.cells if cell.id == "cell-shown")
+        for notebook in (written, executed)
+    )
+    words, frame = made["text/html"].split("<iframe ")
+    assert kept["text/html"] == f"{words}</div>\n"
+    assert 'sandbox="allow-scripts"' in frame
+    assert kept["text/markdown"] == made["text/markdown"]
+    assert kept["text/plain"] == made["text/plain"]
+
+
 def test_draws_its_figures(executed: NotebookNode) -> None:
     kinds = [
         kind

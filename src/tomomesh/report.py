@@ -6,10 +6,13 @@ import platform
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .settings import Settings
 from .stage import Later, Stage, folded
+
+if TYPE_CHECKING:
+    from .html.inline import Shown
 
 BEFORE = ("way", "study", "window", "networks", "rings", "points", "cubes", "stack", "voxels", "space")
 AFTER = ("surface", "fit", "smooth", "remesh", "quality", "written", "mask", "print", "truth")
@@ -39,6 +42,26 @@ class Reported:
     def report(self) -> dict[str, Any]:
         """What the stages found and how good the result is, key by key in docs/report.md; measured on first use."""
         return report_of(self.stages, self.settings)
+
+    def _repr_html_(self) -> str:
+        """Show it in a notebook."""
+        from .html.inline import inline
+
+        return inline(self._shown())
+
+    def _repr_markdown_(self) -> str:
+        """Show it on paper, made of a notebook."""
+        from .html.inline import in_markdown
+
+        return in_markdown(self._shown())
+
+    def _shown(self) -> Shown:
+        """Return what is told of it: here its verdict and first facts."""
+        from .html.inline import Shown, facts_of
+        from .html.verdict import verdict_of
+
+        unit = self.report.get("points", {}).get("unit", "mm")
+        return Shown("Surface", verdict_of(self.report).words, facts_of(self.report, unit))
 
 
 def report_of(stages: tuple[Stage[Any] | Later, ...], settings: Settings) -> dict[str, Any]:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .followed import Followed
+    from .html.inline import Shown
     from .isosurface.crossings import Levels
     from .model.cubes import CubeGrid
     from .model.mesh import TriMesh
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from .segmentation.sample import Sampling
 
     Regions = NDArray[np.unsignedinteger[Any]]
+    Layer = tuple[Any, dict[str, Any], str]
 
 S = TypeVar("S")
 
@@ -80,6 +82,17 @@ class Segmentation(Reported, Generic[S]):
     def labels(self) -> Regions:
         """Every window pixel's winner, (K, J, I): 0 background, neuron + 1 within its slice; found on first use."""
         return self.regions() if callable(self.regions) else self.regions
+
+    def __repr__(self) -> str:
+        return f"Segmentation({self.way or 'no way'}, {len(self.points.positions):,} points of {self.volume!r})"
+
+    def _shown(self) -> Shown:
+        from .html.inline import MOST, Shown
+        from .html.scene import scene_of_points
+
+        facts = [("way", self.way), ("study", repr(self.volume)), ("plane", self.plane)]
+        words = f"{self.runs.count:,} voxels are kept, and {len(self.points.positions):,} points lie on them."
+        return Shown("Segmentation", words, facts, scene_of_points(self.points.positions, most=MOST))
 
     def without_voxels(self) -> Segmentation[S]:
         """Return the same without the study's voxels, where its way does not go on by them."""
@@ -131,6 +144,11 @@ class Place:
         """The frame as a file names it."""
         corner = ",".join(repr(axis).removesuffix(".0") for axis in self.origin)
         return f"local:{corner}" if self.local else self.frame
+
+    @property
+    def words(self) -> str:
+        """What its numbers are."""
+        return f"{'of an unknown unit' if self.unit == 'unknown' else self.unit}, as in the points"
 
 
 @dataclass(frozen=True)
@@ -192,6 +210,43 @@ class Surface(Reported):
     place: Place | None = None
     part: Part | None = None
 
+    def __repr__(self) -> str:
+        mesh = self.mesh
+        return f"Surface({self.way or 'no way'}, {len(mesh.faces):,} faces, {len(mesh.vertices):,} vertices)"
+
+    def to_napari_layers(self) -> list[Layer]:
+        """Return what napari draws, as its layer data tuples, which its layers are created from.
+
+        Returns
+        -------
+        list of (data, options, kind)
+            The study's voxels, where they are in memory, with the affine that places them; the points; the mesh. All
+            axes are in napari's order: z, y, x, in millimeters of the patient (LPS), or as the cloud's.
+        """
+        found = self.segmentation
+        points = (self.points.positions[:, ::-1].copy(), {"name": "points", "size": self._spacing}, "points")
+        surface = ((self.mesh.vertices[:, ::-1].copy(), self.mesh.faces.copy()), {"name": "mesh"}, "surface")
+        return [*([] if found is None else _image_of(found.volume)), points, surface]
+
+    @property
+    def _spacing(self) -> float:
+        """The narrowest spacing of the study's voxels, or half of the mean edge of the mesh."""
+        if self.segmentation is not None:
+            return min(self.segmentation.volume.spacing_mm)
+        a, b = self.mesh.vertices[self.mesh.edges.T]
+        return float(np.linalg.norm(a - b, axis=1).mean() / 2) if len(a) else 1.0
+
+    def _shown(self) -> Shown:
+        from .html.inline import MOST
+        from .html.scene import PATIENT, PLAIN, scene_of_mesh
+
+        mesh, unit, axes, told = self.mesh, "mm", PATIENT, super()._shown()
+        if self.part is not None:
+            mesh, told = self.part.mesh, replace(told, frame="millimeters of the part to print")
+        elif self.place is not None:
+            unit, axes, told = self.place.unit, PLAIN, replace(told, frame=self.place.words)
+        return replace(told, scene=scene_of_mesh(mesh, most=MOST, unit=unit, axes=axes))
+
     def bare(self) -> Surface:
         """Return the same without what is only shown of how it came about."""
         none = QuadMesh(np.empty((0, 3)), np.empty((0, 4), np.int64))
@@ -212,3 +267,11 @@ class Surface(Reported):
         _, nearest = Tree.of_points(self.points.positions).nearest(self.mesh.vertices)
         on_cap = self.points.kinds[nearest] == CAP
         return any_of(on_cap[self.mesh.faces])
+
+
+def _image_of(volume: Volume) -> list[Layer]:
+    """Return a study as a layer of napari's; none where its voxels were given up or stay in their file."""
+    if volume.in_parts is not None or not any(volume.voxels.strides):
+        return []
+    affine = volume.affine[np.ix_([2, 1, 0, 3], [2, 1, 0, 3])]
+    return [(volume.voxels, {"name": "study", "affine": affine, "rgb": volume.layers > 1}, "image")]

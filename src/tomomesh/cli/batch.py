@@ -37,7 +37,7 @@ USUAL = "stl"
 """Format of the meshes where none is asked for."""
 OF_ONE = ("memory", "slab", "pieces", "neuroglancer")
 """Options of one study that is worked on slab by slab."""
-SINGLE = ("labels_in", "points", "labels", "mask_out", "figures", "report", *OF_ONE)
+SINGLE = ("labels_in", "points", "labels", "mask_out", "figures", "report", "slicer", *OF_ONE)
 """Options of one study, which a batch has no place for."""
 
 

@@ -30,6 +30,7 @@ from .outputs.checks import (
     make_folder,
 )
 from .outputs.parts import frame_of_mesh, frame_of_part
+from .outputs.slicer import check_place, check_scene
 from .outputs.write import (
     draw,
     draw_network,
@@ -114,11 +115,13 @@ def _reconstruct(chosen: Namespace) -> None:
 def _reconstruct_one(chosen: Namespace, settings: Settings) -> Surface:
     check_outputs(chosen, OF_STUDIES, *sources_of(chosen, settings))
     check_frame(chosen.output, settings)
+    check_scene(chosen, settings)
     from ..pipeline import reconstruct, reconstruct_once
 
     def read() -> tuple[Volume, Volume | None]:
         volume, labels = read_study(chosen, settings, progress)
         check_archive(chosen, volume)
+        check_place(chosen, settings, volume)
         return volume, labels
 
     with bars_of(chosen) as progress:

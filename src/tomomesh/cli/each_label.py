@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     Make = Callable[[int, Namespace, Settings], Surface]
 
 OPTION = "--each-label"
-SINGLE = ("each", "points", "labels", "mask_out", "figures", "report", *OF_ONE)
+SINGLE = ("each", "points", "labels", "mask_out", "figures", "report", "slicer", *OF_ONE)
 """Options that have no place beside labels that are each a mesh."""
 
 

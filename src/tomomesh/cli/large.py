@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 IN_SLABS = ("workers", "scheduler", *OF_ONE)
 """Options of one study by which it is worked on slab by slab."""
-WHOLE = ("points", "labels", "mask_out", "figures", "html", "patient")
+WHOLE = ("points", "labels", "mask_out", "figures", "html", "slicer", "patient")
 """Results that need the study whole."""
 
 

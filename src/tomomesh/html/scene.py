@@ -75,6 +75,8 @@ class Scene:
         Name to `Values` at the vertices.
     of_faces : int
         Faces of what is shown, before it was decimated.
+    of_points : int
+        Points of what is shown without faces, before it was thinned out.
     unit : str
     axes : three pairs of str
         Names of the ends of x, y and z, the negative first.
@@ -87,6 +89,7 @@ class Scene:
     lines: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), np.int64))
     values: Mapping[str, Values] = field(default_factory=dict)
     of_faces: int = 0
+    of_points: int = 0
     unit: str = "mm"
     axes: tuple[tuple[str, str], ...] = PATIENT
     flat: bool = False
@@ -95,6 +98,18 @@ class Scene:
     def decimated(self) -> bool:
         """Whether fewer faces are shown than there are."""
         return len(self.faces) < self.of_faces
+
+    @property
+    def words(self) -> str:
+        """Say how much of it is shown."""
+        if not self.of_faces:
+            return f"{len(self.vertices):,} of {self.of_points:,} points are shown."
+        if not self.decimated:
+            return f"All {self.of_faces:,} faces of the mesh are shown."
+        return (
+            f"For show, {len(self.faces):,} faces stand for the {self.of_faces:,} of the mesh: small details are lost "
+            "here, not in the mesh itself."
+        )
 
     def packed(self) -> bytes:
         """Return the bytes that the viewer reads; see the head of this module."""
@@ -158,9 +173,13 @@ def scene_of_quads(quads: QuadMesh, *, unit: str = "mm", axes: tuple[tuple[str, 
     return Scene(quads.vertices, faces, quads.edges, of_faces=len(faces), unit=unit, axes=axes, flat=True)
 
 
-def scene_of_points(positions: Floats, *, unit: str = "mm", axes: tuple[tuple[str, str], ...] = PATIENT) -> Scene:
-    """Return what is shown of points (n, 3)."""
-    return Scene(positions, np.empty((0, 3), np.int64), unit=unit, axes=axes)
+def scene_of_points(
+    positions: Floats, *, most: int | None = None, unit: str = "mm", axes: tuple[tuple[str, str], ...] = PATIENT
+) -> Scene:
+    """Return what is shown of points (n, 3): all, or of more than `most` every second, third and so on."""
+    step = 1 if most is None else -(-len(positions) // most) or 1
+    none = np.empty((0, 3), np.int64)
+    return Scene(positions[::step], none, of_points=len(positions), unit=unit, axes=axes)
 
 
 def _frame(vertices: Floats) -> tuple[Floats, float]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import ResourceError
 from .columns import for_kernels, parts_of
 
 if TYPE_CHECKING:
@@ -98,6 +100,29 @@ class TriMesh:
         length = np.sqrt((total**2).sum(axis=1, keepdims=True))
         return total / np.where(length > 0, length, 1.0)
 
+    def to_pyvista(self) -> Any:
+        """Return PyVista's ``PolyData`` of the same vertices and faces, in arrays of its own.
+
+        Raises
+        ------
+        ResourceError
+            Where PyVista is not installed.
+        """
+        return _package("pyvista").PolyData.from_regular_faces(self.vertices.copy(), self.faces.copy())
+
+    def to_trimesh(self) -> Any:
+        """Return trimesh's ``Trimesh`` of the same vertices and faces, in arrays of its own; none is merged or dropped.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from tomomesh import TriMesh
+        >>> corner = TriMesh(np.eye(4, 3, -1), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+        >>> corner.to_trimesh().is_watertight
+        True
+        """
+        return _package("trimesh").Trimesh(self.vertices.copy(), self.faces.copy(), process=False)
+
 
 @dataclass(frozen=True)
 class QuadMesh:
@@ -129,3 +154,19 @@ def _once_each(directed: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     n = max(count, 1)
     keys = np.unique(directed.min(axis=1) * n + directed.max(axis=1))
     return np.stack([keys // n, keys % n], axis=1)
+
+
+def _package(name: str) -> Any:
+    """Import a program's package that a mesh is handed to.
+
+    Raises
+    ------
+    ResourceError
+        Where it is not installed.
+    """
+    try:
+        return import_module(name)
+    except ImportError:
+        raise ResourceError(
+            "the mesh cannot be handed on", found=f"{name} = not installed", hint=f"pip install {name}"
+        ) from None

@@ -63,7 +63,7 @@ def _reconstruct(commands: Any) -> None:
     add_streams(main, STUDY_FORMATS, STUDY_MESH_FORMATS)
     add_each(main)
     add_scale(main)
-    add_outputs(main, "points", "labels", "mask_out", "figures", "html").add_argument(
+    add_outputs(main, "points", "labels", "mask_out", "figures", "html", "slicer").add_argument(
         "--patient", action="store_true", help="copy the patient's fields of a DICOM study into MESH.dcm"
     )
     add_settings(main, (*STAGE_ONE, *STAGE_TWO, "run"))

@@ -118,6 +118,7 @@ def add_outputs(parser: argparse.ArgumentParser, *files: str) -> Any:
         "mask_out": ("FILE", f"write the voxels inside the mesh on the study's own grid: {LABEL}"),
         "figures": ("FOLDER", "write the pictures"),
         "html": ("FILE.html", HTML),
+        "slicer": ("FILE.mrml", "write a scene that opens study and mesh together in 3D Slicer"),
     }
     group = parser.add_argument_group("More results")
     for name in files:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ... import io
 from ...errors import OutputError, UsageError
 from ...io.files.source import suffix_of
+from ...io.slicer import SCENES
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -63,6 +64,7 @@ def check_files(chosen: Namespace, *taken: str) -> None:
         "mask_out": io.LABEL_WRITERS,
         "report": (".json",),
         "html": PAGES,
+        "slicer": SCENES,
         "save_settings": (".toml",),
     }
     names = list(taken)

@@ -130,8 +130,7 @@ def _frame(surface: Surface) -> str:
     if surface.part is not None:
         return "millimeters of the part to print"
     if surface.place is not None:
-        unit = surface.place.unit
-        return f"{'of an unknown unit' if unit == 'unknown' else unit}, as in the points"
+        return surface.place.words
     return "millimeters of the patient (LPS: to the left, to the back, up)"
 
 

@@ -15,6 +15,7 @@ from ...progress import Progress, silent
 from ...stage import Stage
 from .checks import make_folder
 from .parts import frame_of_part
+from .slicer import write_scene
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,6 +40,8 @@ def write_surface(
     stage_one = surface.segmentation
     frame = frame_asked(surface, chosen.output, settings)
     in_file = _write_mesh(chosen, surface, frame, settings, fits)
+    if getattr(chosen, "slicer", None) and stage_one is not None:
+        write_scene(chosen, frame, settings, color=stage_one.volume.layers > 1)
     told: dict[str, dict[str, Any]] = {}
     if getattr(chosen, "points", None):
         write_points(surface.points, stage_one, chosen.points, settings, surface.place)

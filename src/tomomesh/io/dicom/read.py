@@ -118,6 +118,24 @@ def _left(stack: Stack) -> tuple[str, ...]:
     return (f"the distance of the slices is now {apart:.4g} mm, from the first to the last {reach:.4g} mm",)
 
 
+def files_of_series(files: list[Path], settings: ReadSettings, *, study: str) -> list[Path]:
+    """Return the files of the series that `read_dicom` would take, in the order of their slices.
+
+    None where no file holds slices of gray levels, as of a segmentation.
+
+    Raises
+    ------
+    FormatError, GeometryError
+        As that does.
+    """
+    frames = read_frames(files).frames
+    if not frames:
+        return []
+    choice = choose(frames, settings.series, folder=study)
+    stack = stacked(choice.frames, settings, study=study)
+    return [*dict.fromkeys(frame.path for place in stack.places for frame in place)]
+
+
 def list_stacks(files: list[Path]) -> list[int]:
     """Return the numbers of the series among some files that could be a study each, for ``ReadSettings.series``."""
     return stacks_among(read_frames(files).frames)
