@@ -109,8 +109,8 @@ class Session:
         if self.opened.kind == "nothing":
             made = self.made.get("train")
             return "" if made is None else str(made.value.command)
-        words = ["tomomesh", self.opened.command, *self.opened.words, *self.settings.words(), "-o", "mesh.stl"]
-        return shlex.join(words)
+        written = [] if self.opened.kind == "mesh" else [*self.settings.words(), "-o", "mesh.stl"]
+        return shlex.join(["tomomesh", self.opened.command, *self.opened.words, *written])
 
     @property
     def state(self) -> dict[str, Any]:

@@ -93,13 +93,13 @@ def _report(session: Session) -> dict[str, Any]:
     crossing = None if opened is not None else surface_of(session).crossing
     mesh = mesh_of(session)
     problems = problems_of(report, mesh, crossing if crossing is None or len(crossing) == len(mesh.faces) else None)
-    return {"report": report, "problems": [asdict(one) for one in problems], "stages": _stages(session)}
+    return {"report": report, "problems": [asdict(one) for one in problems]}
 
 
-def _stages(session: Session) -> list[dict[str, Any]]:
-    """List the steps that there are of this surface, and how much is in each."""
+def _stages(session: Session) -> dict[str, Any]:
+    """List the steps that there are of this surface, and how much is in each: quick, however long measuring takes."""
     if session.opened.mesh is not None:
-        return [{"name": "fitted", "faces": len(session.opened.mesh.faces)}]
+        return {"stages": [{"name": "fitted", "faces": len(session.opened.mesh.faces)}]}
     surface = surface_of(session)
     counts = {
         "points": len(surface.points), "cuberille": len(surface.cuberille.quads),
@@ -108,7 +108,7 @@ def _stages(session: Session) -> list[dict[str, Any]]:
     }  # fmt: skip
     if surface.smoothed is surface.mesh:
         del counts["smoothed"]
-    return [{"name": name, "faces": count} for name, count in counts.items() if count]
+    return {"stages": [{"name": name, "faces": count} for name, count in counts.items() if count]}
 
 
 def _mesh(session: Session, stage: str, color: str = "") -> Response:
@@ -158,6 +158,7 @@ def _three(session: Session) -> Response:
 
 ROUTES = [
     post("/api/reconstruct", _reconstruct),
+    get("/api/stages", _stages),
     get("/api/report", _report),
     get("/mesh/{stage}", _mesh),
     get("/outline/{plane}/{k:int}", _outline),
