@@ -92,3 +92,7 @@ def test_the_state_says_whether_what_was_made_is_of_these_choices() -> None:
     assert session.state["made"] == {"reconstruct": True}
     assert session.choose({"neurons": 41})["made"] == {"reconstruct": False}
     assert session.undo()["made"] == {"reconstruct": True}
+
+
+def test_a_mesh_is_checked_which_writes_no_mesh() -> None:
+    assert Session(Opened("mesh", ("a mesh.stl",))).command == "tomomesh check 'a mesh.stl'"

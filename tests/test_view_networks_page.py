@@ -28,6 +28,12 @@ SEEN = """() => {
     new MutationObserver(look).observe(player, { attributes: true });
 }"""
 """Notes which frames the page has drawn."""
+NEXT_FRAMES = """() => new Promise((done) => {
+    let left = 60;
+    const tick = () => { if (left--) requestAnimationFrame(tick); else done(); };
+    tick();
+})"""
+"""Waits for 60 frames: at 10 a second, a training that plays has shown several of its own."""
 SAID = 60_000
 """Milliseconds within which the page says what it shall, on whatever machine."""
 TITLES = {
@@ -134,6 +140,17 @@ def test_a_class_plays_the_figures_without_a_study() -> None:
         expect(seen.locator("#net-relief")).not_to_have_js_property("naturalHeight", 0)
         seen.locator(".net-figures button", has_text="4").first.click()
         seen.wait_for_selector("#net-canvas:visible")
+        assert "LT < k <= HT" in seen.inner_text("#net-caption")
+
+
+def test_a_still_figure_is_not_taken_over_by_a_training_that_plays() -> None:
+    with served() as page, looking_at(page) as seen:
+        seen.wait_for_selector("#net-train:enabled")
+        seen.locator(".net-figures button", has_text="2").first.click()
+        until(seen, re.compile("^Presentation [1-9]"))
+        seen.locator(".net-figures button", has_text="4").first.click()
+        expect(seen.locator("#net-caption")).to_contain_text("LT < k <= HT")
+        seen.evaluate(NEXT_FRAMES)
         assert "LT < k <= HT" in seen.inner_text("#net-caption")
 
 

@@ -10,6 +10,8 @@ from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from starlette.websockets import WebSocket
 
 MOST = 1_000
@@ -28,11 +30,12 @@ class Events:
             with suppress(RuntimeError):  # the loop has ended, and the page with it
                 loop.call_soon_threadsafe(_put, queue, event)
 
-    async def listen(self, page: WebSocket) -> None:
-        """Send a page its events until it leaves."""
+    async def listen(self, page: WebSocket, first: Callable[[], dict[str, Any]]) -> None:
+        """Send a page its events until it leaves; ``first`` tells what may have passed before it listened."""
         await page.accept()
         queue: asyncio.Queue[dict[str, Any]] = asyncio.Queue(MOST)
         self._listening[queue] = asyncio.get_running_loop()
+        _put(queue, first())
         sending = asyncio.create_task(_send(page, queue))
         try:
             while True:
@@ -56,7 +59,8 @@ async def _send(page: WebSocket, queue: asyncio.Queue[dict[str, Any]]) -> None:
 
 
 async def _listen(page: WebSocket) -> None:
-    await page.app.state.session.events.listen(page)
+    session = page.app.state.session
+    await session.events.listen(page, lambda: {"event": "state", "state": session.state})
 
 
 ROUTES = [WebSocketRoute("/api/events", _listen)]

@@ -92,12 +92,13 @@ def mesh_of(session: Session) -> TriMesh:
 def _report(session: Session) -> dict[str, Any]:
     """Tell what was measured, and what of it a user should know first, with its places."""
     if session.opened.mesh is not None:
-        return {**session.surveys.of("report", partial(_checked, session.opened)), "stages": _stages(session)}
+        found: dict[str, Any] = session.surveys.of("report", partial(_checked, session.opened))
+        return found
     surface = surface_of(session)
     crossing = surface.crossing
     known = crossing is not None and len(crossing) == len(surface.mesh.faces)
     problems = problems_of(surface.report, surface.mesh, crossing if known else None)
-    return {"report": surface.report, "problems": [asdict(one) for one in problems], "stages": _stages(session)}
+    return {"report": surface.report, "problems": [asdict(one) for one in problems]}
 
 
 def _checked(opened: Opened) -> dict[str, Any]:
@@ -109,12 +110,12 @@ def _checked(opened: Opened) -> dict[str, Any]:
     return {"report": report, "problems": [asdict(one) for one in problems]}
 
 
-def _stages(session: Session) -> list[dict[str, Any]]:
-    """List the steps that there are of this surface, and how much is in each."""
+def _stages(session: Session) -> dict[str, Any]:
+    """List the steps that there are of this surface, and how much is in each: quick, however long measuring takes."""
     opened = session.opened
     if opened.mesh is not None:
         points = [] if opened.points is None else [{"name": "points", "faces": len(opened.points)}]
-        return [*points, {"name": "fitted", "faces": len(opened.mesh.faces)}]
+        return {"stages": [*points, {"name": "fitted", "faces": len(opened.mesh.faces)}]}
     surface = surface_of(session)
     counts = {
         "points": len(surface.points), "cuberille": len(surface.cuberille.quads),
@@ -123,7 +124,7 @@ def _stages(session: Session) -> list[dict[str, Any]]:
     }  # fmt: skip
     if surface.smoothed is surface.mesh:
         del counts["smoothed"]
-    return [{"name": name, "faces": count} for name, count in counts.items() if count]
+    return {"stages": [{"name": name, "faces": count} for name, count in counts.items() if count]}
 
 
 def _mesh(session: Session, stage: str, color: str = "") -> Response:
@@ -174,6 +175,7 @@ def _three(session: Session) -> Response:
 
 ROUTES = [
     post("/api/reconstruct", _reconstruct),
+    get("/api/stages", _stages),
     get("/api/report", _report),
     get("/mesh/{stage}", _mesh),
     get("/outline/{plane}/{k:int}", _outline),

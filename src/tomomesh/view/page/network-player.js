@@ -70,6 +70,10 @@ export function player(show) {
       playing = false;
       to(frame);
     },
+    /** Leave the stage to something else, until there is a reason to play again. */
+    leave() {
+      [at, playing] = [-1, false];
+    },
     toggle: () => (playing ? pause() : play()),
     speed(perSecond) {
       each = 1000 / perSecond;

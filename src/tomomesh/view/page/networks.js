@@ -143,6 +143,7 @@ class Part {
 
   async showStill(figure, own) {
     const k = own ? { k: Number(this.at.slice.value) } : {};
+    this.play.leave();
     this.mode = figure.shows;
     this.networks = null;
     if (figure.shows === "relief") this.at.relief.src = `/picture/relief?${new URLSearchParams(k)}`;
@@ -154,6 +155,7 @@ class Part {
   async showSlice() {
     const k = Number(this.at.slice.value);
     this.figure = null;
+    this.play.leave();
     this.mode = "slices";
     this.chosen = choices();
     this.at.sliced();

@@ -43,6 +43,7 @@ function* flat(value, name = "") {
 
 function inWords(value) {
   if (typeof value === "number") return short(value, 6);
+  if (value !== null && typeof value === "object" && !Array.isArray(value)) return Object.entries(value).map(([name, one]) => `${name} ${inWords(one)}`).join(", ");
   if (!Array.isArray(value)) return String(value ?? "-");
   const first = value.slice(0, 8).map(inWords).join(", ");
   return value.length > 8 ? `${first}, ... (${value.length})` : first || "none";

@@ -28,7 +28,8 @@ class SurfacePart {
     this.made = 0;
     this.viewer = null;
     this.build(panel);
-    for (const event of ["state", "progress"]) on(event, () => this.update());
+    on("state", () => this.follow());
+    on("progress", () => this.update());
     on("done", ({ name }) => { if (name === "reconstruct") this.load(); });
     on("theme", () => this.viewer?.setDark(isDark()));
     this.cut = eachFrame(() => this.cutNow());
@@ -51,7 +52,9 @@ class SurfacePart {
     this.empty = el("p", { class: "empty" }, "No surface yet.");
     const looks = el("div", { class: "row" }, el("label", {}, "Color ", this.color), el("label", {}, this.wire, " edges"));
     this.cutting = el("fieldset", {}, el("legend", {}, "Cut"), el("div", { class: "row" }, el("label", {}, this.cuts, " cut at the slice"), this.plane), this.slice, this.beside.element);
-    const side = el("div", { class: "side" }, this.make, this.hint, el("fieldset", {}, el("legend", {}, "Step"), this.step, this.steps), looks, this.cutting, this.told);
+    const steps = el("fieldset", {}, el("legend", {}, "Step"), this.step, this.steps);
+    this.shown = el("div", { class: "shown", hidden: true }, steps, looks, this.cutting);
+    const side = el("div", { class: "side" }, this.make, this.hint, this.shown, this.told);
     fill(panel, el("div", { class: "stage" }, this.view, this.empty), side);
   }
 
@@ -78,6 +81,17 @@ class SurfacePart {
     trying(post("/api/reconstruct"));
   }
 
+  /** Follow what is opened: a mesh is shown as soon as it has been read. */
+  follow() {
+    const { turn, ready } = state.opened;
+    if (turn !== this.turn) {
+      this.turn = turn;
+      this.clear();
+      if (isMesh(state.opened) && ready) this.load();
+    }
+    this.update();
+  }
+
   update() {
     const { opened, made, job } = state;
     this.make.hidden = isMesh(opened);
@@ -85,17 +99,10 @@ class SurfacePart {
     this.make.textContent = "reconstruct" in made ? "Make it again" : "Make the surface";
     const stale = made.reconstruct === false;
     this.hint.textContent = stale ? "Choices have changed since this surface was made." : this.size || "";
+    this.shown.hidden = !this.stages.length;
     this.cutting.hidden = opened.kind !== "study";
-    this.empty.textContent = opened.refused || (opened.ready ? "No surface yet." : "Reading ...");
-    if (opened.turn !== this.turn) this.turnTo(opened);
+    if (!this.stages.length) this.empty.textContent = opened.refused || (opened.ready ? "No surface yet." : "Reading ...");
     if (!("reconstruct" in made) && !isMesh(opened) && this.stages.length) this.clear();
-  }
-
-  /** Show what else was opened, where it is a mesh that has been read. */
-  turnTo(opened) {
-    this.turn = opened.turn;
-    if (this.stages.length) this.clear();
-    if (isMesh(opened) && opened.ready) this.load();
   }
 
   clear() {
@@ -110,16 +117,24 @@ class SurfacePart {
 
   async load() {
     const known = state && ("reconstruct" in state.made || (isMesh(state.opened) && state.opened.ready));
-    const found = known && (await trying(get("/api/report")));
+    const found = known && (await trying(get("/api/stages")));
     if (!found) return;
     this.stages = found.stages;
     for (const option of this.color.options) option.hidden = isMesh(state.opened) && ["distance", "filled"].includes(option.value);
+    this.update();
     this.step.max = this.stages.length - 1;
     this.step.value = this.step.max;
     fill(this.steps, ...this.stages.map(({ name }) => el("span", {}, NAMES[name])));
-    fill(this.told, problemList(found.problems, (one) => this.fly(one)), reportTable(found.report));
+    fill(this.told, el("p", { class: "muted" }, "Measuring ..."));
     if (state.opened.kind === "study") this.planes = (await trying(get("/api/planes")))?.planes;
     await this.showStage();
+    await this.loadReport();
+  }
+
+  /** After what is drawn: a large mesh is seen before it is measured. */
+  async loadReport() {
+    const found = await trying(get("/api/report"));
+    if (found) fill(this.told, problemList(found.problems, (one) => this.fly(one)), reportTable(found.report));
   }
 
   async showStage() {
