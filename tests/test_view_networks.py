@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from tomomesh.view.course import TrainingCourse
+    from tomomesh.view.networks.course import TrainingCourse
 
 HEAD = phantom((10, 48, 48), (5.0, 5.0, 14.0))
 RING: dict[str, Any] = {"lower": HEAD.lower, "way": "ring"}

@@ -95,7 +95,7 @@ class Session:
         self._turns, self._told = 0, count(1)
         self.surveys, self.selections = Remembered(1), Remembered(3)
         self.choices = Choices().then(choices or {})
-        self.made: dict[str, Made] = {}
+        self.made: dict[str, Product] = {}
         self.events = Events()
         self.jobs = Jobs(self._hear)
 
@@ -144,7 +144,7 @@ class Session:
 
     def keep(self, name: str, value: Any, choices: Mapping[str, Any]) -> None:
         """Keep what was made with some choices."""
-        self.made[name] = Made(value, dict(choices))
+        self.made[name] = Product(value, dict(choices))
         self.tell()
 
     def open(self, opened: Opened, choices: Mapping[str, Any] | None = None) -> None:
@@ -208,7 +208,7 @@ class Session:
 
 
 @dataclass(frozen=True)
-class Made:
+class Product:
     """What some work has made, and the choices that it was made with."""
 
     value: Any

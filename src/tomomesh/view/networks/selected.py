@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import UsageError
 from ...segmentation.study import lay_out, select_in
-from ..session import Made
+from ..session import Product
 
 if TYPE_CHECKING:
     from typing import Any
@@ -38,7 +38,7 @@ def selected_of(session: Session, progress: Progress) -> Selected:
             progress("window", 0, 1)
             labelled = settings.window.select is not None
             laid = lay_out(opened_volume(session), session.opened.labels, settings, labelled=labelled)
-            made = session.made[NAME] = Made(select_in(laid, settings).value, key)
+            made = session.made[NAME] = Product(select_in(laid, settings).value, key)
             progress("window", 1, 1)
     found: Selected = made.value
     return found
