@@ -23,7 +23,7 @@ from tomomesh import phantom
 from tomomesh.cli import main
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
 HEAD = phantom((14, 40, 40), (6.0, 6.0, 11.0))
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * 10.0
@@ -78,7 +78,7 @@ def run(study: Path) -> Path:
     return folder
 
 
-def write_cube(path: Path, sides: list[tuple[int, ...]]) -> Path:
+def write_cube(path: Path, sides: Sequence[tuple[int, ...]]) -> Path:
     corners = [f"v {x} {y} {z}" for x, y, z in CUBE]
     triangles = [face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))]
     path.write_text("\n".join([*corners, *("f " + " ".join(str(n + 1) for n in face) for face in triangles)]) + "\n")

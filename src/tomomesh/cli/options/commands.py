@@ -154,8 +154,13 @@ def _print(commands: Any) -> None:
 
 
 def _view(commands: Any) -> None:
-    view = _command(commands, "view", "a study, points or a mesh in the browser: windows, networks, surface")
-    view.add_argument("looked_at", metavar="STUDY|POINTS|MESH", nargs="?", help=f"{STUDY}; or {CLOUD}; or {CHECKED}")
+    view = _command(commands, "view", "a study, points, a mesh or the folder of a run, in the browser")
+    view.add_argument(
+        "looked_at",
+        metavar="STUDY|POINTS|MESH|RUN",
+        nargs="?",
+        help=f"{STUDY}; or {CLOUD}; or {CHECKED}; or the folder of a run",
+    )
     view.add_argument("--browse", metavar="FOLDER", help="let the page open all studies, points and meshes below it")
     view.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
     view.add_argument("--port", type=int, default=0, metavar="N", help="where to listen (default: a free port)")
