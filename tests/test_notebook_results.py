@@ -224,6 +224,7 @@ class TestNapari:
         np.testing.assert_array_equal(mesh[1], made.mesh.faces)
         assert not {"affine", "scale", "translate"} & {*of_points, *of_mesh}
 
+    @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # what napari itself imports warns
     def test_napari_takes_them(self) -> None:
         layers = pytest.importorskip("napari.layers")
         made, given = self.layers()

@@ -7,7 +7,7 @@ order of their encoding; a mesh in RAS unless its node says LPS. SimpleITK, whos
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import nibabel
@@ -78,7 +78,7 @@ class Scene:
         node = self.stored("Volume")
         members = [node.get(f"fileListMember{n}") for n in range(len(node.attrib))]
         names = [str(self.file(name)) for name in members if name] or [str(self.file(node.attrib["fileName"]))]
-        image = SimpleITK.ReadImage(names if len(names) > 1 else names[0])
+        image: Any = SimpleITK.ReadImage(names if len(names) > 1 else names[0])
         levels = SimpleITK.GetArrayFromImage(image)
         index = np.argwhere(np.ones(levels.shape, bool))[::5]
         places = [image.TransformContinuousIndexToPhysicalPoint(one[::-1].astype(float).tolist()) for one in index]

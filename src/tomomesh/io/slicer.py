@@ -55,9 +55,9 @@ def require_slicer_study(path: str | Path | Sequence[str | Path], settings: Read
     UsageError
         For what 3D Slicer cannot open by itself, or would not place as it is placed here.
     """
-    several = not isinstance(path, (str, Path))
-    shown = str(next(iter(path)) if not isinstance(path, (str, Path)) else path)
-    slices = slices_among([Path(one) for one in path]) if several else slices_behind(Path(shown), shown)
+    paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
+    several, shown = len(paths) > 1, str(paths[0])
+    slices = slices_among(paths) if several else slices_behind(paths[0], shown)
     changed = [f"--{name.replace('_', '-')}" for name in ("spacing", "spacing_z") if getattr(settings, name)]
     if changed or settings.nifti_form != "sform":
         raise UsageError(
@@ -139,11 +139,11 @@ def _add_study(scene: Element, names: Sequence[str], color: bool) -> None:
     storage = "vtkMRMLVolumeArchetypeStorageNode1"
     members = {f"fileListMember{n}": name for n, name in enumerate(names)} if len(names) > 1 else {}
     SubElement(
-        scene, "VolumeArchetypeStorage", id=storage, name="study storage", fileName=names[0], **members,
+        scene, "VolumeArchetypeStorage", members, id=storage, name="study storage", fileName=names[0],
         centerImage="0", singleFile="0" if members else "1", UseOrientationFromFile="1",
     )  # fmt: skip
     grays = {} if color else {"colorNodeID": "vtkMRMLColorTableNodeGrey", "autoWindowLevel": "1"}
-    SubElement(scene, f"{kind}VolumeDisplay", id=display, name="study display", **grays)
+    SubElement(scene, f"{kind}VolumeDisplay", grays, id=display, name="study display")
     tag = "VectorVolume" if color else "Volume"
     SubElement(scene, tag, id=volume, name="study", references=f"display:{display};storage:{storage};")
     for view in VIEWS:

@@ -25,7 +25,8 @@ def check_scene(chosen: Namespace, settings: Settings) -> None:
     """
     if not chosen.slicer:
         return
-    if "--input-format" in getattr(chosen, "typed", "") or getattr(chosen, "shown", ""):
+    typed: str = getattr(chosen, "typed", "")
+    if "--input-format" in typed or hasattr(chosen, "shown"):
         raise UsageError("a scene names files", found="--slicer beside a stream", expected="named files")
     if suffix_of(chosen.output) not in MESHES:
         raise UsageError(
