@@ -82,7 +82,7 @@ def handshake(page: Page, headers: Mapping[str, str]) -> str:
     with socket.create_connection((HERE, page.port)) as link:
         lines = ["GET /api/events HTTP/1.1", *(f"{name}: {value}" for name, value in sent.items() if value), "", ""]
         link.sendall("\r\n".join(lines).encode())
-        return link.recv(4096).decode("latin-1").partition("\r\n")[0]
+        return link.recv(4096).partition(b"\r\n")[0].decode()
 
 
 def test_events_for_our_own_page_alone(page: Page) -> None:

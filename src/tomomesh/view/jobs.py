@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..errors import TomomeshError
+from ..settings import asked_by, parameters
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -73,6 +75,8 @@ class Jobs:
         self._lock = threading.Lock()
         self._count = 0
         self.now: Job | None = None
+        self.failed: dict[str, Any] | None = None
+        """What the last work has failed by, as its event tells it."""
 
     def start(self, name: str, work: Work) -> Job:
         """Begin some work, unless work is underway: a second click is no second run.
@@ -93,6 +97,7 @@ class Jobs:
                 return self.now
             self._count += 1
             job = self.now = Job(self._count, name)
+            self.failed = None
         job.thread = threading.Thread(target=self._run, args=(job, work), daemon=True)
         job.thread.start()
         return job
@@ -106,10 +111,10 @@ class Jobs:
 
     def _run(self, job: Job, work: Work) -> None:
         self._tell({"event": "progress", **job.told})
-        told = _outcome(work, self._progress(job))
+        told = {"job": job.number, "name": job.name, **_outcome(work, self._progress(job))}
         with self._lock:
-            self.now = None
-        self._tell({"job": job.number, "name": job.name, **told})
+            self.now, self.failed = None, told if told["event"] == "failed" else None
+        self._tell(told)
 
     def _progress(self, job: Job) -> Progress:
         said = 0.0
@@ -133,8 +138,20 @@ def _outcome(work: Work, progress: Progress) -> dict[str, Any]:
     except Stopped:
         return {"event": "stopped"}
     except TomomeshError as error:
-        return {"event": "failed", "error": str(error), "flags": list(error.flags)}
+        return {"event": "failed", "error": str(error), "flags": [*error.flags] or switches_in(str(error))}
     except MemoryError:
         return {"event": "failed", "error": "the machine's memory is full", "flags": []}
     except Exception as fault:  # a bug; not in its own words, which may quote what a study says of a patient
         return {"event": "failed", "error": f"a bug: {type(fault).__name__}", "flags": []}
+
+
+def switches_in(line: str) -> list[str]:
+    """Return the switches that a line names, which a page can offer as they are.
+
+    Examples
+    --------
+    >>> switches_in("it has two walls. Try: --fill-holes to cap what is open, or a smaller --cell.")
+    ['--fill-holes']
+    """
+    switches = {asked_by(entry) for _, entry in parameters() if entry.metadata["kind"] is bool}
+    return [option for option in dict.fromkeys(re.findall(r"--[a-z]+(?:-[a-z]+)*", line)) if option in switches]

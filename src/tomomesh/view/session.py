@@ -126,6 +126,7 @@ class Session:
             "command": self.command,
             "made": {name: made.choices == self.choices.values for name, made in self.made.items()},
             "job": None if job is None else job.told,
+            "failed": self.jobs.failed,
         }
 
     def choose(self, changes: Mapping[str, Any]) -> dict[str, Any]:

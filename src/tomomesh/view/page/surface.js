@@ -1,7 +1,7 @@
 /** The surface: from points to mesh in steps, in 3-D, cut where a slice lies, and what was measured of it. */
 import { get, numbers, post } from "./api.js";
 import { el, fill, eachFrame } from "./dom.js";
-import { on, state, trying } from "./store.js";
+import { choose, on, state, trying } from "./store.js";
 import { problemList, reportTable } from "./report.js";
 import { sliceWithOutline } from "./outline.js";
 
@@ -39,6 +39,7 @@ class SurfacePart {
     panel.classList.add("surface");
     this.make = el("button", { type: "button", class: "first", onclick: () => this.begin() }, "Make the surface");
     this.hint = el("p", { class: "muted" });
+    this.fault = el("div", { class: "fault", role: "alert" });
     this.step = el("input", { type: "range", min: 0, max: 0, step: 1, "aria-label": "Step", oninput: () => this.showStage() });
     this.steps = el("div", { class: "steps", "aria-hidden": "true" });
     this.color = el("select", { onchange: () => this.showStage() }, ...Object.entries(COLORS).map(([name, text]) => el("option", { value: name }, text)));
@@ -54,7 +55,7 @@ class SurfacePart {
     this.cutting = el("fieldset", {}, el("legend", {}, "Cut"), el("div", { class: "row" }, el("label", {}, this.cuts, " cut at the slice"), this.plane), this.slice, this.beside.element);
     const steps = el("fieldset", {}, el("legend", {}, "Step"), this.step, this.steps);
     this.shown = el("div", { class: "shown", hidden: true }, steps, looks, this.cutting);
-    const side = el("div", { class: "side" }, this.make, this.hint, this.shown, this.told);
+    const side = el("div", { class: "side" }, this.make, this.fault, this.hint, this.shown, this.told);
     fill(panel, el("div", { class: "stage" }, this.view, this.empty), side);
   }
 
@@ -99,10 +100,21 @@ class SurfacePart {
     this.make.textContent = "reconstruct" in made ? "Make it again" : "Make the surface";
     const stale = made.reconstruct === false;
     this.hint.textContent = stale ? "Choices have changed since this surface was made." : this.size || "";
+    this.tellFault();
     this.shown.hidden = !this.stages.length;
     this.cutting.hidden = opened.kind !== "study";
     if (!this.stages.length) this.empty.textContent = opened.refused || (opened.ready ? "No surface yet." : "Reading ...");
     if (!("reconstruct" in made) && !isMesh(opened) && this.stages.length) this.clear();
+  }
+
+  /** Say what the last surface failed by, and offer what its line names. */
+  tellFault() {
+    const failed = state.failed?.name === "reconstruct" ? state.failed : null;
+    if ((failed?.error ?? "") === (this.fault.dataset.error ?? "")) return;
+    this.fault.dataset.error = failed?.error ?? "";
+    const anew = (flag) => choose({ [flag.replace(/^--(no-)?/, "").replaceAll("-", "_")]: !flag.startsWith("--no-") }).then(() => this.begin());
+    const helps = (failed?.flags ?? []).map((flag) => el("button", { type: "button", onclick: () => anew(flag) }, `Make it with ${flag}`));
+    fill(this.fault, failed && el("p", {}, failed.error), ...helps);
   }
 
   clear() {
