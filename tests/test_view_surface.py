@@ -12,6 +12,7 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("uvicorn")
 
+from conftest import sphere
 from pages import Page, served
 from studies import write_nifti
 from tomomesh import phantom, read_mesh
@@ -139,3 +140,20 @@ def test_a_broken_study_is_one_line(tmp_path: Path) -> None:
         assert "broken.nii" in state["opened"]["refused"]
         assert state["opened"]["refused"].count("\n") == 0
         assert page.ask("/api/reconstruct", {})[0] == 400
+
+
+def test_a_surface_that_fails_says_what_helps(tmp_path: Path) -> None:
+    """And goes on saying so to a page that comes later; what helps is a choice like others."""
+    points = sphere(1500)
+    np.savetxt(tmp_path / "half.xyz", points[points[:, 2] > 0])
+    with served(tmp_path / "half.xyz") as page:
+        page.enter()
+        page.ready()
+        page.state("/api/reconstruct", {})
+        failed = page.ready()["failed"]
+        assert (failed["event"], failed["name"]) == ("failed", "reconstruct")
+        assert failed["flags"] == ["--fill-holes", "--open", "--allow-leaks"]
+        page.state("/api/choose", {"fill_holes": True})
+        page.state("/api/reconstruct", {})
+        assert page.ready()["failed"] is None
+        assert page.state("/api/report")["report"]["quality"]["closed"] is True

@@ -125,7 +125,7 @@ on("state", showState);
 on("progress", showWork);
 on("done", hideWork);
 on("stopped", () => { hideWork(); say("stopped", "done"); });
-on("failed", ({ error }) => { hideWork(); say(error, "fault"); });
+on("failed", ({ name, error }) => { hideWork(); if (name !== "reconstruct" || current !== "surface") say(error, "fault"); });
 on("fault", ({ line }) => say(line, "fault"));
 on("away", () => document.body.classList.add("away"));
 on("back", () => document.body.classList.remove("away"));
