@@ -27,10 +27,20 @@ from tomomesh.html.document import Contents, document
 from tomomesh.html.histogram import HEIGHT, WIDTH, Histogram
 from tomomesh.html.index import index
 from tomomesh.html.places import NOTE, PROBLEM, WARNING, Problem, problems_of
-from tomomesh.html.scene import LEVELS, Scene, Values, scene_of_mesh, scene_of_points, scene_of_quads
+from tomomesh.html.scene import (
+    APART,
+    LEVELS,
+    Scene,
+    Values,
+    scene_of_cubes,
+    scene_of_mesh,
+    scene_of_points,
+    scene_of_quads,
+)
 from tomomesh.html.tables import in_words, tables_of
 from tomomesh.html.verdict import BAD, CARE, GOOD, verdict_of
 from tomomesh.measure.intersections import self_intersections
+from tomomesh.model.cubes import CubeGrid, keys_of
 from tomomesh.model.mesh import QuadMesh
 from tomomesh.show import draw_all
 from tomomesh.show.drawing.page import png
@@ -107,6 +117,16 @@ class TestScene:
         told = Values(np.array([*np.linspace(1, 2, 99), 1000.0, np.nan]), "distance").told("d")
         assert told["low"] == 1
         assert 1.9 < told["high"] <= 2
+
+    def test_cubes_stand_where_they_are_each_by_itself_and_outward(self) -> None:
+        cells = np.array([(0, 0, 0), (1, 0, 0), (5, 2, 7)])
+        origin, edges = np.array([3.0, -2.0, 1.0]), np.array([0.5, 1.0, 2.0])
+        scene = scene_of_cubes(CubeGrid(keys_of(cells), origin, edges, np.empty(0, np.int64), np.zeros(4, np.int64)))
+        for n, cell in enumerate(cells[np.argsort(keys_of(cells))]):
+            own = TriMesh(scene.vertices, scene.faces[12 * n : 12 * n + 12])
+            corners = own.vertices[own.faces].reshape(-1, 3)
+            assert own.face_volumes.sum() == pytest.approx((1 - 2 * APART) ** 3 * edges.prod())
+            np.testing.assert_allclose(corners.min(axis=0) + corners.max(axis=0), 2 * origin + edges * (2 * cell + 1))
 
 
 class TestDecimation:

@@ -74,13 +74,13 @@ def test_points_mask_and_settings_are_the_command_lines(made: Page, tmp_path: Pa
 def test_the_report_leads_to_its_stages(made: Page) -> None:
     assert made.state("/api/report")["report"]["quality"]["closed"] is True
     stages = made.state("/api/stages")["stages"]
-    assert [one["name"] for one in stages] == ["points", "cuberille", "triangulated", "smoothed", "fitted"]
+    assert [one["name"] for one in stages] == ["points", "cubes", "cuberille", "triangulated", "smoothed", "fitted"]
     for stage in stages:
         status, _, data = made.ask(f"/mesh/{stage['name']}")
         assert status == 200
         length = int.from_bytes(data[:4], "little")
         header = json.loads(data[4 : 4 + length])
-        times = {"cuberille": 2}.get(stage["name"], 1)
+        times = {"cubes": 12, "cuberille": 2}.get(stage["name"], 1)
         assert times * stage["faces"] == header["vertices" if stage["name"] == "points" else "faces"]
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..model.mesh import QuadMesh
 from .decimate import decimated, means
 
 if TYPE_CHECKING:
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..model.mesh import QuadMesh, TriMesh
+    from ..model.cubes import CubeGrid
+    from ..model.mesh import TriMesh
 
     Floats = NDArray[np.float64]
 
@@ -171,6 +173,22 @@ def scene_of_quads(quads: QuadMesh, *, unit: str = "mm", axes: tuple[tuple[str, 
     """Return what is shown of a cuberille: flat squares, and their sides."""
     faces = quads.quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     return Scene(quads.vertices, faces, quads.edges, of_faces=len(faces), unit=unit, axes=axes, flat=True)
+
+
+CORNERS = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)])
+"""Corners of a cube, in its edges."""
+SIDES = np.array([(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)])
+"""Its sides, each outward."""
+APART = 0.06
+"""Part of an edge that is left out around a cube, so that neighbors are seen apart. Only a picture depends on it."""
+
+
+def scene_of_cubes(cubes: CubeGrid, *, unit: str = "mm", axes: tuple[tuple[str, str], ...] = PATIENT) -> Scene:
+    """Return what is shown of cubes: each by itself."""
+    inside = APART + (1 - 2 * APART) * CORNERS
+    corners = cubes.origin + cubes.cell_mm * (cubes.cells[:, None] + inside)
+    quads = 8 * np.arange(len(corners))[:, None, None] + SIDES
+    return scene_of_quads(QuadMesh(corners.reshape(-1, 3), quads.reshape(-1, 4)), unit=unit, axes=axes)
 
 
 def scene_of_points(

@@ -11,7 +11,7 @@ from starlette.responses import Response
 
 from ..errors import UsageError
 from ..html.places import problems_of
-from ..html.scene import Scene, scene_of_mesh, scene_of_points, scene_of_quads
+from ..html.scene import Scene, scene_of_cubes, scene_of_mesh, scene_of_points, scene_of_quads
 from ..html.three import three_js
 from ..measure.intersections import self_intersections
 from ..measure.report import assess
@@ -38,12 +38,19 @@ MOST = 2_500_000
 second without a graphics card."""
 STAGES: dict[str, Callable[[Surface], Any]] = {
     "points": lambda surface: scene_of_points(surface.points.positions),
+    "cubes": lambda surface: _cubes(surface),
     "cuberille": lambda surface: scene_of_quads(surface.cuberille),
     "triangulated": lambda surface: surface.cuberille.triangulated(),
     "smoothed": lambda surface: surface.smoothed,
     "fitted": lambda surface: surface.mesh,
 }
 """The steps from points to a mesh, in their order, each as a scene or as the mesh that is drawn."""
+
+
+def _cubes(surface: Surface) -> Scene:
+    if surface.cubes is None:
+        raise UsageError("this surface was made without cubes")
+    return scene_of_cubes(surface.cubes)
 
 
 def _reconstruct(session: Session, body: Any) -> dict[str, Any]:
@@ -118,12 +125,15 @@ def _stages(session: Session) -> dict[str, Any]:
         return {"stages": [*points, {"name": "fitted", "faces": len(opened.mesh.faces)}]}
     surface = surface_of(session)
     counts = {
-        "points": len(surface.points), "cuberille": len(surface.cuberille.quads),
+        "points": len(surface.points),
+        "cubes": 0 if surface.cubes is None else len(surface.cubes.keys), "cuberille": len(surface.cuberille.quads),
         "triangulated": 2 * len(surface.cuberille.quads), "smoothed": len(surface.smoothed.faces),
         "fitted": len(surface.mesh.faces),
     }  # fmt: skip
     if surface.smoothed is surface.mesh:
         del counts["smoothed"]
+    if 12 * counts["cubes"] > MOST:
+        del counts["cubes"]  # which cannot be decimated, and would be seen as a surface anyway
     return {"stages": [{"name": name, "faces": count} for name, count in counts.items() if count]}
 
 

@@ -12,7 +12,7 @@ export const keys = [
 ];
 export const applies = (kind) => kind !== "nothing";
 
-const NAMES = { points: "Points", cuberille: "Cuberille", triangulated: "Triangulated", smoothed: "Smoothed", fitted: "Fitted" };
+const NAMES = { points: "Points", cubes: "Cubes", cuberille: "Cuberille", triangulated: "Triangulated", smoothed: "Smoothed", fitted: "Fitted" };
 const COLORS = { "": "none", distance: "distance to the points", thickness: "thickness", filled: "filled, not measured" };
 const PLANES = ["axial", "coronal", "sagittal"];
 
@@ -174,7 +174,7 @@ class SurfacePart {
   }
 
   tellSize(stage, scene) {
-    const unit = stage.name === "points" ? "points" : stage.name === "cuberille" ? "squares" : "triangles";
+    const unit = { points: "points", cubes: "cubes", cuberille: "squares" }[stage.name] ?? "triangles";
     const fewer = scene.header.of_faces > scene.header.faces ? `, drawn as ${scene.header.faces.toLocaleString("en")}` : "";
     this.view.setAttribute("aria-label", `${NAMES[stage.name]}: ${stage.faces} ${unit}`);
     this.size = `${stage.faces.toLocaleString("en")} ${unit}${fewer}`;
