@@ -36,7 +36,8 @@ def looking_at(page: Page, *, scheme: str = "light", refused: bool = False) -> I
         seen.on("request", lambda asked: None if _ours(asked.url, page) else faults.append(asked.url))
         seen.goto(f"{page.address}?token={page.token}")
         yield seen
-    assert [one for one in faults if not (refused and "400 (Bad Request)" in one)] == []
+    left = [one for one in faults if not (refused and "400 (Bad Request)" in one)]
+    assert left == [], left
 
 
 def _ours(url: str, page: Page) -> bool:

@@ -185,13 +185,13 @@ def test_what_is_refused_is_said_and_taken_back() -> None:
     with served() as page, looking_at(page, refused=True) as seen:
         seen.fill("#option-neurons", "1")
         seen.press("#option-neurons", "Enter")
-        seen.wait_for_selector(".note.fault")
-        assert "--neurons is outside its limits" in seen.inner_text(".note.fault")
+        seen.wait_for_selector(".toast.fault")
+        assert "--neurons is outside its limits" in seen.inner_text(".toast.fault")
         expect(seen.locator("#option-neurons")).to_have_value("")
 
 
 def test_a_long_training_is_stopped_from_the_page() -> None:
-    with served("--epochs", "4000", "--neurons", "400") as page, looking_at(page) as seen:
+    with served("--epochs", "4000", "--neurons", "1600") as page, looking_at(page) as seen:
         seen.select_option("#net-source", "square")
         seen.click("#net-train")
         seen.wait_for_selector("#work-stop:visible")

@@ -111,7 +111,7 @@ def _report(session: Session) -> dict[str, Any]:
 def _checked(opened: Opened) -> dict[str, Any]:
     """Tell of a mesh that was opened: what its run has measured, or what `tomomesh check` does."""
     assert opened.mesh is not None
-    report = opened.report or assess(opened.mesh, cavities=linings(opened.mesh))
+    report = opened.report or {"quality": assess(opened.mesh, cavities=linings(opened.mesh))}
     crosses = report.get("quality", report).get("self_intersections")
     problems = problems_of(report, opened.mesh, self_intersections(opened.mesh) if crosses else None)
     return {"report": report, "problems": [asdict(one) for one in problems]}

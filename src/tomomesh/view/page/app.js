@@ -20,7 +20,7 @@ const byId = (id) => /** @type {any} */ (document.getElementById(id));
 function mountAll() {
   for (const [name, part] of Object.entries(PARTS)) {
     const panel = el("section", { id: name, class: "panel", role: "tabpanel", "aria-labelledby": `tab-${name}`, hidden: true });
-    const tab = el("button", { id: `tab-${name}`, type: "button", role: "tab", "aria-controls": name, onclick: () => open(name) }, part.title);
+    const tab = el("button", { id: `tab-${name}`, type: "button", role: "tab", hidden: true, "aria-controls": name, onclick: () => open(name) }, part.title);
     byId("tabs").append(tab);
     byId("panels").append(panel);
     shown.set(name, { panel, tab, ...part.mount(panel) });
