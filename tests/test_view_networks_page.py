@@ -191,7 +191,7 @@ def test_what_is_refused_is_said_and_taken_back() -> None:
 
 
 def test_a_long_training_is_stopped_from_the_page() -> None:
-    with served("--epochs", "4000", "--neurons", "1600") as page, looking_at(page) as seen:
+    with served("--epochs", "4900", "--neurons", "2500") as page, looking_at(page) as seen:
         seen.select_option("#net-source", "square")
         seen.click("#net-train")
         seen.wait_for_selector("#work-stop:visible")

@@ -118,7 +118,7 @@ class Part {
   async train() {
     if (this.at.train.disabled) return;
     this.at.train.disabled = true;
-    const asked = this.region ? { region: this.region } : this.told.space ? { space: true } : { slice: Number(this.at.slice.value) };
+    const asked = this.region ? { region: this.region } : this.told?.space ? { space: true } : { slice: Number(this.at.slice.value) };
     this.at.canvas.focus();
     if (!(await trying(post("/api/train", asked)))) this.working();
   }
