@@ -70,9 +70,9 @@ function filled(at, told, play) {
   if (!at.source.options.length || at.study !== study) sources(at, told, study);
   at.study = study;
   const here = study && at.source.value === "slice";
-  at.sliceRow.hidden = !here || told?.space;
+  at.sliceRow.hidden = !here || told.space;
   at.all.hidden = !study;
-  at.train.textContent = !here ? "Train" : told?.space ? "Train in space" : "Train this slice";
+  at.train.textContent = !here ? "Train" : told.space ? "Train in space" : "Train this slice";
   const most = Math.max(study ? told.study.slices - 1 : 0, 0);
   if (Number(at.slice.max) !== most) Object.assign(at.slice, { max: String(most), value: String(Math.floor(most / 2)) });
   sliced(at);

@@ -64,6 +64,7 @@ class Part {
     on("training", (told) => this.course.begin(told));
     on("epoch", (frame) => this.course.add(frame));
     for (const end of ["done", "stopped", "failed"]) on(end, (job) => this.finished(end, job));
+    this.working();
   }
 
   async show() {
@@ -99,8 +100,8 @@ class Part {
   }
 
   working() {
-    const busy = Boolean(state && state.job);
-    this.at.train.disabled = this.at.all.disabled = busy || (!this.region && !(this.told && this.told.study && this.told.study.slices));
+    const busy = Boolean(state && state.job) || !this.told;
+    this.at.train.disabled = this.at.all.disabled = busy || (!this.region && !(this.told.study && this.told.study.slices));
   }
 
   sourced() {
@@ -118,7 +119,7 @@ class Part {
   async train() {
     if (this.at.train.disabled) return;
     this.at.train.disabled = true;
-    const asked = this.region ? { region: this.region } : this.told?.space ? { space: true } : { slice: Number(this.at.slice.value) };
+    const asked = this.region ? { region: this.region } : this.told.space ? { space: true } : { slice: Number(this.at.slice.value) };
     this.at.canvas.focus();
     if (!(await trying(post("/api/train", asked)))) this.working();
   }
