@@ -191,17 +191,19 @@ def test_what_is_refused_is_said_and_taken_back() -> None:
 
 
 def test_a_long_training_is_stopped_from_the_page() -> None:
-    with served("--epochs", "4900", "--neurons", "2500") as page, looking_at(page) as seen:
+    long = ("--training", "online", "--iterations", "30000000", "--neurons", "60")  # looked at 60 times, all in all
+    with served(*long) as page, looking_at(page) as seen:
         seen.select_option("#net-source", "square")
         seen.click("#net-train")
         seen.wait_for_selector("#work-stop:visible")
         assert seen.is_disabled("#net-train")
+        until(seen, re.compile("^Presentation "))
         seen.click("#work-stop")
         seen.wait_for_selector("text=Save GIF")  # all is received
         assert seen.is_enabled("#net-train")
         seen.focus("#net-canvas")
         seen.keyboard.press("End")
-        until(seen, re.compile(r"^Epoch \d+ of \d+, stopped$"))
+        until(seen, re.compile(r"^Presentation [\d,]+ of 30,000,000, stopped$"))
 
 
 def test_the_film_and_the_settings_are_saved(tmp_path: Path) -> None:

@@ -185,10 +185,10 @@ class TrainingCourse:
         shown, planned = Shown.of(self.inputs, None), len(self.stops)
 
         def told(codebook: Floats, done: int, radius: float, alpha: float) -> None:
-            progress("train", done, max(done, planned))
             error = float(np.sqrt(shown.match(np.ascontiguousarray(flat(codebook).T))[1], dtype=np.float64).mean())
             drawn = np.asarray(codebook[:, : self.dimensions] / self.scale)
             self.add(Moment("epoch" if done else "start", drawn, error, radius, alpha), tell)
+            progress("train", done, max(done, planned))  # last, so that a training that is stopped has its start
 
         return Look(told, 0 if len(self.inputs) == 1 else PICTURES)
 
