@@ -11,6 +11,9 @@ from html.parser import HTMLParser
 RUN = (None, "text/javascript", "module")
 """Types of scripts that a browser runs."""
 
+HOSTILE = "</script><img src=x onerror=alert(1)>\"'&{{ 7*7 }}<!--"
+"""A name that would be more than a text, were it not escaped."""
+
 
 @dataclass
 class Apart(HTMLParser):

@@ -6,7 +6,6 @@ import base64
 import io
 import json
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from conftest import law
-from html_pages import apart, require_self_contained
+from html_pages import HOSTILE, apart, require_self_contained
 from test_show import round_mesh
 from tomomesh import TriMesh, assess
 from tomomesh.html import document as html
@@ -24,9 +23,8 @@ from tomomesh.html import pictures, three
 from tomomesh.html.citation import citations
 from tomomesh.html.decimate import decimated, means
 from tomomesh.html.document import Contents, document
-from tomomesh.html.histogram import HEIGHT, WIDTH, Histogram
-from tomomesh.html.index import index
-from tomomesh.html.places import NOTE, PROBLEM, WARNING, Problem, problems_of
+from tomomesh.html.histogram import Histogram
+from tomomesh.html.places import NOTE, PROBLEM, Problem
 from tomomesh.html.scene import (
     APART,
     LEVELS,
@@ -37,15 +35,10 @@ from tomomesh.html.scene import (
     scene_of_points,
     scene_of_quads,
 )
-from tomomesh.html.tables import in_words, tables_of
-from tomomesh.html.verdict import BAD, CARE, GOOD, verdict_of
-from tomomesh.measure.intersections import self_intersections
 from tomomesh.model.cubes import CubeGrid, keys_of
 from tomomesh.model.mesh import QuadMesh
 from tomomesh.show import draw_all
 from tomomesh.show.drawing.page import png
-
-HOSTILE = "</script><img src=x onerror=alert(1)>\"'&{{ 7*7 }}<!--"
 
 
 @pytest.fixture(scope="module")
@@ -245,137 +238,3 @@ class TestThree:
     def test_another_page_gives_nothing(self, page: str) -> None:
         assert three.cut_out(page) == ""
         assert three.cut_out(f"<script>{three.BEGIN} x {three.END}</script>") == f"{three.BEGIN} x {three.END}"
-
-
-class TestVerdict:
-    def test_a_sound_mesh_is_good(self, ball: TriMesh) -> None:
-        found = verdict_of(assess(ball))
-        assert found.state == GOOD
-        assert found.words.startswith("Good to use: the mesh is closed")
-
-    def test_what_is_open_or_crosses_or_is_far_is_bad(self, ball: TriMesh) -> None:
-        opened = verdict_of(assess(TriMesh(ball.vertices, ball.faces[5:])))
-        assert opened.state == BAD
-        assert "open along" in opened.words
-        far = verdict_of({"quality": assess(ball) | {"follows": {"far": "it is far", "volume_share": 1.0}}})
-        assert far.words == "Not good to use: it is far."
-        crossing = verdict_of({"quality": assess(ball) | {"self_intersections": 2}})
-        assert "2 face(s) pass through others" in crossing.words
-
-    def test_unrest_and_warnings_want_care(self, ball: TriMesh) -> None:
-        found = verdict_of({"quality": assess(ball), "fit": {"converged": False}, "warnings": ["a", "b"]})
-        assert found.state == CARE
-        assert found.words == "Use with care: the fit is not at rest, there are 2 warnings."
-
-    def test_a_part_is_judged_by_its_print(self) -> None:
-        told = {"sound": True, "self_intersections": 0, "printable": False, "reasons": ["too thin"], "notes": []}
-        assert verdict_of({"print": told}).words == "Not good to use: it cannot be printed: too thin."
-        assert verdict_of({"print": told | {"printable": True}}).state == GOOD
-
-    def test_a_sheet_may_have_borders(self, ball: TriMesh) -> None:
-        sheet = {"way": {"name": "sheet"}, "quality": assess(TriMesh(ball.vertices, ball.faces[5:]))}
-        assert "sheet with borders" in next(check.text for check in verdict_of(sheet).checks)
-        assert [one.matters for one in problems_of(sheet) if "open" in one.text] == [NOTE]
-
-
-class TestPlaces:
-    def test_holes_and_crossings_are_where_they_are(self, ball: TriMesh) -> None:
-        center = ball.vertices.mean(axis=0)
-        radius = float(np.linalg.norm(ball.vertices - center, axis=1).max())
-        top = ball.vertices[ball.faces].mean(axis=1)[:, 2]
-        opened = TriMesh(ball.vertices, ball.faces[top < np.sort(top)[-12]])
-        both = TriMesh(
-            np.concatenate([opened.vertices, opened.vertices + np.array([1.6 * radius, 0, 0])]),
-            np.concatenate([opened.faces, opened.faces + len(opened.vertices)]),
-        )
-        found = problems_of(assess(both), both, self_intersections(both))
-        assert {one.matters for one in found} == {PROBLEM}
-        holes = [one for one in found if "open there" in one.text]
-        assert len(holes) == 2
-        for one, away in zip(sorted(holes, key=lambda hole: hole.place or ()), (0, 1.6 * radius), strict=True):
-            assert one.place is not None
-            np.testing.assert_allclose(one.place, center + np.array([away, 0, radius]), atol=0.2 * radius)
-        crossing = [one for one in found if "pass through" in one.text]
-        assert crossing
-        assert all(one.place is not None for one in crossing)
-        assert abs(np.mean([one.place[0] for one in crossing if one.place]) - center[0] - 0.8 * radius) < 0.2 * radius
-
-    def test_edges_of_three_faces_are_placed(self) -> None:
-        corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]])
-        fan = TriMesh(corners, np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]]))
-        found = [one for one in problems_of(assess(fan), fan) if "more than two" in one.text]
-        assert [one.place for one in found] == [(0.5, 0.0, 0.0)]
-
-    def test_problems_come_first_and_once(self) -> None:
-        report = {
-            "quality": {"follows": {"far": "far"}, "cavity_places_mm": [[1, 2, 3]]}, "warnings": ["far", "odd", "odd"],
-            "fit": {"converged": False}, "study": {"notes": ["noted"]},
-            "print": {"reasons": ["thinnest wall .1"], "thinnest_wall_at_mm": [4, 5, 6], "thinnest_wall_mm": 0.1},
-        }  # fmt: skip
-        found = problems_of(report)
-        assert [one.text for one in found if one.matters == PROBLEM] == ["far", "thinnest wall .1"]
-        assert [one.place for one in found if one.place] == [(4.0, 5.0, 6.0), (1.0, 2.0, 3.0)]
-        assert [one.text for one in found].count("odd") == 1
-        assert [one.text for one in found].count("far") == 1
-        assert [one.matters for one in found] == sorted(
-            (one.matters for one in found), key=(PROBLEM, WARNING, NOTE).index
-        )
-
-    def test_a_sound_mesh_has_none(self, ball: TriMesh) -> None:
-        assert problems_of(assess(ball), ball) == []
-
-
-class TestTables:
-    def test_keys_have_values_and_units(self) -> None:
-        report = {
-            "faces": 3, "points": {"unit": "cm"}, "quality": {"area_mm2": 2.0, "sound": True, "of": {"edge_mm": None}},
-            "timings": {"total_s": 1.0}, "warnings": ["odd"], "rings": {"events": [{"slice": 1}, {"slice": 2}]},
-        }  # fmt: skip
-        found = {name: [(row.key, row.value, row.unit) for row in rows] for name, rows in tables_of(report).items()}
-        assert found == {
-            "mesh": [("faces", "3", "")],
-            "points": [("unit", "cm", "")],
-            "quality": [("area_mm2", "2", "cm^2"), ("sound", "yes", ""), ("of.edge_mm", "none", "cm")],
-            "rings": [("events", "2", ""), ("events[1].slice", "1", ""), ("events[2].slice", "2", "")],
-            "warnings": [("1", "odd", "")],
-        }
-
-    def test_long_lists_say_how_many(self) -> None:
-        assert in_words([0.5, [1, 2]]) == "0.5, (1, 2)"
-        assert in_words(list(range(100))).endswith("11, ... (100 in all)")
-        assert in_words([]) == "none"
-
-
-class TestHistogram:
-    def test_the_window_lies_over_its_bars(self) -> None:
-        found = Histogram([0, 9, 4, 0], -100, 100, lower=0, upper=None, unit="HU")
-        assert found.window == (WIDTH / 2, WIDTH / 2)
-        assert max(high for *_, high in found.bars) == HEIGHT
-        assert [x for x, *_ in found.bars] == [n * WIDTH / 4 for n in range(4)]
-        assert found.words == "Gray levels from -100 to 100 HU; kept are those in 0 < k <= any"
-        assert Histogram([1], 5, 5, 7, 9).window == (0.0, WIDTH)
-        assert Histogram([1, 1], 0, 10, 20, 30).window == (WIDTH, 0.0)
-
-
-class TestIndex:
-    def test_leads_to_each_and_says_what_failed(self) -> None:
-        rows = [
-            {"name": "a b&c", "exit_code": 0, "error": "", "sound": True, "faces": 12, "self_intersections": 0},
-            {"name": HOSTILE, "exit_code": 4, "error": HOSTILE},
-        ]
-        found = require_self_contained(index("all", rows, folder="results", command=HOSTILE))
-        assert [attrs["href"] for tag, attrs in found.elements if tag == "a"] == ["results/a%20b%26c.html"]
-        assert "1 of 2 were made, 1 failed" in found.text
-        assert found.text.count(HOSTILE) == 3
-        assert "img" not in {tag for tag, _ in found.elements}
-
-
-def test_cites_what_the_citation_file_names() -> None:
-    told = (Path(__file__).parents[1] / "CITATION.cff").read_text(encoding="utf-8")
-    paper = citations("1")[0]
-    title = " ".join(told.partition("title: >-")[2].partition("authors:")[0].split())
-    assert title in paper
-    for line in told.partition("preferred-citation")[2].splitlines():
-        key, _, value = line.strip().removeprefix("- ").partition(": ")
-        if key in ("family-names", "year"):
-            assert value in paper
