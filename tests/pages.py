@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 HERE = "127.0.0.1"
+ENDLESS = ("--network", "ring", "--training", "online", "--iterations", "30000000")
+"""Choices with which a surface takes long on any machine, so that what stops it finds it at work."""
 
 
 @dataclass

@@ -13,7 +13,7 @@ pytest.importorskip("starlette")
 pytest.importorskip("uvicorn")
 
 from conftest import sphere
-from pages import Page, served
+from pages import ENDLESS, Page, served
 from studies import write_nifti
 from tomomesh import phantom, read_mesh
 from tomomesh.cli import main
@@ -120,7 +120,7 @@ def test_what_there_is_not(made: Page) -> None:
 
 
 def test_stopped_work_leaves_nothing(study: Path) -> None:
-    with served(study, "--lower", str(HEAD.lower)) as page:
+    with served(study, "--lower", str(HEAD.lower), *ENDLESS) as page:
         page.enter()
         page.ready()
         page.state("/api/reconstruct", {})

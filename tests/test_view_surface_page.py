@@ -17,7 +17,7 @@ pytest.importorskip("uvicorn")
 pytest.importorskip("websockets")
 
 from browsers import NO_WEBGL, SOFTWARE, chromium
-from pages import HERE, served
+from pages import ENDLESS, HERE, served
 from studies import write_nifti
 from tomomesh import phantom
 from tomomesh.cli import main
@@ -174,10 +174,8 @@ def test_undo_changes_the_command_and_tells_that_the_surface_is_older(browser: A
         tab.wait_for_selector("text=Choices have changed", state="hidden")
 
 
-def test_a_second_click_is_no_second_run_and_stop_stops(browser: Any, tmp_path: Path) -> None:
-    head = phantom((54, 128, 128))
-    path = write_nifti(tmp_path / "head.nii", np.asarray(head.volume.voxels), head.volume.affine)
-    with seen(browser, path, "--lower", str(head.lower)) as tab:
+def test_a_second_click_is_no_second_run_and_stop_stops(browser: Any, study: Path) -> None:
+    with seen(browser, study, "--lower", str(HEAD.lower), *ENDLESS) as tab:
         tab.click("#tab-surface")
         tab.wait_for_selector(".surface .first:enabled")
         begun: list[str] = []
