@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from conftest import size
-from tomomesh.measure.thickness import walls_and_gaps
+from tomomesh.measure.thickness import walls_and_gaps, walls_of
 from tomomesh.model.mesh import TriMesh
 
 CLOSE = 1.006
@@ -58,6 +58,7 @@ class TestKnownWidths:
         walls, gaps = walls_and_gaps(ring(16), near=3.0)
         assert 8.8 < walls.least[0] < 10 * CLOSE
         assert np.isinf(gaps.widths).all()
+        assert walls_of(ring(16), near=3.0).widths.tobytes() == walls.widths.tobytes()
 
 
 class TestConvergence:

@@ -75,6 +75,16 @@ class Thickness:
         return float(self.widths[order[np.searchsorted(reached, percent / 100 * reached[-1])]])
 
 
+def walls_of(mesh: TriMesh, *, near: float = np.inf, threads: int = 0, progress: Progress = silent) -> Thickness:
+    """Measure the thickness of a solid all over its surface: the walls of `walls_and_gaps`, alone.
+
+    Returns
+    -------
+    Thickness
+    """
+    return _walls(_Sampled.of(mesh, threads, progress), near)
+
+
 def walls_and_gaps(
     mesh: TriMesh, *, near: float = np.inf, threads: int = 0, progress: Progress = silent
 ) -> tuple[Thickness, Thickness]:
@@ -106,18 +116,42 @@ def walls_and_gaps(
     -----
     The medial ball at a place is found as by Ma, Bae & Choi (2012), on faces in place of points.
     """
-    tree = Tree.of_faces(mesh, threads=threads)
-    normals, areas = _normals(tree)
-    widest = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
-    places, of, share = _samples(tree, areas)
+    surface = _Sampled.of(mesh, threads, progress)
+    return _walls(surface, near), surface.widths(1, min(near, surface.widest))
 
-    def measured(side: int, most: float) -> Thickness:
-        return Thickness(places, share, _widths(tree, side, normals[of], places, most, threads, progress))
 
-    walls = measured(-1, min(near, widest))
-    if near < widest and walls.percentile(SHARE) == np.inf:
-        walls = measured(-1, widest)
-    return walls, measured(1, min(near, widest))
+def _walls(surface: _Sampled, near: float) -> Thickness:
+    """Return the walls that are no wider than asked for; all, where next to nothing is."""
+    found = surface.widths(-1, min(near, surface.widest))
+    if near < surface.widest and found.percentile(SHARE) == np.inf:
+        return surface.widths(-1, surface.widest)
+    return found
+
+
+@dataclass(frozen=True)
+class _Sampled:
+    """A surface with the places (s, 3) where it is measured, their normals (s, 3) and their areas (s,)."""
+
+    tree: Tree
+    widest: float
+    places: Floats
+    normals: Floats
+    areas: Floats
+    threads: int
+    progress: Progress
+
+    @classmethod
+    def of(cls, mesh: TriMesh, threads: int, progress: Progress) -> _Sampled:
+        tree = Tree.of_faces(mesh, threads=threads)
+        normals, areas = _normals(tree)
+        widest = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+        places, of, share = _samples(tree, areas)
+        return cls(tree, widest, places, normals[of], share, threads, progress)
+
+    def widths(self, side: int, most: float) -> Thickness:
+        """Return the widths on the inner side, -1, or the outer, 1: those up to the most that is looked for."""
+        found = _widths(self.tree, side, self.normals, self.places, most, self.threads, self.progress)
+        return Thickness(self.places, self.areas, found)
 
 
 def _normals(tree: Tree) -> tuple[Floats, Floats]:

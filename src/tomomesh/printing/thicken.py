@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..isosurface.well_composed import without_contacts
-from ..measure.thickness import walls_and_gaps
+from ..measure.thickness import walls_of
 from ..measure.tree import Tree
 from ..model.mesh import TriMesh
 from .depth import Depth, depth_near, level_surface
@@ -63,7 +63,7 @@ def thickened(mesh: TriMesh, least: float, *, room: float = ROOM, threads: int, 
     from manifold3d import Manifold, OpType
 
     for _ in range(ROUNDS):
-        walls, _ = walls_and_gaps(mesh, near=least, threads=threads, progress=progress)
+        walls = walls_of(mesh, near=least, threads=threads, progress=progress)
         if walls.widest_spot(least) <= SPARED * least**2:
             break
         tiles = list(_tiles(_middle(mesh, walls, least, threads), TILE * least / (2 * STEPS)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..html.scene import Values
-from ..measure.thickness import walls_and_gaps
+from ..measure.thickness import walls_of
 from ..measure.tree import Tree
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def values_of(session: Session, mesh: TriMesh, name: str) -> Mapping[str, Values
 
 def _thickness(mesh: TriMesh) -> Floats:
     """Return at each vertex the width of the nearest place where the wall was measured; NaN where it has none."""
-    walls, _ = walls_and_gaps(mesh)
+    walls = walls_of(mesh)
     widths = np.where(np.isfinite(walls.widths), walls.widths, np.nan)
     return np.asarray(widths[Tree.of_points(walls.places).nearest(mesh.vertices)[1]])
 
