@@ -38,6 +38,7 @@ VALUES: dict[str, st.SearchStrategy[Any]] = {
     "alpha": st.tuples(st.floats(0.5, 1), st.floats(0.01, 0.4)),
     "cell_mm": st.tuples(st.floats(0.5, 5)) | st.tuples(*[st.floats(0.5, 5)] * 3),
     "smooth": st.floats(0.1, 4),
+    "drop_at": st.lists(st.tuples(*[st.floats(-500, 500)] * 3), min_size=1, max_size=3).map(tuple),
 }
 OTHERS = st.fixed_dictionaries({}, optional=VALUES)
 CHOICES = st.tuples(WINDOWS, OTHERS).map(lambda both: both[0] | both[1])

@@ -149,15 +149,53 @@ class TestKept:
         assert set(drawn[stored[0] > 0].tolist()) == set(range(1, 256))
         assert len(kept.listed()) == windows.LISTED
 
-    def test_a_box_around_a_component_holds_it_alone(self) -> None:
+    @pytest.mark.parametrize("scale", [1.0, 0.0007, 300.0])
+    def test_the_place_of_a_component_picks_it(self, scale: float) -> None:
         stored = np.zeros((6, 9, 9), np.uint8)
         stored[1:5, 1:3, 1:8], stored[1:5, 5:8, 2:7] = 1, 1
-        volume = Volume.from_stored(stored, affine_of(np.diag([1.0, -1, 1])))
+        volume = Volume.from_stored(
+            stored, affine_of(np.diag([1.0, -1, 1])) * np.array([[scale], [scale], [scale], [1]])
+        )
         kept = Kept.of(volume, None, Settings().replace(lower=0.5))
         for one in kept.listed():
-            alone = Kept.of(volume, None, Settings().replace(lower=0.5, roi=tuple(one["roi"])))
+            alone = Kept.of(volume, None, Settings().replace(lower=0.5, keep_at=[one["place"]]))
             assert [other["voxels"] for other in alone.listed()] == [one["voxels"]]
             assert alone.listed()[0]["inside"] == one["inside"]
+
+    @law(40)
+    @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 2)), max_size=12))
+    def test_clicks_leave_out_and_bring_back(self, clicks: list[tuple[int, int]]) -> None:
+        """Whichever voxel of a component is clicked; but the last one stays."""
+        stored = np.zeros((3, 9, 9), np.uint8)
+        corners = [(0, 0), (0, 5), (5, 0), (5, 5)]
+        for j, i in corners:
+            stored[:, j : j + 3, i : i + 3] = 1
+        session = session_of(Volume.from_stored(stored, np.diag([2.0, 0.5, 1.0, 1.0])), lower=0.5)
+        there = {0, 1, 2, 3}
+        for part, off in clicks:
+            voxel = [off, corners[part][0] + off, corners[part][1] + 2 - off]
+            if there == {part}:
+                with pytest.raises(UsageError, match="no other component"):
+                    windows._pick(session, {"voxel": voxel})
+                continue
+            windows._pick(session, {"voxel": voxel})
+            there ^= {part}
+            plane = windows.kept(session)[1].plane(0, 1, (9, 9))
+            assert [bool(plane[j, i]) for j, i in corners] == [n in there for n in range(4)]
+        with pytest.raises(UsageError, match="nothing of the window"):
+            windows._pick(session, {"voxel": [0, 4, 4]})
+
+    def test_a_component_that_is_kept_alone_is_joined_by_a_click(self) -> None:
+        stored = np.zeros((2, 3, 9), np.uint8)
+        stored[:, :, ::4] = 1
+        session = session_of(Volume.from_stored(stored, np.eye(4)), lower=0.5, keep="all", keep_at=[(4, 1, 0)])
+        windows._pick(session, {"voxel": [1, 2, 8]})
+        assert session.choices.values["keep_at"] == ((4, 1, 0), (8, 2, 1))
+        windows._pick(session, {"voxel": [0, 0, 4]})
+        assert session.choices.values == {"lower": 0.5, "keep": "all", "keep_at": ((8, 2, 1),)}
+        session.undo()
+        session.undo()
+        assert session.choices.values["keep_at"] == ((4, 1, 0),)
 
     def test_the_same_choices_are_looked_at_once(self) -> None:
         session = session_of(HEAD.volume, lower=60.0)

@@ -217,16 +217,27 @@ def test_components_are_kept_and_dropped(browser: Any, tmp_path: Path) -> None:
         page.tab.wait_for_selector(".rows .row")
         assert page.tab.locator(".rows .row").count() == 2
         page.tab.click(".rows .row >> nth=1 >> text=only this")
-        roi = page.until(lambda found: found.window.keep == "largest").crop.roi
-        assert roi is not None
-        page.wait("document.querySelectorAll('.rows .row').length === 1")
-        page.tab.keyboard.press("Control+z")
+        [place] = page.until(lambda found: found.window.keep_at is not None).window.keep_at or ()
+        assert f"--keep-at {' '.join(f'{side:g}' for side in place)}" in page.tab.inner_text("#command")
+        page.tab.click(".rows .picked >> text=not alone")
+        page.until(lambda found: found.window.keep_at is None)
         page.wait("document.querySelectorAll('.rows .row').length === 2")
         page.tab.click(".rows .row .name >> nth=1")
         page.tab.focus(".plane-axial canvas")
-        page.tab.wait_for_timeout(300)
+        page.tab.wait_for_load_state("networkidle")  # the slice is there
         page.tab.keyboard.press("Enter")
-        page.until(lambda found: found.window.keep == "largest" and found.crop.roi is None)
+        [left] = page.until(lambda found: found.window.drop_at is not None).window.drop_at or ()
+        assert left == place
+        page.wait("document.querySelectorAll('.rows .picked').length === 1")
+        page.wait("document.querySelector('.told').textContent.includes('1 left out by place')")
+        page.tab.wait_for_load_state("networkidle")
+        page.tab.focus(".plane-axial canvas")
+        page.tab.keyboard.press("Enter")
+        page.until(lambda found: found.window.drop_at is None)
+        page.tab.keyboard.press("Control+z")
+        page.until(lambda found: found.window.drop_at == (place,))
+        page.tab.click(".rows .picked >> text=bring back")
+        page.until(lambda found: found.window.drop_at is None)
 
 
 def test_labels_are_chosen_in_the_list_and_in_a_slice(browser: Any, tmp_path: Path) -> None:

@@ -42,6 +42,12 @@ class LabelSurfaces(Mapping[int, "Surface"]):
         self, read: Callable[[], tuple[Volume, Volume | None]], settings: Settings, progress: Progress = silent,
         given: Mapping[str, Any] | None = None, *, kept: bool = True,
     ) -> None:  # fmt: skip
+        if settings.window.keep_at or settings.window.drop_at:
+            raise UsageError(
+                "components are picked by places of one surface alone",
+                found="--keep-at or --drop-at, and a surface a label",
+                hint="each label on its own, by --select",
+            )  # fmt: skip
         self._settings, self._given, self._kept, self._progress = settings, given or {}, kept, progress
         self._study = laid_out(*read(), settings, progress, labelled=True)
         self._numbers = settings.window.select or self._all()

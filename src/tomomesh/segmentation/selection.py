@@ -23,6 +23,7 @@ from .body import (
 )  # fmt: skip
 from .contours.labelled import filled_slices, gaps_in
 from .padding import as_background, padding_in
+from .picked import picked
 from .slabwise.cut import HERE
 from .slabwise.sources import MaskVoxels
 from .window import otsu_in, window_in, window_limits
@@ -59,6 +60,8 @@ class Counts:
         Voxels that lie in no body, and were kept for all that: for being all of the window, or on a guess most of it.
     lining : int
         Voxels outside of the bounds that were filled, for the outer surface alone to be left.
+    left_out, left_out_voxels : int
+        Components of what was then left, and their voxels, that were left out by places in them.
     """
 
     padding: int = 0
@@ -70,6 +73,8 @@ class Counts:
     dropped_voxels: int = 0
     spared_voxels: int = 0
     lining: int = 0
+    left_out: int = 0
+    left_out_voxels: int = 0
 
 
 @dataclass(frozen=True)
@@ -148,10 +153,15 @@ def choose(
     chosen = _of_levels(stack, asked, cutting) if labels is None else _of_labels(stack, labels, asked)
     chosen = chosen if inside is None else replace(chosen, runs=_within(chosen.runs, inside))
     chosen = _parts(chosen.counted(chosen.runs, window=chosen.kept), stack, asked, cutting.of(chosen.volume.voxels))
-    if asked.keep == "all" or settings.cubes.shared_walls:  # a speck left out of one label would be a gap
-        return chosen
-    cleaned = without_specks(chosen.runs)
-    return replace(chosen, runs=cleaned.mask, cleaned=cleaned)
+    if asked.keep != "all" and not settings.cubes.shared_walls:  # a speck left out of one label would be a gap
+        cleaned = without_specks(chosen.runs)
+        chosen = replace(chosen, runs=cleaned.mask, cleaned=cleaned)
+    return chosen if asked.keep_at is None and asked.drop_at is None else _picked(chosen, asked)
+
+
+def _picked(chosen: Chosen, asked: WindowSettings) -> Chosen:
+    found = picked(chosen.runs, chosen.volume, keep_at=asked.keep_at, drop_at=asked.drop_at)
+    return chosen.counted(found.mask, left_out=found.dropped, left_out_voxels=chosen.kept - found.mask.count)
 
 
 def _of_labels(stack: Volume, labels: Labelled, asked: WindowSettings) -> Chosen:

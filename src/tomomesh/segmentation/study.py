@@ -251,6 +251,8 @@ def _became(counts: Counts, cleaned: Cleaned) -> dict[str, Any]:
         "filled_pores": cleaned.pores,
         "filled_pore_voxels": cleaned.pore_voxels,
         "filled_lining_voxels": counts.lining,
+        "left_out_components": counts.left_out,
+        "left_out_voxels": counts.left_out_voxels,
     }
 
 

@@ -145,7 +145,7 @@ class Settings:
     def to_dict(self) -> dict[str, dict[str, Any]]:
         """Return sections of values, those not set left out, as a TOML file holds them."""
         return {
-            name: {key: list(v) if isinstance(v, tuple) else v for key, v in group.items() if v is not None}
+            name: {key: _listed(value) for key, value in group.items() if value is not None}
             for name, group in asdict(self).items()
         }
 
@@ -165,6 +165,11 @@ class Settings:
         groups = {entry.name: schema_of(getattr(cls(), entry.name)) for entry in fields(cls)}
         dialect = "https://json-schema.org/draft/2020-12/schema"
         return object_of(groups, **{"$schema": dialect}, title="tomomesh settings", description=cls.__doc__)
+
+
+def _listed(value: Any) -> Any:
+    """Turn tuples into lists, however deep."""
+    return [_listed(one) for one in value] if isinstance(value, tuple) else value
 
 
 def parameters() -> Iterator[tuple[str, Field[Any]]]:

@@ -32,11 +32,13 @@ def param(
     paper: Any = UNSET,
     metavar: tuple[str, ...] = (),
     auto: bool = False,
+    repeated: bool = False,
 ) -> Any:
     """Declare a parameter: ``low <= value <= high`` and ``value > above``; `length` where it takes several.
 
     `kind` is the type of one value; it follows from the default, except where that is None or a tuple. `metavar`
-    names each of several values. With `auto`, the word may be said for a number that is not set.
+    names each of several values. With `auto`, the word may be said for a number that is not set. With `repeated` it
+    may be given again and again: its value is a tuple of tuples.
     """
     kind = kind or (float if default is None or isinstance(default, tuple) else type(default))
     meta = {
@@ -51,6 +53,7 @@ def param(
         "paper": paper,
         "metavar": metavar,
         "auto": auto,
+        "repeated": repeated,
     }
     return field(default=default, metadata=meta)
 
@@ -63,7 +66,7 @@ class Group:
         for entry in fields(self):
             value = getattr(self, entry.name)
             plain = value.tolist() if hasattr(value, "tolist") else value
-            value = tuple(plain) if isinstance(plain, list) else plain
+            value = _repeated(plain) if entry.metadata["repeated"] else _tupled(plain)
             value = None if entry.metadata["auto"] and value == "auto" else value
             object.__setattr__(self, entry.name, value)
             if value is not None or entry.default is not None:
@@ -75,7 +78,24 @@ class Group:
         return {entry.name: entry.metadata["paper"] for entry in known if getattr(self, entry.name) == entry.default}
 
 
+def _tupled(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _repeated(value: Any) -> Any:
+    """Take one list of values for a list of one."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    several = [_tupled(one) for one in value]
+    return tuple(several) if any(isinstance(one, tuple) for one in several) else (tuple(several),)
+
+
 def _check(entry: Field[Any], value: Any) -> None:
+    for one in value if entry.metadata["repeated"] and isinstance(value, tuple) else (value,):
+        _check_one(entry, one)
+
+
+def _check_one(entry: Field[Any], value: Any) -> None:
     meta, option = entry.metadata, option_of(entry.name)
     if meta["choices"]:
         if value not in meta["choices"]:

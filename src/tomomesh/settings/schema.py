@@ -51,6 +51,9 @@ def _value(meta: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _array(meta: Mapping[str, Any]) -> dict[str, Any]:
+    if meta["repeated"]:
+        one = _array({**meta, "repeated": False})
+        return {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}
     lengths = meta["length"]
     between = [{"minItems": n, "maxItems": n} for n in range(lengths[0], lengths[-1]) if n not in lengths]
     refused = {"not": {"anyOf": between}} if between else {}

@@ -20,9 +20,13 @@ def spelled(entry: Field[Any], value: Any) -> list[str]:
     >>> known = {entry.name: entry for _, entry in parameters()}
     >>> spelled(known["lower"], 0.1), spelled(known["select"], (1, 5)), spelled(known["remesh"], False)
     (['--lower', '0.1'], ['--select=1,5'], ['--no-remesh'])
+    >>> spelled(known["drop_at"], ((1, 2, 3), (4, 5, 6.5)))
+    ['--drop-at', '1', '2', '3', '--drop-at', '4', '5', '6.5']
     """
     if entry.metadata["kind"] is bool:
         return [asked_by(entry)]
+    if entry.metadata["repeated"]:
+        return [word for one in value for word in (option_of(entry.name), *map(_number, one))]
     values = [_number(one) for one in (value if isinstance(value, (tuple, list)) else [value])]
     if entry.metadata["length"] == MANY or (entry.metadata["length"] == LAYERS and len(values) > 1):
         return [f"{option_of(entry.name)}={','.join(values)}"]

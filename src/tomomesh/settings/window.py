@@ -53,6 +53,14 @@ class WindowSettings(Group):
         "out and pores filled: under 8 voxels, and under a thousandth of the largest component",
         choices=("auto", "body", "largest", "all"),
     )
+    keep_at: tuple[tuple[float, float, float], ...] | None = param(
+        None, "keep of that the component alone that holds a place in the patient, LPS; again for one more",
+        unit="mm", length=(3,), metavar=("X", "Y", "Z"), repeated=True,
+    )  # fmt: skip
+    drop_at: tuple[tuple[float, float, float], ...] | None = param(
+        None, "leave out of that the component that holds a place in the patient, LPS; again for one more",
+        unit="mm", length=(3,), metavar=("X", "Y", "Z"), repeated=True,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         super().__post_init__()

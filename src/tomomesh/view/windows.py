@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import TomomeshError
+from ..errors import TomomeshError, UsageError
 from ..isosurface.runs import Runs
 from ..model.volume import AXES, order_along
+from ..segmentation.picked import component_at
 from ..segmentation.study import select_study
-from .routes import get, levels
+from .routes import get, levels, post
 from .slices import axis_of
 from .studies import opened_volume
 
@@ -28,11 +30,14 @@ if TYPE_CHECKING:
     from .session import Session
 
     Longs = NDArray[np.int64]
+    Place = tuple[float, float, float]
 
 LISTED = 24
 """Components that are told one by one. As many as a page has room for."""
 OTHERS = 255
 """The number that all components share which have none of their own."""
+PICKS = ("keep_at", "drop_at")
+"""Parameters that pick components by places in them."""
 
 
 @dataclass(frozen=True)
@@ -114,16 +119,17 @@ class Kept:
         change[lines[held], mask.stops[held]] = -numbers
         return np.cumsum(change, axis=1, dtype=np.int16)[:, :-1].astype(np.uint8)
 
+    def at(self, place: Place) -> int | None:
+        """Return the component that holds a place in the patient, mm; None where there is none."""
+        return component_at(self.runs, self.selected.study, place)
+
     def listed(self) -> list[dict[str, Any]]:
-        """Tell the largest components: number, voxels, mm3, the box in the patient, and a voxel inside (K, J, I)."""
+        """Tell the largest components: number, voxels, mm3, a voxel inside (K, J, I), and its place in the patient."""
         return [self._listed(n + 1, int(part)) for n, part in enumerate(self.largest[:LISTED])]
 
     def _listed(self, number: int, part: int) -> dict[str, Any]:
         held = np.flatnonzero(self.runs.parts == part)
         (slices, rows), mask = self._rows, self.runs.mask
-        starts, stops = mask.starts[held], mask.stops[held]
-        low = [slices[held].min(), rows[held].min(), starts.min()]
-        high = [slices[held].max(), rows[held].max(), stops.max() - 1]
         middle = held[len(held) // 2]
         inside = np.array([slices[middle], rows[middle], (mask.starts[middle] + mask.stops[middle]) // 2])
         voxels = int(self.runs.sizes[part])
@@ -131,17 +137,16 @@ class Kept:
             "number": number,
             "voxels": voxels,
             "volume_mm3": voxels * self.selected.study.voxel_mm3,
-            "roi": box_of(self.selected.study, np.array(low), np.array(high)),
+            "place": place_of(self.selected.study, inside),
             "inside": (inside[np.argsort(self.order)] + self.corner).tolist(),
         }
 
 
-def box_of(volume: Volume, low: Longs, high: Longs) -> list[float]:
-    """Return a box (X0 X1 Y0 Y1 Z0 Z1) in the patient, mm, half a voxel around those (K, J, I) from some to others."""
-    sides = np.stack([low - 0.5, high + 0.5])[:, ::-1]
-    corners = np.stack(np.meshgrid(*sides.T, indexing="ij"), axis=-1).reshape(-1, 3)
-    places = volume.to_mm(corners)
-    return [round(float(side), 3) for pair in zip(places.min(axis=0), places.max(axis=0), strict=True) for side in pair]
+def place_of(volume: Volume, voxel: Longs) -> Place:
+    """Return the place in the patient, mm, of a voxel (K, J, I): its middle, to a hundredth of its least side."""
+    digits = max(0, math.ceil(2 - math.log10(min(volume.spacing_mm))))
+    x, y, z = (round(float(side), digits) for side in volume.to_mm(voxel[None, ::-1].astype(np.float64))[0])
+    return x, y, z
 
 
 def _matters(settings: Settings) -> Any:
@@ -153,8 +158,10 @@ def _key(settings: Settings) -> str:
     return hashlib.sha256(repr(_matters(settings)).encode()).hexdigest()[:16]
 
 
-def kept(session: Session) -> tuple[str, Kept]:
+def kept(session: Session, picks: bool = True) -> tuple[str, Kept]:
     """Return what the choices of now keep, and the key by which it is known; what is known is not made again.
+
+    Without `picks` it is what would be kept if no component were picked by a place.
 
     Raises
     ------
@@ -164,12 +171,14 @@ def kept(session: Session) -> tuple[str, Kept]:
         Where other choices were made meanwhile, so that nobody waits for this.
     """
     opened_volume(session)
-    asked = _key(session.settings)
+    unpicked = {} if picks else dict.fromkeys(PICKS)
+    asked = _key(session.settings.replace(**unpicked))
 
     def choose() -> Kept:
-        if _key(session.settings) != asked:
+        settings = session.settings.replace(**unpicked)
+        if _key(settings) != asked:
             raise LookupError(asked)
-        return Kept.of(opened_volume(session), session.opened.labels, session.settings)
+        return Kept.of(opened_volume(session), session.opened.labels, settings)
 
     return asked, session.selections.of(asked, choose)
 
@@ -184,6 +193,25 @@ def _kept(session: Session) -> dict[str, Any]:
     return {"key": key, **found.told, "components": found.listed(), "count": len(found.largest)}
 
 
+def _pick(session: Session, body: dict[str, Any]) -> dict[str, Any]:
+    """Leave out the component at a voxel (K, J, I) of the study, or bring back the one that was left out there."""
+    place = place_of(opened_volume(session), np.array(body["voxel"], np.int64))
+    window, (_, found) = session.settings.window, kept(session)
+    keep, drop = list(window.keep_at or ()), list(window.drop_at or ())
+    if (part := found.at(place)) is not None:
+        if len(found.largest) == 1:
+            raise UsageError("there is no other component: nothing would be left", hint="another window")
+        others = [one for one in keep if found.at(one) != part]
+        keep, drop = (others, drop) if others else (keep, [*drop, place])
+    else:
+        _, whole = kept(session, picks=False)
+        if (part := whole.at(place)) is None:
+            raise UsageError("nothing of the window that is kept lies here", hint="--keep all, or another window")
+        drop = [one for one in drop if whole.at(one) != part]
+        keep = keep if not keep or part in map(whole.at, keep) else [*keep, place]
+    return session.choose({"keep_at": keep or None, "drop_at": drop or None})
+
+
 def _plane(session: Session, plane: str, k: str, key: str) -> Response:
     """Return the components' numbers on a slice, of a selection that was told."""
     found: Kept = session.selections.known(key)
@@ -192,4 +220,4 @@ def _plane(session: Session, plane: str, k: str, key: str) -> Response:
     return levels(found.plane(axis, int(k), (rows, columns)))
 
 
-ROUTES = [get("/api/kept", _kept), get("/kept/{plane}/{k}", _plane)]
+ROUTES = [get("/api/kept", _kept), post("/api/pick", _pick), get("/kept/{plane}/{k}", _plane)]

@@ -101,8 +101,8 @@ def _network(commands: Any) -> None:
     add_settings(
         network, ("window", "network", "run"),
         without=(
-            "slices", "way", "signal", "contours", "space", "select", "keep", "units", "precision", *MESH_ONLY,
-            *STUDY_ONLY,
+            "slices", "way", "signal", "contours", "space", "select", "keep", "keep_at", "drop_at", "units",
+            "precision", *MESH_ONLY, *STUDY_ONLY,
         ),
     )  # fmt: skip
 

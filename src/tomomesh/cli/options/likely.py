@@ -38,6 +38,7 @@ USUAL = {
     "output": ("out", "outfile", "output-file", "output-dir", "save", "destination"),
     "cell": ("voxel-size", "voxelsize", "resolution", "grid", "pitch"),
     "keep": ("keep-largest", "largest-component", "lcc", "remove-islands", "islands", "min-size"),
+    "drop-at": ("remove-component", "exclude", "erase"),
     "fill-holes": ("close-holes", "hole-size", "fill"),
     "edge": ("edge-length", "mesh-size", "max-edge"),
     "threads": ("jobs", "cores", "n-jobs"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
 from ...settings import LAYERS, MANY, asked_by, limits_of, option_of, parameters
@@ -47,6 +48,7 @@ def joined(arguments: Sequence[str]) -> list[str]:
     words: list[str] = []
     for word in arguments:
         option, _, values = words[-1].partition("=") if words else ("", "", "")
+        word = _plain(word)
         own, _, listed = word.partition("=")
         if option in SEVERAL and values.count(",") < 2 and _is_number(word):
             words[-1] = f"{option}={values},{word}" if values else f"{option}={word}"
@@ -59,6 +61,12 @@ def joined(arguments: Sequence[str]) -> list[str]:
         else:
             words.append(word)
     return words
+
+
+def _plain(word: str) -> str:
+    """Write a number below 0 without an exponent, with which argparse takes it for an option."""
+    is_one = word.startswith("-") and "e" in word.lower() and _is_number(word)
+    return f"{Decimal(word):f}" if is_one else word
 
 
 def _takes_more(words: Sequence[str]) -> bool:
@@ -101,6 +109,7 @@ def add_parameter(group: argparse._ArgumentGroup, entry: Field[Any]) -> None:
         dest=name,
         type=_numbers if one_or_three or listed else _labels if many else _kind(meta),
         nargs=several,
+        action="append" if meta["repeated"] else "store",
         default=argparse.SUPPRESS,
         **(chosen_from(meta["choices"], _help(entry)) if meta["choices"] else _free(entry)),
     )

@@ -1,8 +1,8 @@
-/** What is kept, component by component; or the labels of a label map. A click keeps or drops, as far as the options go. */
+/** What is kept, component by component; or the labels of a label map. A click leaves out, or brings back. */
 import { el, fill } from "./dom.js";
 import { goTo, isLabels, looked } from "./looked.js";
 import { colorOf, labelColor } from "./painting.js";
-import { choose, state } from "./store.js";
+import { choose, pick, state } from "./store.js";
 
 const LARGE = 1000;
 
@@ -29,8 +29,9 @@ export function makeKeeping() {
 function inWords({ window, count }) {
   const parts = [`${counted(window.voxels)} voxels, ${(100 * window.share).toPrecision(2)} %, in ${count === 1 ? "one component" : `${count} components`}`];
   if (window.dropped_components) parts.push(`${window.dropped_components} left out (gray)`);
-  if (window.specks) parts.push(`${window.specks} specks left out`);
-  if (window.filled_pores) parts.push(`${window.filled_pores} pores filled`);
+  if (window.left_out_components) parts.push(`${window.left_out_components} left out by place`);
+  if (window.specks) parts.push(`${window.specks} ${window.specks === 1 ? "speck" : "specks"} left out`);
+  if (window.filled_pores) parts.push(`${window.filled_pores} ${window.filled_pores === 1 ? "pore" : "pores"} filled`);
   return `${parts.join("; ")}.`;
 }
 
@@ -43,26 +44,29 @@ function colored(element, color) {
 }
 
 function componentRows() {
-  return (looked.kept?.components || []).map((one) => el("div", { class: "row" },
+  const several = looked.kept?.count > 1;
+  const kept = (looked.kept?.components || []).map((one) => el("div", { class: "row" },
     el("button", { type: "button", class: "name", title: "Lead the crosshair there", onclick: () => goTo(one.inside) },
       colored(el("span", { class: "swatch" }), colorOf(one.number)), ` ${one.number}: ${volume(one.volume_mm3)}`),
-    looked.kept.count > 1 && el("button", { type: "button", title: onlyTitle(one), onclick: () => only(one) }, "only this")));
+    several && el("button", { type: "button", title: "--keep-at a place in it", onclick: () => choose({ keep_at: [one.place], drop_at: null }) }, "only this"),
+    several && el("button", { type: "button", title: "--drop-at a place in it", onclick: () => pick(one.inside) }, "leave out")));
+  return [...kept, ...pickedRows("keep_at", "the one at", "not alone"), ...pickedRows("drop_at", "not the one at", "bring back")];
 }
 
-const onlyTitle = (one) => (one.number === 1 ? "--keep largest" : "--keep largest, in a box around it (--roi)");
-
-/** Keep one component: the largest of all, or of a box around it. */
-function only(one) {
-  choose(one.number === 1 ? { keep: "largest" } : { keep: "largest", roi: one.roi });
+/** What was picked by places, each to be taken back. */
+function pickedRows(name, words, back) {
+  const places = state.choices[name] || [];
+  const without = (place) => places.filter((one) => one !== place);
+  return places.map((place) => el("div", { class: "row picked" }, el("span", { class: "name" }, `${words} ${place.join(", ")}`),
+    el("button", { type: "button", onclick: () => choose({ [name]: without(place).length ? without(place) : null }) }, back)));
 }
 
-/** Take a click on a component: another than the largest is dropped, and what was dropped is kept. @param {number} number 0 for none @param {boolean} inWindow @param {(line: string) => void} say */
-export function pickComponent(number, inWindow, say) {
-  const keep = state.choices.keep || "auto";
-  if (number > 1 && keep !== "largest") choose({ keep: "largest" });
-  else if (number === 1 && looked.kept.count > 1) choose({ keep: "largest" });
-  else if (!number && inWindow && keep !== "all") choose({ keep: "all" });
-  else say(number ? "There is no other component to drop." : "Nothing of the window is here.");
+/** Take a click on a voxel: its component is left out, or brought back. @param {number[]} voxel @param {boolean} held whether it is kept @param {boolean} inWindow @param {(line: string, kind?: string) => void} say */
+export function pickComponent(voxel, held, inWindow, say) {
+  const picked = state.choices.keep_at || state.choices.drop_at;
+  if (held || (inWindow && picked)) pick(voxel);
+  else if (inWindow && (state.choices.keep || "auto") !== "all") choose({ keep: "all" });
+  else say("Nothing of the window is here.");
 }
 
 /** Take a click on a label: it is chosen, or no more. @param {number} label */

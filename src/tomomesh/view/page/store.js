@@ -25,6 +25,9 @@ export function tell(event, told = {}) {
 /** Change parameters; null takes one back to its default. @param {Record<string, any>} changes */
 export const choose = (changes) => changed(post("/api/choose", changes));
 
+/** Leave out the component at a voxel, or bring it back. @param {number[]} voxel of the study, slice, row and column */
+export const pick = (voxel) => changed(post("/api/pick", { voxel }));
+
 export const undo = () => changed(post("/api/undo"));
 export const redo = () => changed(post("/api/redo"));
 /** Have the work end: events tell that it does, and none may be undone by the answer, which is older. */

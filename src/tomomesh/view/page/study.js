@@ -100,7 +100,7 @@ function pickAt(place, say) {
   if (isLabels()) return pickLabel(Math.round(levels[0]));
   const within = [...levels].map((level, n) => level > looked.window.lower[n] && level <= looked.window.upper[n]);
   const held = state.choices.layers === "any" ? within.some(Boolean) : within.every(Boolean);
-  if (looked.kept) pickComponent(keeps.have(name, place[plane.axis])?.values[at] || 0, held, say);
+  if (looked.kept) pickComponent(place, Boolean(keeps.have(name, place[plane.axis])?.values[at]), held, say);
 }
 
 /** Follow the session: fetch what has changed of what is opened and of what is kept. */
