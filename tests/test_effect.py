@@ -43,7 +43,8 @@ SOMETIMES = {*MATTERS, *(name for way in TABLE for name in way_of(way).reads)}
 ALWAYS = {
     "series", "spacing", "spacing_z", "fill_gaps", "resample_slices", "skip_bad", "nifti_form", "level", "fill_chunks",
     "structure", "skip_flat", "roi", "slice_range", "lower", "upper", "preset", "select", "fill_slices", "keep",
-    "keep_at", "drop_at", "slices", "way", "network", "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow",
+    "keep_at", "drop_at",
+    "slices", "way", "network", "space", "contours", "tolerance", "max_steps", "scale", "flat_base", "down", "hollow",
     "drain", "least_wall", "print_check", "threads", "frame", "target_faces", "smooth", "remesh", "edge",
     "precision", "one_piece", "fill_cavities", "thicken", "shared_walls",
 }  # fmt: skip

@@ -24,7 +24,7 @@ from tomomesh.html.citation import citations
 from tomomesh.html.decimate import decimated, means
 from tomomesh.html.document import Contents, document
 from tomomesh.html.histogram import Histogram
-from tomomesh.html.places import NOTE, PROBLEM, Problem
+from tomomesh.html.places import NOTE, PROBLEM, Problem, Spot
 from tomomesh.html.scene import (
     APART,
     LEVELS,
@@ -51,7 +51,7 @@ def told(ball: TriMesh) -> Contents:
     drawn = {name: png(page) for name, page in draw_all(mesh=ball)}
     return Contents(
         "ball.stl", assess(ball), scene_of_mesh(ball), ["mesh      a ball"], "tomomesh check ball.stl",
-        [Problem(PROBLEM, "a spot", (1.0, 2.0, 3.0), 0.5), Problem(NOTE, "nowhere")], drawn,
+        [Problem(PROBLEM, "a spot", (Spot((1.0, 2.0, 3.0), 0.5),)), Problem(NOTE, "nowhere")], drawn,
         Histogram([4, 0, 1], 0, 9, 3),
     )  # fmt: skip
 
@@ -173,13 +173,14 @@ class TestDocument:
         for word in ("euler_number", "tomomesh check ball.stl", "a spot", "nowhere", *citations("0")[:1]):
             assert word in found.text
         flown = [attrs for tag, attrs in found.elements if attrs.get("class") == "fly"]
-        assert [one["data-place"] for one in flown] == ["1.0 2.0 3.0"]
+        assert [one["data-places"] for one in flown] == ["1.0 2.0 3.0 0.5"]
         assert [attrs["id"] for tag, attrs in found.elements if tag == "section"][:3] == ["summary", "mesh", "problems"]
 
     def test_escapes_whatever_it_is_told(self, told: Contents) -> None:
         plain = apart(document(told))
         hostile = replace(
-            told, title=HOSTILE, command=HOSTILE, summary=[HOSTILE], problems=[Problem(NOTE, HOSTILE, (0, 0, 0))] * 2,
+            told, title=HOSTILE, command=HOSTILE, summary=[HOSTILE],
+            problems=[Problem(NOTE, HOSTILE, (Spot((0, 0, 0)),))] * 2,
             report={**told.report, HOSTILE: {HOSTILE: HOSTILE}, "warnings": [HOSTILE]}, frame=HOSTILE,
             histogram=Histogram([1, 2], 0, 1, unit=HOSTILE),
             scene=replace(told.scene, unit=HOSTILE, axes=((HOSTILE, HOSTILE),) * 3, values={

@@ -12,7 +12,7 @@ from test_show import round_mesh
 from tomomesh import assess
 from tomomesh.html.document import Contents, document
 from tomomesh.html.index import index
-from tomomesh.html.places import NOTE, PROBLEM, Problem
+from tomomesh.html.places import NOTE, PROBLEM, Problem, Spot
 from tomomesh.html.scene import Values, scene_of_mesh
 from tomomesh.show import draw_all
 from tomomesh.show.drawing.page import png
@@ -32,7 +32,8 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     far = tuple(ball.vertices[0].tolist())
     told = Contents(
         "a ball.stl", {"quality": assess(ball), "versions": {"numpy": "2"}}, scene_of_mesh(ball, values=heights),
-        command=COMMAND, problems=[Problem(PROBLEM, "a spot", far, 0.5), Problem(NOTE, "n")], pictures=drawn,
+        command=COMMAND, pictures=drawn,
+        problems=[Problem(PROBLEM, "a spot", (Spot(far, 0.5), Spot((0.0, 0.0, 0.0)))), Problem(NOTE, "n")],
     )  # fmt: skip
     path = tmp_path_factory.mktemp("pages") / "ball.html"
     path.write_text(document(told), encoding="utf-8")
@@ -119,7 +120,9 @@ class TestPage:
         share = seen.drawn()
         buttons = seen.page.locator("button.fly")
         assert buttons.count() == 1
+        assert buttons.inner_text() == "Show the first"
         buttons.click()
+        assert buttons.inner_text() == "Show 2 of 2"
         seen.page.wait_for_timeout(800)
         assert seen.drawn() != share
         view = seen.page.locator("#view").bounding_box()

@@ -6,14 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
 
+from conftest import law, seeds
 from html_pages import HOSTILE, require_self_contained
 from test_show import round_mesh
-from tomomesh import TriMesh, assess
+from tomomesh import TriMesh, assess, reconstruct_points
+from tomomesh.errors import GeometryError
 from tomomesh.html.citation import citations
 from tomomesh.html.histogram import HEIGHT, WIDTH, Histogram
 from tomomesh.html.index import index
-from tomomesh.html.places import NOTE, PROBLEM, WARNING, problems_of
+from tomomesh.html.places import MOST, NOTE, PROBLEM, WARNING, named_places, problems_of
 from tomomesh.html.tables import in_words, tables_of
 from tomomesh.html.verdict import BAD, CARE, GOOD, verdict_of
 from tomomesh.measure.intersections import self_intersections
@@ -67,21 +70,64 @@ class TestPlaces:
         )
         found = problems_of(assess(both), both, self_intersections(both))
         assert {one.matters for one in found} == {PROBLEM}
-        holes = [one for one in found if "open there" in one.text]
-        assert len(holes) == 2
-        for one, away in zip(sorted(holes, key=lambda hole: hole.place or ()), (0, 1.6 * radius), strict=True):
-            assert one.place is not None
-            np.testing.assert_allclose(one.place, center + np.array([away, 0, radius]), atol=0.2 * radius)
-        crossing = [one for one in found if "pass through" in one.text]
-        assert crossing
-        assert all(one.place is not None for one in crossing)
-        assert abs(np.mean([one.place[0] for one in crossing if one.place]) - center[0] - 0.8 * radius) < 0.2 * radius
+        [holes] = [one.places for one in found if "open there" in one.text]
+        for spot, away in zip(sorted(holes), (0, 1.6 * radius), strict=True):
+            np.testing.assert_allclose(spot.place, center + np.array([away, 0, radius]), atol=0.2 * radius)
+        [crossing] = [one.places for one in found if "pass through" in one.text]
+        assert abs(np.mean([spot.place[0] for spot in crossing]) - center[0] - 0.8 * radius) < 0.2 * radius
 
     def test_edges_of_three_faces_are_placed(self) -> None:
         corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]])
         fan = TriMesh(corners, np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]]))
-        found = [one for one in problems_of(assess(fan), fan) if "more than two" in one.text]
-        assert [one.place for one in found] == [(0.5, 0.0, 0.0)]
+        [found] = [one for one in problems_of(assess(fan), fan) if "more than two" in one.text]
+        assert [spot.place for spot in found.places] == [(0.5, 0.0, 0.0)]
+
+    def test_vertices_where_sheets_touch_are_placed(self, ball: TriMesh) -> None:
+        """Two balls that share one corner."""
+        at = ball.vertices[0]
+        other = np.where(np.arange(len(ball.vertices)) == 0, 0, np.arange(len(ball.vertices)) + len(ball.vertices) - 1)
+        both = TriMesh(
+            np.concatenate([ball.vertices, 2 * at - ball.vertices[1:]]),
+            np.concatenate([ball.faces, other[ball.faces][:, ::-1]]),
+        )
+        [found] = [one for one in problems_of(assess(both), both) if "sheets touch" in one.text]
+        assert [spot.place for spot in found.places] == [tuple(at)]
+
+    def test_faces_that_are_turned_are_placed(self, ball: TriMesh) -> None:
+        faces = np.array(ball.faces)
+        faces[7] = faces[7, ::-1]
+        turned = TriMesh(ball.vertices, faces)
+        [found] = [one for one in problems_of(assess(turned), turned) if "do not agree" in one.text]
+        corners = ball.vertices[faces[7]]
+        np.testing.assert_allclose(
+            [spot.place for spot in found.places], [(corners.min(axis=0) + corners.max(axis=0)) / 2]
+        )
+
+    def test_pieces_inside_out_are_placed(self, ball: TriMesh) -> None:
+        far = ball.vertices + 1000.0
+        both = TriMesh(
+            np.concatenate([ball.vertices, far]), np.concatenate([ball.faces, ball.faces[:, ::-1] + len(far)])
+        )
+        [found] = [one for one in problems_of(assess(both), both) if "inside out" in one.text]
+        np.testing.assert_allclose([spot.place for spot in found.places], [(far.min(axis=0) + far.max(axis=0)) / 2])
+
+    @law(10)
+    @given(seeds)
+    def test_a_leak_is_where_the_samples_lack(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        points, hole = (
+            rows / np.linalg.norm(rows, axis=1)[:, None] for rows in (rng.normal(size=(n, 3)) for n in (4000, 1))
+        )
+        center = rng.uniform(-500, 500, 3)
+        open_ = 10 * points[points @ hole[0] < 0.4] + center
+        with pytest.raises(GeometryError) as refused:
+            reconstruct_points(open_)
+        warnings = reconstruct_points(open_, allow_leaks=True).report["warnings"]
+        for line in (str(refused.value), " ".join(warnings)):
+            [spot] = named_places(line)
+            np.testing.assert_allclose(spot.place, center + 4 * hole[0], atol=1)
+        [told] = [one for one in problems_of({"warnings": warnings}) if one.places]
+        assert told.matters == WARNING
 
     def test_problems_come_first_and_once(self) -> None:
         report = {
@@ -91,12 +137,16 @@ class TestPlaces:
         }  # fmt: skip
         found = problems_of(report)
         assert [one.text for one in found if one.matters == PROBLEM] == ["far", "thinnest wall .1"]
-        assert [one.place for one in found if one.place] == [(4.0, 5.0, 6.0), (1.0, 2.0, 3.0)]
+        assert [one.places for one in found if one.places] == [(((4.0, 5.0, 6.0), 0.1),), (((1.0, 2.0, 3.0), 0.0),)]
         assert [one.text for one in found].count("odd") == 1
         assert [one.text for one in found].count("far") == 1
         assert [one.matters for one in found] == sorted(
             (one.matters for one in found), key=(PROBLEM, WARNING, NOTE).index
         )
+
+    def test_many_of_a_kind_are_one_with_many_places(self) -> None:
+        [found] = problems_of({"quality": {"cavity_places_mm": np.arange(900).reshape(-1, 3).tolist()}})
+        assert (found.text, len(found.places)) == ("300 cavities inside", MOST)
 
     def test_a_sound_mesh_has_none(self, ball: TriMesh) -> None:
         assert problems_of(assess(ball), ball) == []

@@ -153,6 +153,8 @@ def test_a_surface_that_fails_says_what_helps(tmp_path: Path) -> None:
         failed = page.ready()["failed"]
         assert (failed["event"], failed["name"]) == ("failed", "reconstruct")
         assert failed["flags"] == ["--fill-holes", "--open", "--allow-leaks"]
+        [[place, _]] = failed["places"]
+        assert np.linalg.norm(place) < 0.05 * np.linalg.norm(points[0])  # the middle of the hemisphere's rim
         page.state("/api/choose", {"fill_holes": True})
         page.state("/api/reconstruct", {})
         assert page.ready()["failed"] is None

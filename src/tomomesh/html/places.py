@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..measure.links import Links
+from ..measure.shape import areas_and_volumes
 from ..measure.topology import FAULTS
 
 if TYPE_CHECKING:
@@ -21,8 +23,10 @@ if TYPE_CHECKING:
 
 PROBLEM, WARNING, NOTE = "problem", "warning", "note"
 """How much it matters, the most first."""
-MOST = 8
-"""Places that are told of one kind, the largest first; all are counted. Chosen: a list that is read at one sight."""
+MOST = 100
+"""Places that are told of one kind, the largest first; all are counted. Chosen: more nobody looks at one by one."""
+AROUND = re.compile(r"around \(([^()]*)\)")
+"""A place in the words of a warning or an error."""
 WORDS = {
     "boundary_edges": "edge(s) with a face on one side alone: the surface is open there",
     "nonmanifold_edges": "edge(s) where more than two faces meet",
@@ -31,6 +35,18 @@ WORDS = {
     "inward_components": "piece(s) inside out",
 }
 """Faults of `measure.topology`, in words."""
+
+
+class Spot(NamedTuple):
+    """A place (3,) in the numbers of the mesh, and how far what is there reaches from it."""
+
+    place: tuple[float, float, float]
+    radius: float = 0.0
+
+    @property
+    def words(self) -> str:
+        """All four numbers, as a script takes them."""
+        return " ".join(map(repr, (*self.place, self.radius)))
 
 
 @dataclass(frozen=True)
@@ -42,16 +58,13 @@ class Problem:
     matters : str
         `PROBLEM`, `WARNING` or `NOTE`.
     text : str
-    place : three floats, or None
-        Where, in the numbers of the mesh.
-    radius : float
-        How far it reaches from there.
+    places : tuple of Spot
+        Where, the largest first: `MOST` at most, and none where none is known.
     """
 
     matters: str
     text: str
-    place: tuple[float, float, float] | None = None
-    radius: float = 0.0
+    places: tuple[Spot, ...] = ()
 
 
 def problems_of(
@@ -85,7 +98,7 @@ def _once(found: list[Problem]) -> list[Problem]:
     """Leave out what was said already, at the same place."""
     kept = dict[object, Problem]()
     for one in found:
-        kept.setdefault((one.text, one.place), one)
+        kept.setdefault((one.text, one.places), one)
     return [*kept.values()]
 
 
@@ -104,8 +117,7 @@ def _of_topology(quality: Mapping[str, Any], mesh: TriMesh | None, sheet: bool) 
             continue
         border = name == "boundary_edges"
         text, matters = f"{quality[name]} {WORDS[name]}", NOTE if border and sheet else PROBLEM
-        where = [] if links is None else _borders(links) if border else _edges(links, name)
-        yield from _at(matters, text, where)
+        yield Problem(matters, text, () if links is None else _faults(links, name))
 
 
 def _of_crossing(
@@ -114,8 +126,8 @@ def _of_crossing(
     count = quality.get("self_intersections") or report.get("print", {}).get("self_intersections")
     if count:
         known = mesh is not None and crossing is not None and crossing.any()
-        where = _pieces(mesh.only(crossing)) if known and mesh is not None and crossing is not None else []
-        yield from _at(PROBLEM, f"{count} face(s) pass through others", where)
+        where = _pieces(mesh.only(crossing)) if known and mesh is not None and crossing is not None else ()
+        yield Problem(PROBLEM, f"{count} face(s) pass through others", where)
 
 
 def _of_print(told: Mapping[str, Any]) -> Iterator[Problem]:
@@ -124,11 +136,12 @@ def _of_print(told: Mapping[str, Any]) -> Iterator[Problem]:
         for text in told.get(key, ()):
             name = "wall" if "wall" in text else "gap" if "gap" in text else ""
             place = told.get(f"thinnest_{name}_at_mm")
-            yield Problem(matters, text, _place(place), told.get(f"thinnest_{name}_mm") or 0.0)
+            where = () if place is None else (Spot(_place(place), told.get(f"thinnest_{name}_mm") or 0.0),)
+            yield Problem(matters, text, where)
 
 
 def _of_rest(report: Mapping[str, Any]) -> Iterator[Problem]:
-    yield from (Problem(WARNING, text) for text in report.get("warnings", ()))
+    yield from (Problem(WARNING, text, named_places(text)) for text in report.get("warnings", ()))
     against = report.get("against", {})
     notes = [*report.get("study", {}).get("notes", ()), *report.get("points", {}).get("notes", ())]
     yield from (Problem(NOTE, text) for text in [*notes, *against.get("notes", ())])
@@ -137,36 +150,55 @@ def _of_rest(report: Mapping[str, Any]) -> Iterator[Problem]:
 def _of_cavities(quality: Mapping[str, Any]) -> Iterator[Problem]:
     places = quality.get("cavity_places_mm")
     if places:
-        yield from _at(NOTE, "a cavity inside", [(_place(place), 0.0) for place in places])
+        text = "a cavity inside" if len(places) == 1 else f"{len(places)} cavities inside"
+        yield Problem(NOTE, text, tuple(Spot(_place(place)) for place in places[:MOST]))
 
 
-def _at(matters: str, text: str, where: list[Any]) -> Iterator[Problem]:
-    """Tell of one thing at several places."""
-    if not where:
-        yield Problem(matters, text)
-    for number, (place, radius) in enumerate(where[:MOST], 1):
-        each = f" ({number} of {len(where)} places)" if len(where) > 1 else ""
-        yield Problem(matters, text + each, place, radius)
+def named_places(line: str) -> tuple[Spot, ...]:
+    """Return the places that a warning or an error names, as ``around (1, 2, 3)``.
+
+    Examples
+    --------
+    >>> named_places("the outside leaks in, by a gap around (1, -2.5, 3e-2)")
+    (Spot(place=(1.0, -2.5, 0.03), radius=0.0),)
+    """
+    found = [numbers.split(",") for numbers in AROUND.findall(line)]
+    return tuple(Spot(_place(numbers)) for numbers in found if len(numbers) == 3)
 
 
-def _borders(links: Links) -> list[Any]:
-    """Return the middle and the reach of each line of borders, the longest first."""
-    corners = links.faces.reshape(-1)
-    ends = np.stack([corners[links.borders], corners[_next(links.borders)]], axis=1)
-    return _groups(links.vertices, ends)
+def _faults(links: Links, name: str) -> tuple[Spot, ...]:
+    """Return where a fault of `measure.topology` is: the middle and the reach of what hangs together."""
+    if name == "inward_components":
+        return _inward(links)
+    if name == "nonmanifold_vertices":
+        return tuple(Spot(_place(links.vertices[n])) for n in links.touching[:MOST].tolist())
+    corners, (order, first) = links.faces.reshape(-1), links.edges
+    found = {
+        "boundary_edges": links.borders, "nonmanifold_edges": order[first[:-1][links.uses > 2]],
+        "misoriented_edges": order[first[:-1][_disagree(links)]],
+    }[name]  # fmt: skip
+    return _groups(links.vertices, np.stack([corners[found], corners[_next(found)]], axis=1))
 
 
-def _edges(links: Links, name: str) -> list[Any]:
-    """Return the places of edges that more than two faces share; of other faults none is known."""
-    if name != "nonmanifold_edges":
-        return []
-    order, first = links.edges
-    shared = order[first[:-1][links.uses > 2]]
-    corners = links.faces.reshape(-1)
-    return _groups(links.vertices, np.stack([corners[shared], corners[_next(shared)]], axis=1))
+def _disagree(links: Links) -> NDArray[np.bool_]:
+    """Tell of each edge whether it has two faces that both run through it in the same direction, (e,)."""
+    corners, (order, first) = links.faces.reshape(-1), links.edges
+    two = links.uses == 2
+    one, other = (corners[order[first[:-1][two] + n]] for n in (0, 1))
+    found = np.zeros(len(two), np.bool_)
+    found[two] = one == other
+    return found
 
 
-def _pieces(mesh: TriMesh) -> list[Any]:
+def _inward(links: Links) -> tuple[Spot, ...]:
+    """Return where the pieces without a border are that look inward."""
+    volumes = areas_and_volumes(links)[1]
+    turned = np.bincount(links.face_pieces, volumes, links.pieces) < 0
+    turned[links.face_pieces[links.borders // 3]] = False
+    return _groups(links.vertices, links.faces[turned[links.face_pieces]])
+
+
+def _pieces(mesh: TriMesh) -> tuple[Spot, ...]:
     """Return the places of the pieces of a mesh, the one with the most faces first."""
     return _groups(mesh.vertices, mesh.faces)
 
@@ -176,10 +208,10 @@ def _next(half_edges: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.asarray(half_edges - half_edges % 3 + (half_edges + 1) % 3)
 
 
-def _groups(vertices: Floats, simplices: NDArray[Any]) -> list[Any]:
+def _groups(vertices: Floats, simplices: NDArray[Any]) -> tuple[Spot, ...]:
     """Return the middle and the reach of what hangs together over vertices, the largest first."""
     if not len(simplices):
-        return []
+        return ()
     links = Links(_Simplices(vertices, simplices[:, [0, 1, -1]]))
     piece, used = links.vertex_pieces, links.used
     count = np.bincount(links.face_pieces)
@@ -187,7 +219,7 @@ def _groups(vertices: Floats, simplices: NDArray[Any]) -> list[Any]:
     np.minimum.at(low, piece[used], vertices[used])
     np.maximum.at(high, piece[used], vertices[used])
     middles, reach = (low + high) / 2, np.sqrt(((high - low) ** 2).sum(axis=1)) / 2
-    return [(_place(middles[n]), float(reach[n])) for n in np.argsort(-count, kind="stable")]
+    return tuple(Spot(_place(middles[n]), float(reach[n])) for n in np.argsort(-count, kind="stable")[:MOST])
 
 
 @dataclass(frozen=True)
@@ -198,8 +230,6 @@ class _Simplices:
     faces: NDArray[Any]
 
 
-def _place(place: Any) -> tuple[float, float, float] | None:
-    if place is None:
-        return None
+def _place(place: Any) -> tuple[float, float, float]:
     x, y, z = (float(value) for value in place)
     return x, y, z

@@ -103,6 +103,14 @@ class Links:
         """Number of connected pieces."""
         return int(self.vertex_pieces.max(initial=-1)) + 1
 
+    @property
+    def touching(self) -> NDArray[np.intp]:
+        """Vertices at which several fans meet."""
+        roots = np.arange(self.faces.size, dtype=np.int32)
+        join_corners(self.faces, *self.edges, roots)
+        fans = np.bincount(self.faces.reshape(-1)[np.unique(roots)], minlength=len(self.vertices))
+        return np.flatnonzero(fans > 1)
+
     @cached_property
     def fans_and_loops(self) -> tuple[int, Ints]:
         """Number of fans, which are faces around a vertex edge by edge, and one half edge of each line of borders."""

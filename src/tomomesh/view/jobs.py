@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..errors import TomomeshError
+from ..html.places import named_places
 from ..settings import asked_by, parameters
 
 if TYPE_CHECKING:
@@ -138,11 +139,13 @@ def _outcome(work: Work, progress: Progress) -> dict[str, Any]:
     except Stopped:
         return {"event": "stopped"}
     except TomomeshError as error:
-        return {"event": "failed", "error": str(error), "flags": [*error.flags] or switches_in(str(error))}
+        line = str(error)
+        flags = [*error.flags] or switches_in(line)
+        return {"event": "failed", "error": line, "flags": flags, "places": named_places(line)}
     except MemoryError:
-        return {"event": "failed", "error": "the machine's memory is full", "flags": []}
+        return {"event": "failed", "error": "the machine's memory is full", "flags": [], "places": ()}
     except Exception as fault:  # a bug; not in its own words, which may quote what a study says of a patient
-        return {"event": "failed", "error": f"a bug: {type(fault).__name__}", "flags": []}
+        return {"event": "failed", "error": f"a bug: {type(fault).__name__}", "flags": [], "places": ()}
 
 
 def switches_in(line: str) -> list[str]:

@@ -13,6 +13,7 @@ from ..errors import UsageError
 from ..html.places import problems_of
 from ..html.scene import Scene, scene_of_cubes, scene_of_mesh, scene_of_points, scene_of_quads
 from ..html.three import three_js
+from ..html.verdict import verdict_of
 from ..measure.intersections import self_intersections
 from ..measure.report import assess
 from ..measure.section import section
@@ -26,7 +27,9 @@ from . import coloring
 from .routes import get, levels, post
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
 
     from ..progress import Progress
     from .opened import Opened
@@ -37,7 +40,7 @@ MOST = 2_500_000
 """Faces that are drawn at most; of a larger mesh fewer are, and the page says so. Two million are drawn at 3 frames a
 second without a graphics card."""
 STAGES: dict[str, Callable[[Surface], Any]] = {
-    "points": lambda surface: scene_of_points(surface.points.positions),
+    "points": lambda surface: scene_of_points(surface.points.positions, most=MOST),
     "cubes": lambda surface: _cubes(surface),
     "cuberille": lambda surface: scene_of_quads(surface.cuberille),
     "triangulated": lambda surface: surface.cuberille.triangulated(),
@@ -104,8 +107,7 @@ def _report(session: Session) -> dict[str, Any]:
     surface = surface_of(session)
     crossing = surface.crossing
     known = crossing is not None and len(crossing) == len(surface.mesh.faces)
-    problems = problems_of(surface.report, surface.mesh, crossing if known else None)
-    return {"report": surface.report, "problems": [asdict(one) for one in problems]}
+    return _told(surface.report, surface.mesh, crossing if known else None)
 
 
 def _checked(opened: Opened) -> dict[str, Any]:
@@ -113,8 +115,15 @@ def _checked(opened: Opened) -> dict[str, Any]:
     assert opened.mesh is not None
     report = opened.report or {"quality": assess(opened.mesh, cavities=linings(opened.mesh))}
     crosses = report.get("quality", report).get("self_intersections")
-    problems = problems_of(report, opened.mesh, self_intersections(opened.mesh) if crosses else None)
-    return {"report": report, "problems": [asdict(one) for one in problems]}
+    return _told(report, opened.mesh, self_intersections(opened.mesh) if crosses else None)
+
+
+def _told(report: Mapping[str, Any], mesh: TriMesh, crossing: NDArray[np.bool_] | None) -> dict[str, Any]:
+    problems, verdict = problems_of(report, mesh, crossing), verdict_of(report)
+    return {
+        "report": report, "problems": [asdict(one) for one in problems],
+        "verdict": {"state": verdict.state, "words": verdict.words},
+    }  # fmt: skip
 
 
 def _stages(session: Session) -> dict[str, Any]:
@@ -123,6 +132,8 @@ def _stages(session: Session) -> dict[str, Any]:
     if opened.mesh is not None:
         points = [] if opened.points is None else [{"name": "points", "faces": len(opened.points)}]
         return {"stages": [*points, {"name": "fitted", "faces": len(opened.mesh.faces)}]}
+    if WORK not in session.made and opened.points is not None:
+        return {"stages": [{"name": "points", "faces": len(opened.points)}]}
     surface = surface_of(session)
     counts = {
         "points": len(surface.points),
@@ -139,9 +150,10 @@ def _stages(session: Session) -> dict[str, Any]:
 
 def _mesh(session: Session, stage: str, color: str = "") -> Response:
     """Send a stage as the viewer reads it, with the numbers that color it."""
-    if session.opened.mesh is not None:
-        points = session.opened.points if stage == "points" else None
-        shown: Any = session.opened.mesh if points is None else scene_of_points(points.positions)
+    opened = session.opened
+    if opened.mesh is not None or (WORK not in session.made and stage == "points"):
+        points = opened.points if stage == "points" else None
+        shown: Any = mesh_of(session) if points is None else scene_of_points(points.positions, most=MOST)
     elif stage in STAGES:
         shown = STAGES[stage](surface_of(session))
     else:

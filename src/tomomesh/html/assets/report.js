@@ -43,9 +43,15 @@
   tool("axis").addEventListener("change", cut);
   tool("cut").addEventListener("input", cut);
 
+  /* From one place to the next, and after the last to the first. */
   for (const button of document.querySelectorAll("button.fly")) {
+    const places = button.dataset.places.split(";").map((one) => one.split(" ").map(Number));
+    let at = 0;
     button.addEventListener("click", () => {
-      viewer.fly(button.dataset.place.split(" ").map(Number), Number(button.dataset.radius));
+      const [x, y, z, radius] = places[at];
+      at = (at + 1) % places.length;
+      if (places.length > 1) button.textContent = `Show ${at + 1} of ${places.length}`;
+      viewer.fly([x, y, z], radius);
       element.scrollIntoView({ block: "nearest" });
     });
   }

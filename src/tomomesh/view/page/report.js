@@ -4,19 +4,31 @@ import { el, fill, short } from "./dom.js";
 const MARKS = { problem: "!", warning: "?", note: "i" };
 
 /**
- * List what a user should know; a click on what has a place goes there.
- * @param {{matters: string, text: string, place: number[]|null, radius: number}[]} problems
- * @param {(one: any) => void} go
+ * Say whether the surface is good to use, and list what a user should know of it; a click on what has places goes
+ * there, from one to the next.
+ * @param {{state: string, words: string}} verdict
+ * @param {{matters: string, text: string, places: [number[], number][]}[]} problems
+ * @param {(place: number[], radius: number) => void} go
  */
-export function problemList(problems, go) {
-  if (!problems.length) return el("p", { class: "fine" }, "No problems: closed, manifold, and no face passes through another.");
-  const rows = problems.map((one) => {
-    const text = [el("b", { class: `matters ${one.matters}`, title: one.matters }, MARKS[one.matters]), ` ${one.text}`];
-    const what = one.place ? el("button", { type: "button", class: "plain", onclick: () => go(one) }, ...text) : el("span", {}, ...text);
-    const where = one.place ? el("small", { class: "muted" }, ` at ${one.place.map((x) => short(x, 4)).join(", ")}`) : null;
-    return el("li", {}, what, where);
-  });
-  return el("ul", { class: "problems", "aria-label": "What to know of this surface" }, ...rows);
+export function problemList(verdict, problems, go) {
+  const words = el("p", { class: `verdict ${verdict.state}` }, verdict.words);
+  return [words, problems.length > 0 && el("ul", { class: "problems", "aria-label": "What to know of this surface" }, ...problems.map((one) => problemRow(one, go)))];
+}
+
+function problemRow({ matters, text, places }, go) {
+  const words = [el("b", { class: `matters ${matters}`, title: matters }, MARKS[matters]), ` ${text}`];
+  if (!places.length) return el("li", {}, el("span", {}, ...words));
+  const where = el("small", { class: "muted", role: "status" });
+  let at = -1;
+  const step = (by) => {
+    at = (at + by + places.length) % places.length;
+    const [place, radius] = places[at];
+    where.textContent = ` ${places.length > 1 ? `${at + 1} of ${places.length}, ` : ""}at ${place.map((x) => short(x, 4)).join(", ")}`;
+    go(place, radius);
+  };
+  const stepping = (sign, name, by) => el("button", { type: "button", class: "step", "aria-label": name, title: name, onclick: () => step(by) }, sign);
+  const several = places.length > 1 && [stepping("‹", "the place before", -1), stepping("›", "the next place", 1)];
+  return el("li", {}, el("button", { type: "button", class: "plain", onclick: () => step(1) }, ...words), where, ...(several || []));
 }
 
 /**

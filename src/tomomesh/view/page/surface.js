@@ -49,13 +49,14 @@ class SurfacePart {
     this.cuts = el("input", { type: "checkbox", onchange: () => this.cut() });
     this.beside = sliceWithOutline();
     this.told = el("div", { class: "told" });
+    this.table = el("div", {});
     this.view = el("div", { class: "view" });
     this.empty = el("p", { class: "empty" }, "No surface yet.");
     const looks = el("div", { class: "row" }, el("label", {}, "Color ", this.color), el("label", {}, this.wire, " edges"));
     this.cutting = el("fieldset", {}, el("legend", {}, "Cut"), el("div", { class: "row" }, el("label", {}, this.cuts, " cut at the slice"), this.plane), this.slice, this.beside.element);
     const steps = el("fieldset", {}, el("legend", {}, "Step"), this.step, this.steps);
-    this.shown = el("div", { class: "shown", hidden: true }, steps, looks, this.cutting);
-    const side = el("div", { class: "side" }, this.make, this.fault, this.hint, this.shown, this.told);
+    this.shown = el("div", { class: "shown", hidden: true }, steps, looks);
+    const side = el("div", { class: "side" }, this.make, this.fault, this.hint, this.shown, this.told, this.cutting, this.table);
     fill(panel, el("div", { class: "stage" }, this.view, this.empty), side);
   }
 
@@ -88,7 +89,7 @@ class SurfacePart {
     if (turn !== this.turn) {
       this.turn = turn;
       this.clear();
-      if (isMesh(state.opened) && ready) this.load();
+      if (ready && state.opened.kind !== "study") this.load();
     }
     this.update();
   }
@@ -102,9 +103,9 @@ class SurfacePart {
     this.hint.textContent = stale ? "Choices have changed since this surface was made." : this.size || "";
     this.tellFault();
     this.shown.hidden = !this.stages.length;
-    this.cutting.hidden = opened.kind !== "study";
+    this.cutting.hidden = opened.kind !== "study" || !this.stages.length;
     if (!this.stages.length) this.empty.textContent = opened.refused || (opened.ready ? "No surface yet." : "Reading ...");
-    if (!("reconstruct" in made) && !isMesh(opened) && this.stages.length) this.clear();
+    if (!("reconstruct" in made) && opened.kind === "study" && this.stages.length) this.clear();
   }
 
   /** Say what the last surface failed by, and offer what its line names. */
@@ -114,7 +115,8 @@ class SurfacePart {
     this.fault.dataset.error = failed?.error ?? "";
     const anew = (flag) => choose({ [flag.replace(/^--(no-)?/, "").replaceAll("-", "_")]: !flag.startsWith("--no-") }).then(() => this.begin());
     const helps = (failed?.flags ?? []).map((flag) => el("button", { type: "button", onclick: () => anew(flag) }, `Make it with ${flag}`));
-    fill(this.fault, failed && el("p", {}, failed.error), ...helps);
+    const places = (failed?.places ?? []).map(([place, radius]) => el("button", { type: "button", onclick: () => this.viewer?.fly(place, radius) }, "Show where"));
+    fill(this.fault, failed && el("p", {}, failed.error), ...places, ...helps);
   }
 
   clear() {
@@ -123,13 +125,15 @@ class SurfacePart {
     this.viewer = null;
     this.empty.hidden = false;
     fill(this.told);
+    fill(this.table);
     fill(this.steps);
     this.size = "";
   }
 
   async load() {
-    const known = state && ("reconstruct" in state.made || (isMesh(state.opened) && state.opened.ready));
-    const found = known && (await trying(get("/api/stages")));
+    const measured = state && ("reconstruct" in state.made || isMesh(state.opened));
+    const known = measured || state?.opened.kind === "points";
+    const found = known && state.opened.ready && (await trying(get("/api/stages")));
     if (!found) return;
     this.stages = found.stages;
     for (const option of this.color.options) option.hidden = isMesh(state.opened) && ["distance", "filled"].includes(option.value);
@@ -137,16 +141,18 @@ class SurfacePart {
     this.step.max = this.stages.length - 1;
     this.step.value = this.step.max;
     fill(this.steps, ...this.stages.map(({ name }) => el("span", {}, NAMES[name])));
-    fill(this.told, el("p", { class: "muted" }, "Measuring ..."));
+    fill(this.told, measured && el("p", { class: "muted" }, "Measuring ..."));
     if (state.opened.kind === "study") this.planes = (await trying(get("/api/planes")))?.planes;
     await this.showStage();
-    await this.loadReport();
+    if (measured) await this.loadReport();
   }
 
   /** After what is drawn: a large mesh is seen before it is measured. */
   async loadReport() {
     const found = await trying(get("/api/report"));
-    if (found) fill(this.told, problemList(found.problems, (one) => this.fly(one)), reportTable(found.report));
+    if (!found) return;
+    fill(this.told, ...problemList(found.verdict, found.problems, (place, radius) => this.viewer?.fly(place, radius)));
+    fill(this.table, reportTable(found.report));
   }
 
   async showStage() {
@@ -175,7 +181,8 @@ class SurfacePart {
 
   tellSize(stage, scene) {
     const unit = { points: "points", cubes: "cubes", cuberille: "squares" }[stage.name] ?? "triangles";
-    const fewer = scene.header.of_faces > scene.header.faces ? `, drawn as ${scene.header.faces.toLocaleString("en")}` : "";
+    const [all, drawn] = stage.name === "points" ? [stage.faces, scene.header.vertices] : [scene.header.of_faces, scene.header.faces];
+    const fewer = all > drawn ? `, drawn as ${drawn.toLocaleString("en")}` : "";
     this.view.setAttribute("aria-label", `${NAMES[stage.name]}: ${stage.faces} ${unit}`);
     this.size = `${stage.faces.toLocaleString("en")} ${unit}${fewer}`;
     this.update();
@@ -195,10 +202,6 @@ class SurfacePart {
     this.beside.show(plane, k, outline.values, this.planes[plane]);
     const at = await trying(get(`/api/place/${plane}/${k}`));
     if (at) this.viewer.clip(this.cuts.checked ? at : null);
-  }
-
-  fly(problem) {
-    if (problem.place) this.viewer?.fly(problem.place, problem.radius);
   }
 }
 

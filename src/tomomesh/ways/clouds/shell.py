@@ -190,11 +190,17 @@ def walls_of(shell: Shell, samples: Samples, points: Points, origin: Floats, set
     tight = shell.leak_test.tight
     flat = not tight and _is_flat(samples)
     walls = count_walls(settings, tight=tight, flat=flat)
-    if walls is not None:
+    if walls is not None and (tight or flat):
         return walls
+    found = _borders(shell, samples, settings)
+    if walls is not None:
+        return folded(
+            walls.value,
+            walls,
+            Stage(None, warnings=(f"the outside leaks in: {_leak(found, origin)}",) if found else ()),
+        )
     if _is_wide(shell, samples):
         raise too_wide(shell.cell)
-    found = _borders(shell, samples, settings)
     if fills_solid(points.places):
         raise GeometryError(
             "the points fill a solid, and do not lie on its surface", found=f"{len(points.cloud)} points",
@@ -202,11 +208,16 @@ def walls_of(shell: Shell, samples: Samples, points: Points, origin: Floats, set
         )  # fmt: skip
     if shell.is_thin and not _is_open(found, samples):
         return walls_found(1, BOTH_SIDES)
-    where = [f"a gap of {gap.size:.4g} around {place_in_words(gap.place + origin)}" for gap in found[:1]]
     raise GeometryError(
         ("the points look like an open surface: " if found else "")
         + "the outside leaks into the shell of cubes, so its surface would have two walls",
-        found=f"{len(found)} border(s), the widest {where[0]}" if found else f"cell = {shell.cell.min():.4g}",
+        found=_leak(found, origin) if found else f"cell = {shell.cell.min():.4g}",
         expected="points all around the object, without gaps as wide as its holes",
         hint="--fill-holes to cap what is open, --open for a sheet with borders, or --allow-leaks",
     )
+
+
+def _leak(borders: list[Gap], origin: Floats) -> str:
+    """Say where the outside leaks in."""
+    where = place_in_words(borders[0].place + origin)
+    return f"{len(borders)} border(s), the widest a gap of {borders[0].size:.4g} around {where}"
