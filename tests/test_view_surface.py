@@ -15,13 +15,19 @@ pytest.importorskip("uvicorn")
 from conftest import sphere
 from pages import ENDLESS, Page, served
 from studies import write_nifti
-from tomomesh import phantom, read_mesh
+from test_show import round_mesh
+from tomomesh import TriMesh, phantom, read_mesh
 from tomomesh.cli import main
 from tomomesh.measure.section import section
+from tomomesh.view import coloring, surfaces
+from tomomesh.view.opened import Opened
+from tomomesh.view.session import Session
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+    from tomomesh.progress import Progress
 
 HEAD = phantom((14, 40, 40), (6.0, 6.0, 11.0))
 
@@ -117,6 +123,32 @@ def test_the_outline_lies_where_the_plane_cuts_the_mesh(made: Page, tmp_path: Pa
 def test_what_there_is_not(made: Page) -> None:
     for path in ("/mesh/none", "/save/mesh.exe", "/save/../x", "/outline/oblique/3", "/mesh/fitted?color=none"):
         assert made.ask(path)[0] in (400, 404)
+
+
+def test_what_colors_is_measured_beside_the_page(made: Page) -> None:
+    made.state("/api/color", {"color": "thickness"})
+    made.ready()
+    assert made.state("/api/color", {"color": "thickness"}) == {"ready": True}
+    assert made.ask("/api/color", {"color": "none"})[0] == 200  # it fails as work does, beside the page
+    assert "no such colors" in made.ready()["failed"]["error"]
+
+
+def test_measuring_can_be_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    session = Session(Opened("mesh", ("ball.ply",), mesh=round_mesh()))
+
+    def endless(mesh: TriMesh, *, progress: Progress) -> None:
+        while True:
+            progress("walls", 0, 1)
+
+    monkeypatch.setattr(coloring, "walls_of", endless)
+    assert surfaces._color(session, {"color": "thickness"}) == {"ready": False, "job": 1}
+    job = session.jobs.now
+    assert job is not None
+    session.jobs.stop()
+    assert job.thread is not None
+    job.thread.join()
+    assert session.jobs.now is None
+    assert not coloring.is_measured(session, surfaces.mesh_of(session), "thickness")
 
 
 def test_stopped_work_leaves_nothing(study: Path) -> None:

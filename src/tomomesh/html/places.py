@@ -25,8 +25,8 @@ PROBLEM, WARNING, NOTE = "problem", "warning", "note"
 """How much it matters, the most first."""
 MOST = 100
 """Places that are told of one kind, the largest first; all are counted. Chosen: more nobody looks at one by one."""
-AROUND = re.compile(r"around \(([^()]*)\)")
-"""A place in the words of a warning or an error."""
+AROUND = re.compile(r"(?:gap of (\S+) )?around \(([^()]*)\)")
+"""A place in the words of a warning or an error, and how wide the gap is around it."""
 WORDS = {
     "boundary_edges": "edge(s) with a face on one side alone: the surface is open there",
     "nonmanifold_edges": "edge(s) where more than two faces meet",
@@ -159,11 +159,11 @@ def named_places(line: str) -> tuple[Spot, ...]:
 
     Examples
     --------
-    >>> named_places("the outside leaks in, by a gap around (1, -2.5, 3e-2)")
-    (Spot(place=(1.0, -2.5, 0.03), radius=0.0),)
+    >>> named_places("the outside leaks in, by a gap of 4 around (1, -2.5, 3e-2)")
+    (Spot(place=(1.0, -2.5, 0.03), radius=2.0),)
     """
-    found = [numbers.split(",") for numbers in AROUND.findall(line)]
-    return tuple(Spot(_place(numbers)) for numbers in found if len(numbers) == 3)
+    found = [(float(width or 0) / 2, numbers.split(",")) for width, numbers in AROUND.findall(line)]
+    return tuple(Spot(_place(numbers), radius) for radius, numbers in found if len(numbers) == 3)
 
 
 def _faults(links: Links, name: str) -> tuple[Spot, ...]:

@@ -10,6 +10,7 @@ from ..errors import UsageError
 from ..html.scene import Values
 from ..measure.thickness import walls_of
 from ..measure.tree import Tree
+from ..progress import silent
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..model.mesh import TriMesh
+    from ..progress import Progress
     from ..results import Surface
     from .session import Session
 
@@ -25,28 +27,42 @@ if TYPE_CHECKING:
 COLORS = ("distance", "thickness", "filled")
 
 
-def values_of(session: Session, mesh: TriMesh, name: str) -> Mapping[str, Values]:
-    """Return the numbers of a name at the vertices of a mesh.
+def values_of(session: Session, mesh: TriMesh, name: str, progress: Progress = silent) -> Mapping[str, Values]:
+    """Return the numbers of a name at the vertices of a mesh, which are measured once.
 
     Raises
     ------
     UsageError
         For a name that there is not, or where nothing is known of it.
     """
+    _, found = session.colors.of((name, id(mesh)), lambda: (mesh, _measured(session, mesh, name, progress)))
+    return {name: found}
+
+
+def is_measured(session: Session, mesh: TriMesh, name: str) -> bool:
+    """Tell whether the numbers of a name are there without waiting."""
+    try:
+        session.colors.known((name, id(mesh)))
+    except LookupError:
+        return False
+    return True
+
+
+def _measured(session: Session, mesh: TriMesh, name: str, progress: Progress) -> Values:
     made = session.made.get("reconstruct")
     surface: Surface | None = None if made is None or session.opened.mesh is not None else made.value
     if name == "thickness":
-        return {name: Values(_thickness(mesh), "thickness of the wall", "mm")}
+        return Values(_thickness(mesh, progress), "thickness of the wall", "mm")
     if name == "distance" and surface is not None:
-        return {name: Values(_distance(surface), "distance to the points", "mm")}
+        return Values(_distance(surface), "distance to the points", "mm")
     if name == "filled" and surface is not None:
-        return {name: Values(_filled(surface), "filled, not measured")}
+        return Values(_filled(surface), "filled, not measured")
     raise UsageError("the mesh has no such colors", found=name, expected=" | ".join(COLORS))
 
 
-def _thickness(mesh: TriMesh) -> Floats:
+def _thickness(mesh: TriMesh, progress: Progress) -> Floats:
     """Return at each vertex the width of the nearest place where the wall was measured; NaN where it has none."""
-    walls = walls_of(mesh)
+    walls = walls_of(mesh, progress=progress)
     widths = np.where(np.isfinite(walls.widths), walls.widths, np.nan)
     return np.asarray(widths[Tree.of_points(walls.places).nearest(mesh.vertices)[1]])
 

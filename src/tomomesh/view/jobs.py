@@ -40,7 +40,7 @@ class Job:
     ----------
     number : int
     name : str
-        What it is called to the page: read, reconstruct, segment, train.
+        What it is called to the page: read, reconstruct, color, segment, train.
     stage, done, total
         Where it is, as `tomomesh.progress` says.
     """

@@ -93,7 +93,7 @@ class Session:
     ) -> None:  # fmt: skip
         self.opened, self.write, self.reach = opened, write, reach or Reach()
         self._turns, self._told = 0, count(1)
-        self.surveys, self.selections = Remembered(1), Remembered(3)
+        self.surveys, self.selections, self.colors = Remembered(1), Remembered(3), Remembered(3)
         self.choices = Choices().then(choices or {})
         self.made: dict[str, Outcome] = {}
         self.events = Events()
@@ -146,6 +146,7 @@ class Session:
     def keep(self, name: str, value: Any, choices: Mapping[str, Any]) -> None:
         """Keep what was made with some choices."""
         self.made[name] = Outcome(value, dict(choices))
+        self.colors.clear()
         self.tell()
 
     def open(self, opened: Opened, choices: Mapping[str, Any] | None = None) -> None:
@@ -185,6 +186,7 @@ class Session:
         self.opened, self._turns = opened, self._turns + 1
         self.surveys.clear()
         self.selections.clear()
+        self.colors.clear()
         self.tell()
 
     def tell(self) -> None:

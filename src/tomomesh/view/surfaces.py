@@ -165,6 +165,19 @@ def _mesh(session: Session, stage: str, color: str = "") -> Response:
     return Response(shown.packed(), media_type="application/octet-stream")
 
 
+def _color(session: Session, body: Any) -> dict[str, Any]:
+    """Begin to measure what is to color the mesh, and tell whether that is known already."""
+    mesh, name = mesh_of(session), str(body["color"])
+    if coloring.is_measured(session, mesh, name):
+        return {"ready": True}
+    return {"ready": False, "job": session.jobs.start("color", partial(_colored, session, mesh, name)).number}
+
+
+def _colored(session: Session, mesh: TriMesh, name: str, progress: Progress) -> dict[str, Any]:
+    coloring.values_of(session, mesh, name, progress)
+    return {"color": name}
+
+
 def _outline(session: Session, plane: str, k: str) -> Response:
     """Send where the mesh cuts a slice: ends (s, 2, 2) of segments, in the slice's own columns and rows."""
     volume = session.opened.volume
@@ -199,6 +212,7 @@ ROUTES = [
     post("/api/reconstruct", _reconstruct),
     get("/api/stages", _stages),
     get("/api/report", _report),
+    post("/api/color", _color),
     get("/mesh/{stage}", _mesh),
     get("/outline/{plane}/{k:int}", _outline),
     get("/api/place/{plane}/{k:int}", _place),

@@ -277,7 +277,7 @@
       const target = new THREE.Vector3(...place.map((value, n) => value - center[n]));
       const outward = target.clone();
       if (outward.length() < 0.02 * this.size) outward.subVectors(this.camera.position, this.controls.target);
-      const far = Math.max(8 * radius, 0.35 * this.size);
+      const far = Math.max(Math.min(8 * radius, this.size), 2.5 * radius, 0.35 * this.size);
       const eye = outward.normalize().multiplyScalar(far).add(target);
       this.mark.position.copy(target);
       this.mark.visible = true;

@@ -28,7 +28,7 @@ function problemRow({ matters, text, places }, go) {
   };
   const stepping = (sign, name, by) => el("button", { type: "button", class: "step", "aria-label": name, title: name, onclick: () => step(by) }, sign);
   const several = places.length > 1 && [stepping("‹", "the place before", -1), stepping("›", "the next place", 1)];
-  return el("li", {}, el("button", { type: "button", class: "plain", onclick: () => step(1) }, ...words), where, ...(several || []));
+  return el("li", {}, el("button", { type: "button", class: "plain", onclick: () => step(1) }, ...words), ...(several || []), where);
 }
 
 /**

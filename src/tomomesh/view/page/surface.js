@@ -27,10 +27,21 @@ class SurfacePart {
     this.stages = [];
     this.made = 0;
     this.viewer = null;
+    this.ended = 0;
     this.build(panel);
     on("state", () => this.follow());
     on("progress", () => this.update());
-    on("done", ({ name }) => { if (name === "reconstruct") this.load(); });
+    on("done", ({ name, job }) => {
+      this.ended = job;
+      if (name === "reconstruct") this.load();
+      else if (this.waits) this.showStage();
+    });
+    for (const end of ["stopped", "failed"]) {
+      on(end, ({ job }) => {
+        this.ended = job;
+        this.uncolor();
+      });
+    }
     on("theme", () => this.viewer?.setDark(isDark()));
     this.cut = eachFrame(() => this.cutNow());
   }
@@ -100,7 +111,7 @@ class SurfacePart {
     this.make.disabled = Boolean(job) || !opened.ready;
     this.make.textContent = "reconstruct" in made ? "Make it again" : "Make the surface";
     const stale = made.reconstruct === false;
-    this.hint.textContent = stale ? "Choices have changed since this surface was made." : this.size || "";
+    this.hint.textContent = this.waits ? "Measuring what is to color it ..." : stale ? "Choices have changed since this surface was made." : this.size || "";
     this.tellFault();
     this.shown.hidden = !this.stages.length;
     this.cutting.hidden = opened.kind !== "study" || !this.stages.length;
@@ -159,8 +170,8 @@ class SurfacePart {
     const stage = this.stages[Number(this.step.value)];
     if (!stage) return;
     for (const [n, span] of [...this.steps.children].entries()) span.classList.toggle("now", n === Number(this.step.value));
-    const color = stage.name === "fitted" ? this.color.value : "";
     const asked = (this.made += 1);
+    const color = stage.name === "fitted" ? await this.measured() : "";
     const answer = await trying(fetch(`/mesh/${stage.name}?color=${color}`).then(bytesOf));
     if (!answer || asked !== this.made) return;
     this.empty.hidden = true;
@@ -177,6 +188,23 @@ class SurfacePart {
     this.viewer.setWire(this.wire.checked);
     this.tellSize(stage, scene);
     this.cut();
+  }
+
+  /** What is to color the mesh, once it is measured: until then nothing. */
+  async measured() {
+    const color = this.color.value;
+    const found = color && (await trying(post("/api/color", { color })));
+    if (found?.job <= this.ended) return this.measured(); // its end was told before it was
+    this.waits = Boolean(found && !found.ready);
+    this.update();
+    return found?.ready ? color : "";
+  }
+
+  /** What was to be measured is not. */
+  uncolor() {
+    if (this.waits) this.color.value = "";
+    this.waits = false;
+    this.update();
   }
 
   tellSize(stage, scene) {
