@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -15,6 +16,8 @@ pytest.importorskip("starlette")
 pytest.importorskip("uvicorn")
 
 from pages import HERE, Page, served
+from tomomesh.errors import UsageError
+from tomomesh.view.doors import public_origin
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -127,3 +130,65 @@ def test_it_listens_on_this_machine_alone() -> None:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 2
         assert done.stderr.startswith("error: whoever reaches this host")
+
+
+PROXY = "https://view.example.org"
+
+
+@pytest.fixture(scope="module")
+def behind() -> Iterator[Page]:
+    """A page behind a proxy that hands on the host that it is asked for."""
+    with socket.create_server((HERE, 0)) as free:
+        port = free.getsockname()[1]
+    command = [
+        sys.executable,
+        "-m",
+        "tomomesh",
+        "view",
+        "--no-browser",
+        "--port",
+        str(port),
+        "--public-url",
+        PROXY + ":443/",
+    ]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        address, _, token = process.stderr.readline().removeprefix("open ").strip().partition("/?token=")
+        assert address == PROXY
+        yield Page(process, port, token)
+        process.send_signal(signal.SIGINT)
+
+
+def test_a_proxy_with_tls_is_our_own_origin(behind: Page) -> None:
+    proxied = {"Host": "view.example.org", "Origin": PROXY}
+    status, headers, _ = behind.ask(f"/?token={behind.token}", headers=proxied)
+    assert (status, headers["location"]) == (303, "/")
+    assert {"HttpOnly", "SameSite=Strict", "Secure"} <= {part.strip() for part in headers["set-cookie"].split(";")}
+    assert behind.ask(f"/?token={behind.token}", headers=proxied)[0] == 403
+    behind.cookie = headers["set-cookie"].partition(";")[0]
+    assert behind.ask("/api/choose", {"neurons": 40}, headers=proxied)[0] == 200
+    assert "101" in handshake(behind, proxied)
+    for wrong in (
+        {"Origin": "http://view.example.org"}, {"Origin": f"http://{HERE}:{behind.port}"}, {"Host": "evil.example"},
+        {"Host": "view.example.org:443"}, {"Cookie": ""},
+    ):  # fmt: skip
+        assert behind.ask("/api/choose", {"neurons": 41}, headers=proxied | wrong)[0] == 403
+        assert "403" in handshake(behind, proxied | wrong)
+    assert behind.ask("/api/choose", {"neurons": 42}, headers={"Origin": PROXY})[0] == 403  # of this machine's own host
+    assert behind.state()["choices"] == {"neurons": 40}
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["http://view.example.org", "https://", "view.example.org", "https://a@b.org", "https://b.org/view", "https://b.org?x",
+     "https://b.org:x", "https://b.org:99999", "https://b.org#x", "", "https://[::1", "https:///x"],
+)  # fmt: skip
+def test_a_proxy_is_named_by_its_origin_alone(address: str) -> None:
+    with pytest.raises(UsageError, match="--public-url"):
+        public_origin(address)
+
+
+@pytest.mark.parametrize("address", ["https://b.org", "https://B.org/", "https://b.org:443"])
+def test_origins_are_as_browsers_write_them(address: str) -> None:
+    assert public_origin(address) == "https://b.org"
+    assert public_origin("https://[::1]:8443") == "https://[::1]:8443"

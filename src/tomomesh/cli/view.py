@@ -29,12 +29,14 @@ def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
     from ..view import require_view
 
     require_view()
+    from ..view.doors import public_origin
     from ..view.opened import Opened, kind_of
     from ..view.reach import Reach, browsed
     from ..view.server import serve
     from ..view.session import Session
     from .outputs.write import write_one
 
+    public = "" if chosen.public_url is None else public_origin(chosen.public_url)
     opened = Opened() if chosen.looked_at is None else Opened(kind_of(chosen.looked_at), (chosen.looked_at,))
 
     def started(address: str) -> None:
@@ -44,4 +46,5 @@ def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
 
     folder = None if chosen.browse is None else browsed(chosen.browse)
     session = Session(opened, given, Reach(opened.words, folder), write=write_one)
-    serve(session, started, host="127.0.0.1" if chosen.host in LOCAL else chosen.host, port=chosen.port)
+    host = "127.0.0.1" if chosen.host in LOCAL else chosen.host
+    serve(session, started, host=host, port=chosen.port, public=public)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import secrets
 from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, urlsplit
+
+from ..errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -26,6 +28,8 @@ SENT = {
     "cache-control": "no-store",
 }
 """With every answer. Nothing is stored: slices are a patient's."""
+HTTPS = 443
+"""The port that browsers leave out."""
 READING = ("GET", "HEAD")
 """Requests that change nothing."""
 
@@ -40,14 +44,13 @@ class Doors:
     Parameters
     ----------
     app : ASGI application
-    hosts : collection of str
-        What ``Host`` may be, with the port.
-    scheme : str
-        ``http``, or ``https`` where a proxy in front speaks TLS.
+    origins : collection of str
+        What the page's own origin may be, ``http://127.0.0.1:8000`` or what a proxy in front is called: ``Host`` is
+        what follows the scheme.
     """
 
-    def __init__(self, app: ASGIApp, hosts: Collection[str], scheme: str = "http") -> None:
-        self._app, self._hosts, self._scheme = app, frozenset(hosts), scheme
+    def __init__(self, app: ASGIApp, origins: Collection[str]) -> None:
+        self._app, self._schemes = app, {host: scheme for scheme, _, host in (one.partition("://") for one in origins)}
         self.token: str = secrets.token_urlsafe(32)
         self._ticket = secrets.token_urlsafe(32)
         self._name = "tomomesh-" + secrets.token_hex(4)
@@ -58,13 +61,14 @@ class Doors:
             await self._app(scope, receive, send)
             return
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
-        if headers.get("host") not in self._hosts:
+        scheme = self._schemes.get(headers.get("host", ""))
+        if scheme is None:
             await _refuse(scope, receive, send, "the host is not ours")
         elif self._hands_over(scope):
-            await self._welcome(send)
+            await self._welcome(send, secure=scheme == "https")
         elif not self._bears_ticket(headers):
             await _refuse(scope, receive, send, "open the address that tomomesh has printed; it opens once")
-        elif not self._is_ours(scope, headers):
+        elif not _is_ours(scope, headers, f"{scheme}://{headers['host']}"):
             await _refuse(scope, receive, send, "the request is another page's")
         else:
             await self._app(scope, receive, _with_headers(send))
@@ -79,9 +83,8 @@ class Doors:
         self.token = ""
         return True
 
-    async def _welcome(self, send: Send) -> None:
-        secure = "; Secure" if self._scheme == "https" else ""
-        cookie = f"{self._name}={self._ticket}; HttpOnly; SameSite=Strict; Path=/{secure}"
+    async def _welcome(self, send: Send, *, secure: bool) -> None:
+        cookie = f"{self._name}={self._ticket}; HttpOnly; SameSite=Strict; Path=/{'; Secure' if secure else ''}"
         await _answer(send, 303, "", {"location": "/", "set-cookie": cookie})
 
     def _bears_ticket(self, headers: dict[str, str]) -> bool:
@@ -91,11 +94,40 @@ class Doors:
             return False
         return found is not None and secrets.compare_digest(found.value.encode(), self._ticket.encode())
 
-    def _is_ours(self, scope: Scope, headers: dict[str, str]) -> bool:
-        """Tell whether a request that changes something comes from our own page."""
-        if scope["type"] == "http" and scope["method"] in READING:
-            return headers.get("sec-fetch-site", "none") in ("none", "same-origin")
-        return headers.get("origin") == f"{self._scheme}://{headers['host']}"
+
+def public_origin(address: str) -> str:
+    """Return the origin of what a proxy in front is called, as browsers write it.
+
+    Raises
+    ------
+    UsageError
+        For what is no ``https://HOST``: with a path the page's own addresses would lead beside it.
+
+    Examples
+    --------
+    >>> public_origin("https://View.example.org:443/")
+    'https://view.example.org'
+    """
+    try:
+        found = urlsplit(address.rstrip("/").lower())
+        port, host = found.port, found.hostname or ""
+    except ValueError:  # a port that is none
+        found, port, host = urlsplit(""), None, ""
+    host = f"[{host}]" if ":" in host else host
+    told = f"{host}:{port}" if port is not None else host
+    if host and found.geturl() == f"https://{told}":
+        return f"https://{host if port == HTTPS else told}"
+    raise UsageError(
+        "a proxy in front is named by its origin alone", found=f"--public-url {address}",
+        expected="https://HOST or https://HOST:PORT",
+    )  # fmt: skip
+
+
+def _is_ours(scope: Scope, headers: dict[str, str], origin: str) -> bool:
+    """Tell whether a request that changes something comes from our own page."""
+    if scope["type"] == "http" and scope["method"] in READING:
+        return headers.get("sec-fetch-site", "none") in ("none", "same-origin")
+    return headers.get("origin") == origin
 
 
 def _with_headers(send: Send) -> Send:

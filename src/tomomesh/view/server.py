@@ -31,7 +31,9 @@ class _Server(uvicorn.Server):
         self._started()
 
 
-def serve(session: Session, started: Callable[[str], None], *, host: str = HERE, port: int = 0) -> None:
+def serve(
+    session: Session, started: Callable[[str], None], *, host: str = HERE, port: int = 0, public: str = ""
+) -> None:
     """Serve the page until Ctrl-C.
 
     Parameters
@@ -42,17 +44,19 @@ def serve(session: Session, started: Callable[[str], None], *, host: str = HERE,
         Takes the address to open, token and all, once the page can be opened.
     host, port : str, int
         Where it listens: this machine alone, on a free port, unless asked otherwise.
+    public : str
+        The origin of a proxy in front, where there is one.
     """
     listening = socket.create_server((host, port))
     bound = listening.getsockname()[1]
-    names = {host, "localhost"} if host == HERE else {host}
-    doors = Doors(application(session), {f"{name}:{bound}" for name in names})
+    own = [f"http://{name}:{bound}" for name in ([host, "localhost"] if host == HERE else [host])]
+    doors = Doors(application(session), [*own, *([public] if public else [])])
     config = uvicorn.Config(
         doors, log_level="critical", access_log=False, ws_max_size=1 << 16, lifespan="off", timeout_graceful_shutdown=1
     )
 
     def begun() -> None:
-        started(f"http://{host}:{bound}/?token={doors.token}")
+        started(f"{public or own[0]}/?token={doors.token}")
         if session.opened.words and not session.opened.ready:
             session.read(session.opened)
 

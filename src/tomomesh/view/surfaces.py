@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ from starlette.responses import Response
 
 from ..errors import UsageError
 from ..html.places import problems_of
-from ..html.scene import Scene, scene_of_cubes, scene_of_mesh, scene_of_points, scene_of_quads
+from ..html.scene import PLAIN, Scene, scene_of_cubes, scene_of_mesh, scene_of_points, scene_of_quads
 from ..html.three import three_js
 from ..html.verdict import verdict_of
 from ..measure.intersections import self_intersections
@@ -162,7 +162,15 @@ def _mesh(session: Session, stage: str, color: str = "") -> Response:
         values = coloring.values_of(session, shown, color) if color and stage == "fitted" else {}
         shown = scene_of_mesh(shown, most=MOST, values=values)
     assert isinstance(shown, Scene)
-    return Response(shown.packed(), media_type="application/octet-stream")
+    return Response(_framed(session, shown).packed(), media_type="application/octet-stream")
+
+
+def _framed(session: Session, scene: Scene) -> Scene:
+    """Name the ends of the axes: the patient's for a study and for what a run has left, else x, y and z."""
+    if session.opened.kind in ("study", "run"):
+        return scene
+    place = session.made[WORK].value.place if WORK in session.made else None
+    return replace(scene, axes=PLAIN, unit=scene.unit if place is None else place.unit)
 
 
 def _color(session: Session, body: Any) -> dict[str, Any]:

@@ -167,6 +167,9 @@ def _view(commands: Any) -> None:
     view.add_argument(
         "--host", default="127.0.0.1", metavar="NAME", help="listen for other machines too; see docs/view.md"
     )
+    view.add_argument(
+        "--public-url", metavar="URL", help="what a proxy with TLS in front is called, as https://view.example.org"
+    )
     view.add_argument("--i-know", metavar="WORDS", help="the words that --host asks for")
     add_settings(view, (*STAGE_ONE, "cloud", *STAGE_TWO, "run"))
 
