@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -105,6 +106,55 @@ WINDOWS: dict[str, dict[str, Any]] = {
     "largest": {"keep": "largest", "upper": 150.0}, "range": {"slice_range": (3, 9)},
     "box": {"lower": 60.0, "roi": (-60.0, 70.0, -50.0, 90.0, -60.0, 50.0)},
 }  # fmt: skip
+
+
+class TestBeside:
+    """A label map beside the study: chosen by its labels, drawn over its gray levels."""
+
+    @pytest.fixture
+    def session(self, tmp_path: Path) -> Session:
+        stored = np.zeros(HEAD.volume.shape, np.uint8)
+        stored[3:9, 10:20, 5:15], stored[3:9, 20:30, 15:25] = 4, 7
+        gray = write_nifti(tmp_path / "gray.nii", np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
+        beside = write_nifti(tmp_path / "labels.nii", stored[:, ::-1], HEAD.volume.affine @ flipped(1, stored.shape[1]))
+        session = Session(Opened("study", (str(gray),), str(beside)))
+        session.read(session.opened)
+        return opened(session)
+
+    def test_its_labels_are_told_and_chosen(self, session: Session) -> None:
+        told = studies._study(session)
+        assert (told["beside"], told["labels"]) == (True, {"4": 600, "7": 600})
+        windows._pick(session, {"voxel": [5, 25, 20]})
+        assert session.settings.window.select == (7,)
+        assert [one["voxels"] for one in windows.kept(session)[1].listed()] == [600]
+        windows._pick(session, {"voxel": [5, 15, 10]})
+        assert session.choices.values == {"select": (4, 7)}
+        windows._pick(session, {"voxel": [5, 25, 20]})
+        assert session.choices.values == {"select": (4,)}
+        with pytest.raises(UsageError, match="no label lies here"):
+            windows._pick(session, {"voxel": [0, 0, 0]})
+
+    def test_the_command_names_it_where_it_matters(self, session: Session) -> None:
+        assert "--labels-in" not in session.command
+        session.choose({"select": [4]})
+        gray, beside = session.opened.words[0], session.opened.beside
+        assert shlex.split(session.command) == [
+            "tomomesh", "reconstruct", gray, "--labels-in", beside, "--select=4", "-o", "mesh.stl",
+        ]  # fmt: skip
+
+    def test_one_that_does_not_fit_is_refused(self, tmp_path: Path) -> None:
+        gray = write_nifti(tmp_path / "gray.nii", np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
+        beside = write_nifti(tmp_path / "other.nii", np.ones((4, 4, 4), np.uint8), np.diag([3.0, 3, 3, 1]))
+        session = Session(Opened("study", (str(gray),), str(beside)))
+        session.read(session.opened)
+        assert "grid" in opened(session).opened.refused
+
+
+def flipped(axis: int, size: int) -> NDArray[np.float64]:
+    """Return what leads from the indices (i, j, k) of a flipped array to those of the array."""
+    turn = np.eye(4)
+    turn[axis, axis], turn[axis, 3] = -1, size - 1
+    return turn
 
 
 class TestKept:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,13 +18,13 @@ from browsers import SOFTWARE, chromium
 from pages import HERE, Page, served
 from studies import AFFINES, sampled, setting, write_nifti, write_series
 from tomomesh import phantom
+from tomomesh.cli import main
 from tomomesh.cli.commands import settings_of
 from tomomesh.cli.options import build_parser
 from tomomesh.cli.options.parameters import joined
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from pathlib import Path
 
     from tomomesh.settings import Settings
 
@@ -238,6 +239,26 @@ def test_components_are_kept_and_dropped(browser: Any, tmp_path: Path) -> None:
         page.until(lambda found: found.window.drop_at == (place,))
         page.tab.click(".rows .picked >> text=bring back")
         page.until(lambda found: found.window.drop_at is None)
+
+
+def test_labels_beside_a_study_are_chosen_and_give_the_commands_bytes(browser: Any, tmp_path: Path) -> None:
+    gray = write_nifti(tmp_path / "gray.nii", np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
+    beside = write_nifti(tmp_path / "labels.nii", LABELS, HEAD.volume.affine)
+    with shown(browser, gray, "--labels-in", beside) as page:
+        page.tab.wait_for_selector(".rows input[type=checkbox]")
+        page.tab.click(".rows input[type=checkbox] >> nth=0")
+        page.until(lambda found: bool(found.window.select))
+        page.wait("document.querySelector('.told').textContent.includes('voxels')")
+        assert page.colors("axial") > 0
+        page.tab.click("#tab-surface")
+        page.tab.keyboard.press("m")
+        page.tab.wait_for_selector(".verdict")
+        page.tab.click("#tab-saving")
+        with page.tab.expect_download() as saved:
+            page.tab.click(".save >> nth=0 >> text=Save")
+        words = shlex.split(page.tab.inner_text("#command"))[1:-1]
+        assert main([*words, str(tmp_path / "mesh.stl"), "--quiet"]) == 0
+        assert Path(saved.value.path()).read_bytes() == (tmp_path / "mesh.stl").read_bytes()
 
 
 def test_labels_are_chosen_in_the_list_and_in_a_slice(browser: Any, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from ..settings import Settings
+    from ..view.opened import Opened
 
 ANYWHERE = "anybody-who-has-the-address-may-see-it"
 """What ``--i-know`` wants to be told, for other hosts than this machine."""
@@ -30,14 +31,13 @@ def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
 
     require_view()
     from ..view.doors import public_origin
-    from ..view.opened import Opened, kind_of
     from ..view.reach import Reach, browsed
     from ..view.server import serve
     from ..view.session import Session
     from .outputs.write import write_one
 
     public = "" if chosen.public_url is None else public_origin(chosen.public_url)
-    opened = Opened() if chosen.looked_at is None else Opened(kind_of(chosen.looked_at), (chosen.looked_at,))
+    opened = _opened(chosen.looked_at, chosen.labels_in)
 
     def started(address: str) -> None:
         print(f"open {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
@@ -48,3 +48,12 @@ def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
     session = Session(opened, given, Reach(opened.words, folder), write=write_one)
     host = "127.0.0.1" if chosen.host in LOCAL else chosen.host
     serve(session, started, host=host, port=chosen.port, public=public)
+
+
+def _opened(path: str | None, beside: str | None) -> Opened:
+    from ..view.opened import Opened, kind_of
+
+    kind = "nothing" if path is None else kind_of(path)
+    if beside and kind != "study":
+        raise UsageError("a label map lies beside a study", found=f"--labels-in, and {kind}", expected="STUDY")
+    return Opened(kind, () if path is None else (path,), beside or "")

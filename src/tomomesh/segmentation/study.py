@@ -122,7 +122,7 @@ def lay_out(
     axis = _slice_axis(volume, settings.network.slices)
     part, box = crop(volume, settings.crop, axis)
     study = part.along(axis)
-    laid = study if labels is None else _fitting(labels, volume, cutting).cropped(box).along(axis)
+    laid = study if labels is None else fitting(labels, volume, cutting).cropped(box).along(axis)
     cropped = _cropped(tuple(box[n] for n in order_along(axis)), volume.along(axis).shape)
     found = Labelled.of(laid, cutting) if labelled else None
     return LaidOut(study, AXES[axis], found, inside_roi(study, settings.crop.roi), cropped, cutting)
@@ -159,8 +159,8 @@ def _slice_axis(volume: Volume, slices: str) -> int:
     return volume.stored_axis if slices == "stored" else AXES.index(slices)
 
 
-def _fitting(labels: Volume, volume: Volume, cutting: Cutting) -> Volume:
-    """Lay a label map onto the study's grid."""
+def fitting(labels: Volume, volume: Volume, cutting: Cutting = HERE) -> Volume:
+    """Lay a label map onto the study's grid; errors are those of `onto_grid`, with the option that helps."""
     labels = whole(labels, cutting)
     try:
         return onto_grid(labels, volume, cutting)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from .. import io
 from ..errors import EmptyError, FormatError, TomomeshError, UnreadableError
 from ..io.files.source import suffix_of
+from ..segmentation.study import fitting
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -41,8 +42,12 @@ class Opened:
         study, points, mesh, run (the folder that a run has left), or nothing where nothing was opened.
     words : tuple of str
         What names it on a command line.
+    beside : str
+        The file of a label map beside the study; "" where there is none.
     volume, labels : Volume or None
-        The study, and a label map beside it; None while it is being read.
+        The study, and the label map beside it; None while it is being read.
+    laid : Volume or None
+        The label map on the study's grid.
     points : PointSet or None
     mesh : TriMesh or None
     report : mapping
@@ -59,8 +64,10 @@ class Opened:
 
     kind: str = "nothing"
     words: tuple[str, ...] = ()
+    beside: str = ""
     volume: Volume | None = field(default=None, repr=False)
     labels: Volume | None = field(default=None, repr=False)
+    laid: Volume | None = field(default=None, repr=False)
     points: PointSet | None = field(default=None, repr=False)
     mesh: TriMesh | None = field(default=None, repr=False)
     report: Mapping[str, Any] = field(default_factory=dict, repr=False)
@@ -74,7 +81,12 @@ class Opened:
         if self.kind in ("mesh", "run"):
             return self.repeats or (("check", *self.words) if self.kind == "mesh" else ())
         name = "surface" if self.kind == "points" else "reconstruct"
-        return (name, *self.words, *settings.words(), "-o", "mesh.stl")
+        beside = ("--labels-in", self.beside) if self.beside and settings.window.select else ()
+        return (name, *self.words, *beside, *settings.words(), "-o", "mesh.stl")
+
+    def chosen_labels(self, settings: Settings) -> Volume | None:
+        """Return the label map beside the study, where labels are chosen."""
+        return self.labels if settings.window.select else None
 
     @property
     def ready(self) -> bool:
@@ -85,7 +97,7 @@ class Opened:
         """Tell whether other settings read a study otherwise."""
         if self.kind != "study":
             return False
-        part = bool(self.refused or self.names) and suffix_of(self.words[0]) not in WHOLE
+        part = bool(self.refused or self.names) and suffix_of(self.beside or self.words[0]) not in WHOLE
         return before.read != after.read or (part and before.window.select != after.window.select)
 
     @property
@@ -139,8 +151,8 @@ def _is_mesh(path: str | Path) -> bool:
     return suffix_of(path) in {*io.MESH_READERS} - {*io.VOLUME_READERS}
 
 
-def opened_as(kind: str, path: str, settings: Settings, progress: Progress) -> Opened:
-    """Read what a path leads to.
+def opened_as(kind: str, path: str, settings: Settings, progress: Progress, *, beside: str = "") -> Opened:
+    """Read what a path leads to, and the label map beside a study.
 
     Raises
     ------
@@ -149,7 +161,7 @@ def opened_as(kind: str, path: str, settings: Settings, progress: Progress) -> O
     """
     progress("read", 0, 1)
     read: dict[str, Any] = {
-        "study": lambda: _study(path, settings),
+        "study": lambda: _study(path, settings, beside),
         "points": lambda: {"points": io.read_points(path, settings=settings.cloud)},
         "mesh": lambda: _mesh(Path(path)),
         "run": lambda: _run(Path(path)),
@@ -161,7 +173,7 @@ def opened_as(kind: str, path: str, settings: Settings, progress: Progress) -> O
             raise
         kind, found = "points", read["points"]()
     progress("read", 1, 1)
-    return Opened(kind, (path,), **found)
+    return Opened(kind, (path,), beside, **found)
 
 
 def _run(folder: Path) -> dict[str, Any]:
@@ -215,6 +227,11 @@ def _repeats(path: Path, report: Mapping[str, Any]) -> tuple[str, ...]:
     return (*made, "--settings", str(settings), "-o", path.name)
 
 
-def _study(path: str, settings: Settings) -> dict[str, Any]:
-    volume = io.read_volume(path, settings=settings.read, select=settings.window.select)
-    return {"volume": volume, "names": io.label_names(path)}
+def _study(path: str, settings: Settings, beside: str) -> dict[str, Any]:
+    select = settings.window.select
+    volume = io.read_volume(path, settings=settings.read, select=None if beside else select)
+    if not beside:
+        return {"volume": volume, "names": io.label_names(path)}
+    labels = io.read_volume(beside, settings=settings.read, select=select)
+    laid = fitting(labels, volume)
+    return {"volume": volume, "labels": labels, "laid": laid, "names": io.label_names(beside)}

@@ -165,7 +165,7 @@ class Session:
             Where other work is underway.
         """
         self._check_idle()
-        self._look_at(Opened(opened.kind, opened.words))
+        self._look_at(Opened(opened.kind, opened.words, opened.beside))
         if opened.words:
             self.jobs.start("read", self._read)
 
@@ -176,7 +176,7 @@ class Session:
     def _read(self, progress: Progress) -> dict[str, Any]:
         opened = self.opened
         try:
-            self._look_at(opened_as(opened.kind, opened.words[0], self.settings, progress))
+            self._look_at(opened_as(opened.kind, opened.words[0], self.settings, progress, beside=opened.beside))
         except TomomeshError as fault:
             self._look_at(replace(opened, refused=str(fault), flags=fault.flags))
             raise

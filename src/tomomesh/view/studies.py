@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import io
 from ..errors import TomomeshError, UsageError
 from ..model.volume import AXES
@@ -67,12 +69,24 @@ def _study(session: Session) -> dict[str, Any]:
     """Tell what `tomomesh inspect` tells of the study, with more bars, and names of its labels."""
     opened, settings = session.opened, session.settings
     volume = opened_volume(session)
-    found: dict[str, Any] = session.surveys.of(None, lambda: survey(opened_volume(session), BARS))
+    found: dict[str, Any] = session.surveys.of(None, lambda: _surveyed(session))
     slices = {"auto": found["default_plane"], "stored": AXES[volume.stored_axis]}.get(settings.network.slices)
     names = _named(found["labels"], opened.names)
     return {key: found[key] for key in found if key not in ("corner_mm", "affine")} | {
         "label_names": names, "slices": slices or settings.network.slices,
     }  # fmt: skip
+
+
+def _surveyed(session: Session) -> dict[str, Any]:
+    """Survey the study; where a label map lies beside it, its labels are that one's."""
+    found, laid = survey(opened_volume(session), BARS), session.opened.laid
+    return {**found, "beside": False} if laid is None else {**found, "beside": True, "labels": _counted(laid)}
+
+
+def _counted(labels: Volume) -> dict[str, int]:
+    numbers, counts = np.unique(labels.voxels, return_counts=True)
+    pairs = zip(numbers.tolist(), counts.tolist(), strict=True)
+    return {str(round(number)): count for number, count in pairs if number > 0}
 
 
 def _named(labels: Mapping[str, int], names: Mapping[int, str]) -> dict[str, str]:

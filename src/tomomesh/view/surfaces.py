@@ -71,7 +71,7 @@ def _made(session: Session, progress: Progress) -> dict[str, Any]:
         made = reconstruct_points(opened.points, settings, progress=progress, **choices)
     else:
         assert opened.volume is not None
-        made = reconstruct(opened.volume, settings, labels=opened.labels, progress=progress, **choices)
+        made = reconstruct(opened.volume, settings, labels=opened.chosen_labels(settings), progress=progress, **choices)
     progress("measure", 0, 1)
     quality = made.report["quality"]
     progress("measure", 1, 1)

@@ -178,7 +178,7 @@ def kept(session: Session, picks: bool = True) -> tuple[str, Kept]:
         settings = session.settings.replace(**unpicked)
         if _key(settings) != asked:
             raise LookupError(asked)
-        return Kept.of(opened_volume(session), session.opened.labels, settings)
+        return Kept.of(opened_volume(session), session.opened.chosen_labels(settings), settings)
 
     return asked, session.selections.of(asked, choose)
 
@@ -195,7 +195,10 @@ def _kept(session: Session) -> dict[str, Any]:
 
 def _pick(session: Session, body: dict[str, Any]) -> dict[str, Any]:
     """Leave out the component at a voxel (K, J, I) of the study, or bring back the one that was left out there."""
-    place = place_of(opened_volume(session), np.array(body["voxel"], np.int64))
+    voxel = np.array(body["voxel"], np.int64)
+    if session.opened.laid is not None:
+        return _pick_label(session, int(session.opened.laid.voxels[tuple(voxel)]))
+    place = place_of(opened_volume(session), voxel)
     window, (_, found) = session.settings.window, kept(session)
     keep, drop = list(window.keep_at or ()), list(window.drop_at or ())
     if (part := found.at(place)) is not None:
@@ -210,6 +213,14 @@ def _pick(session: Session, body: dict[str, Any]) -> dict[str, Any]:
         drop = [one for one in drop if whole.at(one) != part]
         keep = keep if not keep or part in map(whole.at, keep) else [*keep, place]
     return session.choose({"keep_at": keep or None, "drop_at": drop or None})
+
+
+def _pick_label(session: Session, label: int) -> dict[str, Any]:
+    """Choose a label of the map beside the study, or no more."""
+    if label == 0:
+        raise UsageError("no label lies here", expected="a voxel of one")
+    chosen = {*(session.settings.window.select or ())} ^ {label}
+    return session.choose({"select": sorted(chosen) or None, **dict.fromkeys(("lower", "upper", "preset"))})
 
 
 def _plane(session: Session, plane: str, k: str, key: str) -> Response:

@@ -161,6 +161,7 @@ def _view(commands: Any) -> None:
         nargs="?",
         help=f"{STUDY}; or {CLOUD}; or {CHECKED}; or the folder of a run",
     )
+    view.add_argument("--labels-in", metavar="FILE", help="a label map beside STUDY, whose labels can be chosen")
     view.add_argument("--browse", metavar="FOLDER", help="let the page open all studies, points and meshes below it")
     view.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
     view.add_argument("--port", type=int, default=0, metavar="N", help="where to listen (default: a free port)")

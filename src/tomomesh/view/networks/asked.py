@@ -119,7 +119,7 @@ def _segment(session: Session, progress: Progress) -> Told:
     """Train all slices: the very call of ``tomomesh segment``."""
     from ...pipeline import segment as run
 
-    choices, labels = session.choices.values, session.opened.labels
+    choices, labels = session.choices.values, session.opened.chosen_labels(session.settings)
     found = run(opened_volume(session), session.settings, labels=labels, progress=progress, **choices)
     session.keep(SEGMENT, found, choices)
     return {"slices": _slices_with(found.source)}

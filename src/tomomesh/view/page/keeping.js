@@ -18,8 +18,9 @@ export function makeKeeping() {
     told.className = `told ${kind}`;
   };
   const show = () => {
-    title.textContent = isLabels() ? "Labels" : "Kept";
-    fill(list, ...(isLabels() ? labelRows() : componentRows()));
+    const beside = Boolean(looked.survey?.beside);
+    title.textContent = isLabels() || beside ? "Labels" : "Kept";
+    fill(list, ...(isLabels() || beside ? labelRows() : []), ...(isLabels() ? [] : componentRows()));
     fill(doubts, ...(looked.kept?.warnings || []).map((line) => el("li", {}, line)));
     if (looked.kept) say(inWords(looked.kept));
   };

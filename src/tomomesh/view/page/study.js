@@ -9,7 +9,7 @@ import { makeOpening } from "./opening.js";
 import { labelsOf, mixOf, scaleOf, tonesOf } from "./painting.js";
 import { Plane } from "./plane.js";
 import { makeRegion } from "./region.js";
-import { on, state, tell, trying } from "./store.js";
+import { on, pick, state, tell, trying } from "./store.js";
 import { makeContrast, makeWindowing, settleContrast, settleWindow } from "./windowing.js";
 
 export const title = "Study";
@@ -98,6 +98,7 @@ function pickAt(place, say) {
   const { layers } = looked.geometry;
   const levels = grays.have(name, place[plane.axis]).values.subarray(at * layers, (at + 1) * layers);
   if (isLabels()) return pickLabel(Math.round(levels[0]));
+  if (looked.survey?.beside) return pick(place);
   const within = [...levels].map((level, n) => level > looked.window.lower[n] && level <= looked.window.upper[n]);
   const held = state.choices.layers === "any" ? within.some(Boolean) : within.every(Boolean);
   if (looked.kept) pickComponent(place, Boolean(keeps.have(name, place[plane.axis])?.values[at]), held, say);
