@@ -84,6 +84,6 @@ function labelRows() {
   const chosen = new Set(state.choices.select || []);
   return Object.entries(labels).map(([label, voxels]) => el("label", { class: "row" },
     el("input", { type: "checkbox", ...(chosen.has(Number(label)) ? { checked: true } : {}), onchange: () => pickLabel(Number(label)) }),
-    colored(el("span", { class: "swatch" }), labelColor(Number(label))),
+    isLabels() && colored(el("span", { class: "swatch" }), labelColor(Number(label))), // over gray levels components have colors
     el("span", { class: "name" }, `${label} ${names[label] || ""}`), el("small", {}, counted(voxels))));
 }
