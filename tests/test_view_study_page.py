@@ -209,6 +209,28 @@ def test_a_box_and_a_range_of_slices_are_the_part_that_is_kept(head: Shown) -> N
     assert head.until(lambda found: found.crop.roi is None).crop.slice_range is None
 
 
+def test_a_box_by_the_keyboard_alone(head: Shown) -> None:
+    head.tab.keyboard.press("a")
+    head.tab.keyboard.press("b")
+    head.tab.keyboard.press("Enter")
+    head.wait("document.querySelector('.told').textContent.includes('One corner')")
+    head.tab.keyboard.press("Escape")
+    head.wait("!document.querySelector('.told').textContent.includes('One corner')")
+    head.tab.keyboard.press("Enter")
+    for _ in range(5):
+        head.tab.keyboard.press("Shift+ArrowRight")
+        head.tab.keyboard.press("Shift+ArrowDown")
+    head.tab.keyboard.press("Enter")
+    roi = head.until(lambda found: found.crop.roi is not None).crop.roi
+    assert roi is not None
+    sides = np.diff(np.reshape(roi, (3, 2)), axis=1).ravel()
+    assert sides[:2] == pytest.approx(6 * 3.75)  # both corners included
+    assert sides[2] == pytest.approx(27 * 5.4)
+    head.tab.click("text=All of the study")
+    head.until(lambda found: found.crop.roi is None)
+    head.tab.keyboard.press("c")
+
+
 def test_components_are_kept_and_dropped(browser: Any, tmp_path: Path) -> None:
     stored = np.zeros((12, 40, 40), np.int16)
     stored[2:10, 5:20, 5:20], stored[2:10, 25:35, 25:35] = 1000, 1000

@@ -8,7 +8,7 @@ import { goTo, isLabels, look, looked } from "./looked.js";
 import { makeOpening } from "./opening.js";
 import { labelsOf, mixOf, scaleOf, tonesOf } from "./painting.js";
 import { Plane } from "./plane.js";
-import { makeRegion } from "./region.js";
+import { chooseBox, makeRegion } from "./region.js";
 import { on, pick, state, tell, trying } from "./store.js";
 import { makeContrast, makeWindowing, settleContrast, settleWindow } from "./windowing.js";
 
@@ -16,7 +16,7 @@ export const title = "Study";
 export const keys = [
   ["Up, Down, wheel", "the next slice, the one before"], ["Page Up, Page Down", "ten slices on, back"], ["Home, End", "the first, the last slice"],
   ["A, S, Q", "the axial, the sagittal, the coronal plane"], ["Shift + arrows", "the crosshair by a pixel"], ["M", "the plane larger, or all three"],
-  ["+, -, Ctrl + wheel", "zoom; drag with the middle button"], ["C, P, B", "what a click does: crosshair, pick, box"], ["Enter", "pick what is under the crosshair"],
+  ["+, -, Ctrl + wheel", "zoom; drag with the middle button"], ["C, P, B", "what a click does: crosshair, pick, box"], ["Enter", "pick what is under the crosshair; Box: one corner, then the other"],
   ["right button", "contrast: sideways the width, up and down the level"],
 ];
 export const applies = (kind, opened) => kind === "study" || kind === "nothing" || opened.browses || (kind === "run" && !opened.ready);
@@ -203,9 +203,29 @@ function onKey(event, page) {
   else if (ACTIVE[key]) page.planes[ACTIVE[key]].canvas.focus();
   else if (key === "m") plane.largest(active);
   else if (key === "+" || key === "-") plane.zoomBy(key === "+" ? 1.25 : 0.8);
-  else if (key === "Enter" && event.target === plane.canvas) plane.pick(looked.at);
+  else if (key === "Enter" && event.target === plane.canvas) looked.tool === "box" ? setCorner(plane, page.parts.keeping.say) : plane.pick(looked.at);
+  else if (key === "Escape" && corner) leaveCorner(page);
   else return false;
   return true;
+}
+
+let corner = null;
+
+/** Set a corner of a box at the crosshair; with the other, both voxels included, it is chosen. */
+function setCorner({ plane }, say) {
+  const at = [looked.at[plane.rows], looked.at[plane.columns]];
+  if (corner?.plane !== plane) {
+    corner = { plane, at };
+    return say("One corner is set. Shift and arrows lead the crosshair to the other, Enter sets it, Escape leaves.");
+  }
+  const ends = [Math.min, Math.max].map((end, n) => at.map((one, axis) => end(one, corner.at[axis]) + n));
+  corner = null;
+  return chooseBox(plane, ...ends);
+}
+
+function leaveCorner(page) {
+  corner = null;
+  page.parts.keeping.show();
 }
 
 function crossBy({ plane }, key) {

@@ -16,8 +16,9 @@ export function chooseBounds() {
   looked.held = false;
   const { lower, upper } = looked.window;
   const none = lower.every((one) => one === -Infinity) && upper.every((one) => one === Infinity);
-  const below = Math.floor(looked.survey.lowest) - 1;
-  const above = Math.ceil(looked.survey.highest);
+  const { lowest, highest } = looked.survey ?? looked.geometry; // which may be typed before the study is surveyed
+  const below = Math.floor(lowest) - 1;
+  const above = Math.ceil(highest);
   choose({
     preset: null, select: null,
     lower: none ? below : sent(lower, -Infinity, below),
