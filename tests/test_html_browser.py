@@ -146,7 +146,7 @@ class TestPage:
         watched = Watched(browser, file)
         watched.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
         watched.page.locator("button.copy").click()
-        watched.page.wait_for_function('document.querySelector("button.copy").textContent === "Copied"')
+        watched.page.wait_for_selector("button.copy:has-text('Copied')")
         assert watched.page.evaluate("navigator.clipboard.readText()") == COMMAND
         watched.page.close()
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
-from typing import TYPE_CHECKING
+import shlex
+from pathlib import Path
 
 import pytest
 
@@ -13,10 +15,9 @@ pytest.importorskip("websockets")
 
 from looked_at import looking_at
 from pages import served
-from tomomesh import phantom, write_mesh
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from test_show import round_mesh
+from tomomesh import TriMesh, phantom, write_mesh
+from tomomesh.cli import main
 
 
 def test_a_mesh_is_drawn_and_measured_whenever_its_page_is_opened(tmp_path: Path) -> None:
@@ -31,3 +32,32 @@ def test_a_mesh_is_drawn_and_measured_whenever_its_page_is_opened(tmp_path: Path
         expect(seen.locator("#surface")).to_contain_text(re.compile(r"[\d,]+ triangles"))
         assert "[object Object]" not in seen.inner_text("#surface")
         assert asked.index("fitted") < asked.index("report")
+
+
+def test_a_mesh_is_saved_in_another_format_as_the_command_does(tmp_path: Path) -> None:
+    path = tmp_path / "a ball.ply"
+    write_mesh(round_mesh(), path)
+    with served(path) as page, looking_at(page) as seen:
+        seen.click("#tab-saving")
+        seen.wait_for_selector(".save button:enabled")
+        assert seen.locator(".save").count() == 1
+        for suffix in (".stl", ".3mf"):
+            seen.select_option(".save select", suffix)
+            with seen.expect_download() as saved:
+                seen.click(".save button")
+            words = shlex.split(seen.inner_text("pre.whole"))
+            assert words == ["tomomesh", "print", str(path), "-o", "mesh.stl"]
+            assert main([*words[1:-1], str(tmp_path / f"mesh{suffix}"), "--quiet"]) == 0
+            assert Path(saved.value.path()).read_bytes() == (tmp_path / f"mesh{suffix}").read_bytes()
+
+
+def test_an_open_mesh_is_not_saved_and_says_why(tmp_path: Path) -> None:
+    path = tmp_path / "open.ply"
+    write_mesh(TriMesh(round_mesh().vertices, round_mesh().faces[5:]), path)
+    with served(path) as page:
+        page.enter()
+        page.ready()
+        status, _, answer = page.ask("/save/mesh.stl")
+        assert status == 400
+        assert json.loads(answer)["error"].count("\n") == 0
+        assert page.ask("/save/points.ply")[0] == 400

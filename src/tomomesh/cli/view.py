@@ -7,9 +7,11 @@ import webbrowser
 from typing import TYPE_CHECKING
 
 from ..errors import UsageError
+from .options import build_parser
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Sequence
     from typing import Any
 
     from ..settings import Settings
@@ -34,7 +36,11 @@ def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
     from ..view.reach import Reach, browsed
     from ..view.server import serve
     from ..view.session import Session
+    from .commands import run
     from .outputs.write import write_one
+
+    def ran(words: Sequence[str]) -> None:
+        run(build_parser().parse_args(words))
 
     public = "" if chosen.public_url is None else public_origin(chosen.public_url)
     opened = _opened(chosen.looked_at, chosen.labels_in)
@@ -45,7 +51,7 @@ def view(chosen: Namespace, settings: Settings, given: dict[str, Any]) -> None:
             webbrowser.open(address)
 
     folder = None if chosen.browse is None else browsed(chosen.browse)
-    session = Session(opened, given, Reach(opened.words, folder), write=write_one)
+    session = Session(opened, given, Reach(opened.words, folder), write=write_one, run=ran)
     host = "127.0.0.1" if chosen.host in LOCAL else chosen.host
     serve(session, started, host=host, port=chosen.port, public=public)
 

@@ -84,6 +84,15 @@ class Opened:
         beside = ("--labels-in", self.beside) if self.beside and settings.window.select else ()
         return (name, *self.words, *beside, *settings.words(), "-o", "mesh.stl")
 
+    @property
+    def converts(self) -> bool:
+        """Whether it is a mesh that can be written in another format."""
+        return self.kind == "mesh" and self.mesh is not None
+
+    def converting(self, output: str) -> tuple[str, ...]:
+        """Return the words of the command that writes a mesh in another format."""
+        return "print", *self.words, "-o", output
+
     def chosen_labels(self, settings: Settings) -> Volume | None:
         """Return the label map beside the study, where labels are chosen."""
         return self.labels if settings.window.select else None

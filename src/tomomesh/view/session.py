@@ -81,6 +81,8 @@ class Session:
     write : callable, optional
         Writes a file of a surface as the command line does: what of it, the surface, its settings, the
         path, and the words of the command that repeats it.
+    run : callable, optional
+        Runs the command line of some words.
     reach : Reach
         What may be opened.
     surveys, selections : Remembered
@@ -89,9 +91,9 @@ class Session:
 
     def __init__(
         self, opened: Opened, choices: Mapping[str, Any] | None = None, reach: Reach | None = None,
-        *, write: Write | None = None,
+        *, write: Write | None = None, run: Callable[[Sequence[str]], None] | None = None,
     ) -> None:  # fmt: skip
-        self.opened, self.write, self.reach = opened, write, reach or Reach()
+        self.opened, self.write, self.run, self.reach = opened, write, run, reach or Reach()
         self._turns, self._told = 0, count(1)
         self.surveys, self.selections, self.colors = Remembered(1), Remembered(3), Remembered(3)
         self.choices = Choices().then(choices or {})
@@ -124,6 +126,9 @@ class Session:
             "undo": len(self.choices.before),
             "redo": len(self.choices.after),
             "command": self.command,
+            "saving": shlex.join(["tomomesh", *self.opened.converting("mesh.stl")])
+            if self.opened.converts
+            else self.command,
             "made": {name: made.choices == self.choices.values for name, made in self.made.items()},
             "job": None if job is None else job.told,
             "failed": self.jobs.failed,

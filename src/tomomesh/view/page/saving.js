@@ -5,10 +5,10 @@ import { on, state, trying } from "./store.js";
 
 export const title = "Save";
 export const keys = [];
-export const applies = (kind) => kind === "study" || kind === "points";
+export const applies = (kind) => ["study", "points", "mesh"].includes(kind);
 
 const WHAT = {
-  mesh: ["The mesh", "closed, in patient millimeters unless --frame says otherwise"],
+  mesh: ["The mesh", "closed; of a study in patient millimeters unless --frame says otherwise"],
   points: ["The points", "neurons, bridged gaps and caps"],
   mask: ["The voxels inside the mesh", "a label map on the study's own grid"],
   labels: ["The regions of the networks", "a label map on the study's own grid"],
@@ -28,15 +28,16 @@ export function mount(panel) {
   async function show() {
     const formats = await trying(get("/api/formats"));
     if (!formats) return;
-    fill(list, ...Object.entries(WHAT).map(([what, words]) => line(what, words, formats[what])));
+    const shown = Object.entries(WHAT).filter(([what]) => state.opened.kind !== "mesh" || what in formats);
+    fill(list, ...shown.map(([what, words]) => line(what, words, formats[what])));
     update();
   }
 
   function update() {
     if (!state) return;
-    command.textContent = state.command;
+    command.textContent = state.saving;
     const stale = state.made.reconstruct === false;
-    hint.textContent = !("reconstruct" in state.made) ? "There is no surface yet: make it in the part Surface." : stale ? "Choices have changed since the surface was made: files are of the surface that is shown." : "";
+    hint.textContent = state.opened.kind === "mesh" ? "A closed mesh is written in another format, its frame and unit named where the format can." : !("reconstruct" in state.made) ? "There is no surface yet: make it in the part Surface." : stale ? "Choices have changed since the surface was made: files are of the surface that is shown." : "";
   }
 
   on("state", () => { update(); if (!panel.hidden) show(); });
@@ -46,8 +47,15 @@ export function mount(panel) {
 function line(what, [name, about], formats) {
   const kinds = el("select", { "aria-label": `Format of ${name.toLowerCase()}`, disabled: !formats || formats.length < 2 },
     ...(formats || []).map((suffix) => el("option", { value: suffix }, suffix.slice(1))));
-  const save = el("button", { type: "button", disabled: !formats, onclick: () => download(`${what}${kinds.value}`) }, "Save");
+  const save = el("button", { type: "button", disabled: !formats, onclick: () => saved(save, `${what}${kinds.value}`) }, "Save");
   return el("div", { class: "save" }, el("div", {}, el("strong", {}, name), el("br"), el("span", { class: "muted" }, about)), kinds, save);
+}
+
+/** Save, and let nobody ask for it twice meanwhile. */
+async function saved(button, name) {
+  button.disabled = true;
+  await download(name);
+  button.disabled = false;
 }
 
 async function download(name) {
