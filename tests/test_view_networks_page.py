@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -215,3 +216,19 @@ def test_the_film_and_the_settings_are_saved(tmp_path: Path) -> None:
                 seen.click(f"text={words}")
             saved.value.save_as(tmp_path / "saved")
             assert (tmp_path / "saved").read_bytes().startswith(start)
+
+
+def test_nothing_lies_over_another_part_in_a_narrow_window() -> None:
+    with served() as page, looking_at(page) as seen:
+        seen.select_option("#net-source", "square")
+        seen.click("#net-train")
+        seen.wait_for_selector("text=Save GIF")
+        for width, height in ((1280, 720), (1000, 700), (900, 600)):
+            seen.set_viewport_size({"width": width, "height": height})
+            parts = [seen.locator(part).bounding_box() for part in (".net-side", ".net-stage", ".net-beside")]
+            ends = [(part["x"], part["x"] + part["width"]) for part in parts]
+            assert all(one[1] <= other[0] for one, other in pairwise(ends))
+            for one in seen.locator(".net-player > *").all():
+                box = one.bounding_box()
+                assert ends[1][0] <= box["x"]
+                assert box["x"] + box["width"] <= ends[1][1] + 0.5
