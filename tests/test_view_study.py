@@ -122,8 +122,8 @@ class TestBeside:
         return opened(session)
 
     def test_its_labels_are_told_and_chosen(self, session: Session) -> None:
-        told = studies._study(session)
-        assert (told["beside"], told["labels"]) == (True, {"4": 600, "7": 600})
+        assert slices._planes(session)["labelled"]
+        assert studies._study(session)["labels"] == {"4": 600, "7": 600}
         windows._pick(session, {"voxel": [5, 25, 20]})
         assert session.settings.window.select == (7,)
         assert [one["voxels"] for one in windows.kept(session)[1].listed()] == [600]
@@ -133,6 +133,13 @@ class TestBeside:
         assert session.choices.values == {"select": (4,)}
         with pytest.raises(UsageError, match="no label lies here"):
             windows._pick(session, {"voxel": [0, 0, 0]})
+
+    def test_they_are_sent_as_they_lie_over_the_study(self, session: Session) -> None:
+        for plane, axis in {"axial": 0, "coronal": 1, "sagittal": 2}.items():
+            across = np.moveaxis(session.opened.laid.voxels, axis, 0)  # type: ignore[union-attr]
+            sent = np.frombuffer(slices._labels(session, plane, "8").body, np.uint8)
+            assert np.array_equal(sent.reshape(across.shape[1:]), across[8])
+        assert session.opened.laid.voxels[5, 15, 10] == 4  # type: ignore[union-attr]
 
     def test_the_command_names_it_where_it_matters(self, session: Session) -> None:
         assert "--labels-in" not in session.command

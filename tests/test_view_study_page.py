@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,12 +27,16 @@ from tomomesh.cli.options.parameters import joined
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from numpy.typing import NDArray
+
     from tomomesh.settings import Settings
 
 HEAD = phantom((27, 64, 64), (3.75, 3.75, 5.4))
 LABELS = np.select([HEAD.volume.voxels > 200, HEAD.volume.voxels > 100], [2, 1], 0).astype(np.uint8)
 SLICE = "Number(document.querySelector(`.plane-${name} canvas`).dataset.slice)"
 DRAWN = ".plane-axial canvas[data-slice]"
+LINE, AREA = 0.01, 0.02
+"""Shares of a plane that a label's outline stays below, and that its inside fills."""
 
 
 class Shown:
@@ -92,19 +97,27 @@ class Shown:
 
     def colors(self, plane: str) -> int:
         """Count the pixels of a plane that are not gray."""
-        count: int = self.tab.evaluate(
+        red, _, blue = np.moveaxis(self.pixels(plane), 1, 0)
+        return int(np.count_nonzero(abs(red - blue) > 40))
+
+    def pixels(self, plane: str) -> NDArray[np.int64]:
+        """Return the colors (n, 3) of a plane's pixels as they are drawn."""
+        drawn = self.tab.evaluate(
             """(name) => {
               const canvas = document.querySelector(`.plane-${name} canvas`);
               const copy = new OffscreenCanvas(canvas.width, canvas.height);
               const pen = copy.getContext("2d", { willReadFrequently: true });
               pen.drawImage(canvas, 0, 0);
-              const pixels = pen.getImageData(0, 0, canvas.width, canvas.height).data;
-              let found = 0;
-              for (let n = 0; n < pixels.length; n += 4) found += Math.abs(pixels[n] - pixels[n + 2]) > 40;
-              return found;
+              return Array.from(pen.getImageData(0, 0, canvas.width, canvas.height).data);
             }""", plane,
         )  # fmt: skip
-        return count
+        return np.array(drawn, np.int64).reshape(-1, 4)[:, :3]
+
+    def swatch(self, row: int) -> NDArray[np.int64]:
+        """Return the color of a row of the list."""
+        element = self.tab.locator(".rows .swatch").nth(row)
+        css = element.evaluate("(swatch) => getComputedStyle(swatch).backgroundColor")
+        return np.array(re.findall(r"\d+", css)[:3], np.int64)
 
 
 @pytest.fixture(scope="module")
@@ -271,7 +284,6 @@ def test_labels_beside_a_study_are_chosen_and_give_the_commands_bytes(browser: A
         page.tab.click(".rows input[type=checkbox] >> nth=0")
         page.until(lambda found: bool(found.window.select))
         page.wait("document.querySelector('.told').textContent.includes('voxels')")
-        assert page.colors("axial") > 0
         page.tab.click("#tab-surface")
         page.tab.keyboard.press("m")
         page.tab.wait_for_selector(".verdict")
@@ -281,6 +293,32 @@ def test_labels_beside_a_study_are_chosen_and_give_the_commands_bytes(browser: A
         words = shlex.split(page.tab.inner_text("#command"))[1:-1]
         assert main([*words, str(tmp_path / "mesh.stl"), "--quiet"]) == 0
         assert Path(saved.value.path()).read_bytes() == (tmp_path / "mesh.stl").read_bytes()
+
+
+def test_labels_beside_a_study_have_their_colors(browser: Any, tmp_path: Path) -> None:
+    """Those that are chosen are filled, the others have an outline."""
+    stored = np.zeros(HEAD.volume.shape, np.uint16)
+    stored[4:22, 20:44, 14:30], stored[4:22, 20:44, 34:50] = 5, 601
+    gray = write_nifti(tmp_path / "gray.nii", np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
+    beside = write_nifti(tmp_path / "labels.nii", stored, HEAD.volume.affine)
+
+    def shares() -> list[float]:
+        pixels = page.pixels("axial")
+        return [float(np.mean((abs(pixels - page.swatch(n)) < 4).all(axis=1))) for n in (0, 1)]
+
+    with shown(browser, gray, "--labels-in", beside) as page:
+        page.tab.wait_for_selector(".rows input[type=checkbox]")
+        page.tab.locator("input[aria-label='Opacity of what is kept']").fill("1")
+        page.wait("document.querySelector('.told').textContent.includes('voxels')")
+        assert 0 < min(shares()) < max(shares()) < LINE
+        page.tab.click(".rows input[type=checkbox] >> nth=1")
+        page.until(lambda found: found.window.select == (601,))
+        page.wait("document.querySelector('.told').textContent.includes('6.91K voxels')")
+        page.tab.wait_for_load_state("networkidle")
+        assert 0 < shares()[0] < LINE < AREA < shares()[1]
+        box = page.tab.locator(".plane-axial canvas").bounding_box()
+        page.tab.mouse.move(box["x"] + 0.58 * box["width"], box["y"] + 0.5 * box["height"])
+        page.wait("document.querySelector('.under').textContent.includes('label 601')")
 
 
 def test_labels_are_chosen_in_the_list_and_in_a_slice(browser: Any, tmp_path: Path) -> None:

@@ -45,6 +45,7 @@ def _planes(session: Session) -> dict[str, Any]:
         "shape": list(volume.shape),
         "affine": volume.affine.tolist(),
         "layers": volume.layers,
+        "labelled": session.opened.laid is not None,
         "unit": volume.unit,
         "lowest": low,
         "highest": high,
@@ -87,8 +88,20 @@ def _ends_of(direction: NDArray[np.float64]) -> tuple[str, str]:
 
 
 def _slice(session: Session, plane: str, k: str) -> Response:
-    """Return the gray levels of a slice (rows, columns[, layers]), none but these copied."""
-    voxels = opened_volume(session).voxels
+    """Return the gray levels of a slice (rows, columns[, layers])."""
+    return _cut(opened_volume(session), plane, k)
+
+
+def _labels(session: Session, plane: str, k: str) -> Response:
+    """Return the labels of a slice (rows, columns) of the map that lies over the study."""
+    if session.opened.laid is None:
+        raise LookupError(plane)
+    return _cut(session.opened.laid, plane, k)
+
+
+def _cut(volume: Volume, plane: str, k: str) -> Response:
+    """Return the numbers of a slice, none but these copied."""
+    voxels = volume.voxels
     across = np.moveaxis(voxels, axis_of(plane), 0)  # a view; `take` would copy all voxels where an axis is flipped
     found = across[_number(k, len(across))]
     kind = found.dtype
@@ -102,4 +115,4 @@ def _number(k: str, count: int) -> int:
     return number
 
 
-ROUTES = [get("/api/planes", _planes), get("/slice/{plane}/{k}", _slice)]
+ROUTES = [get("/api/planes", _planes), get("/slice/{plane}/{k}", _slice), get("/labels/{plane}/{k}", _labels)]

@@ -80,7 +80,7 @@ def _study(session: Session) -> dict[str, Any]:
 def _surveyed(session: Session) -> dict[str, Any]:
     """Survey the study; where a label map lies beside it, its labels are that one's."""
     found, laid = survey(opened_volume(session), BARS), session.opened.laid
-    return {**found, "beside": False} if laid is None else {**found, "beside": True, "labels": _counted(laid)}
+    return found if laid is None else {**found, "labels": _counted(laid)}
 
 
 def _counted(labels: Volume) -> dict[str, int]:

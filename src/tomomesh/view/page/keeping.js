@@ -18,9 +18,9 @@ export function makeKeeping() {
     told.className = `told ${kind}`;
   };
   const show = () => {
-    const beside = Boolean(looked.survey?.beside);
-    title.textContent = isLabels() || beside ? "Labels" : "Kept";
-    fill(list, ...(isLabels() || beside ? labelRows() : []), ...(isLabels() ? [] : componentRows()));
+    const labelled = looked.geometry?.labelled && looked.survey;
+    title.textContent = isLabels() || labelled ? "Labels" : "Kept";
+    fill(list, ...(isLabels() || labelled ? labelRows() : []), ...(isLabels() ? [] : componentRows()));
     fill(doubts, ...(looked.kept?.warnings || []).map((line) => el("li", {}, line)));
     if (looked.kept) say(inWords(looked.kept));
   };
@@ -48,7 +48,7 @@ function componentRows() {
   const several = looked.kept?.count > 1;
   const kept = (looked.kept?.components || []).map((one) => el("div", { class: "row" },
     el("button", { type: "button", class: "name", title: "Lead the crosshair there", onclick: () => goTo(one.inside) },
-      colored(el("span", { class: "swatch" }), colorOf(one.number)), ` ${one.number}: ${volume(one.volume_mm3)}`),
+      state.choices.select ? null : colored(el("span", { class: "swatch" }), colorOf(one.number)), ` ${one.number}: ${volume(one.volume_mm3)}`),
     several && el("button", { type: "button", title: "--keep-at a place in it", onclick: () => choose({ keep_at: [one.place], drop_at: null }) }, "only this"),
     several && el("button", { type: "button", title: "--drop-at a place in it", onclick: () => pick(one.inside) }, "leave out")));
   return [...kept, ...pickedRows("keep_at", "the one at", "not alone"), ...pickedRows("drop_at", "not the one at", "bring back")];
@@ -84,6 +84,6 @@ function labelRows() {
   const chosen = new Set(state.choices.select || []);
   return Object.entries(labels).map(([label, voxels]) => el("label", { class: "row" },
     el("input", { type: "checkbox", ...(chosen.has(Number(label)) ? { checked: true } : {}), onchange: () => pickLabel(Number(label)) }),
-    isLabels() && colored(el("span", { class: "swatch" }), labelColor(Number(label))), // over gray levels components have colors
+    colored(el("span", { class: "swatch" }), labelColor(Number(label))),
     el("span", { class: "name" }, `${label} ${names[label] || ""}`), el("small", {}, counted(voxels))));
 }

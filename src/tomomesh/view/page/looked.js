@@ -32,4 +32,4 @@ export function inPatient([k, j, i]) {
 export const unit = () => (looked.geometry.unit === "HU" ? " HU" : "");
 
 /** Whether the study is a label map, and no gray levels of it were asked for. */
-export const isLabels = () => Boolean(looked.survey && !looked.survey.beside && Object.keys(looked.survey.labels).length) && !["lower", "upper", "preset"].some((name) => name in state.choices);
+export const isLabels = () => Boolean(looked.survey && !looked.geometry.labelled && Object.keys(looked.survey.labels).length) && !["lower", "upper", "preset"].some((name) => name in state.choices);

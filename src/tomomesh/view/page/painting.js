@@ -11,6 +11,7 @@ const OUT_OF_BOX = 0.35;
 
 const rgb = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 const packed = (r, g, b) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
+const DROPPED_COLOR = packed(...GRAY);
 
 /** The color of a component, as CSS. @param {number} number */
 export const colorOf = (number) => COLORS[(number - 1) % COLORS.length];
@@ -135,4 +136,31 @@ function paintColors(out, { indices, layers }, kept, outside, { tones, mix, any 
     }
     out[n] = color;
   }
+}
+
+/**
+ * Paint a label map over a slice: the outline of each label in its color, and what is kept of those that are chosen.
+ * @param {Uint32Array} out the slice as it was painted
+ * @param {{map: any, columns: number, kept: Uint8Array | null, outside: Uint8Array | null}} slice
+ * @param {{chosen: Set<number>, opacity: number}} over
+ */
+export function paintOver(out, { map, columns, kept, outside }, { chosen, opacity }) {
+  let [label, color, held] = [0, packed(...rgb(COLORS[0])), false];
+  for (let n = 0; n < out.length; n++) {
+    if (map[n] !== label) {
+      label = map[n];
+      color = label > 0 ? shaded(labelBytes(Math.round(label) % 360), 1) : packed(...rgb(COLORS[0]));
+      held = chosen.has(Math.round(label));
+    }
+    const rim = label > 0 && (map[n - 1] !== label || map[n + 1] !== label || map[n - columns] !== label || map[n + columns] !== label);
+    if (rim) out[n] = color;
+    else if (outside && outside[n]) continue;
+    else if (held) out[n] = blended(out[n], !kept || kept[n] ? color : DROPPED_COLOR, opacity);
+    else if (chosen.size && kept && kept[n]) out[n] = blended(out[n], color, opacity); // filled between labels
+  }
+}
+
+function blended(below, above, share) {
+  const mixed = (bits) => Math.round(((below >>> bits) & 255) * (1 - share) + ((above >>> bits) & 255) * share) << bits;
+  return ((255 << 24) | mixed(16) | mixed(8) | mixed(0)) >>> 0;
 }

@@ -2,7 +2,7 @@
 import { eachFrame, el, short } from "./dom.js";
 import { goTo, inPatient, isLabels, look, looked, unit } from "./looked.js";
 import { LINES, drawBox, drawCross, drawLetters, drawScale, placed, pointOf, under } from "./marks.js";
-import { paint } from "./painting.js";
+import { paint, paintOver } from "./painting.js";
 import { chooseBox, outsideOf } from "./region.js";
 import { on, state, tell } from "./store.js";
 
@@ -11,9 +11,9 @@ const MOST_ZOOM = 16;
 /** Slices are painted by the processor: to hand each to the graphics card costs twice the time where that is emulated. */
 const PAINTED = { willReadFrequently: true };
 
-/** A plane of the study; `grays` and `keeps` fetch its slices, `tables` leads to colors, `pick` takes a click on a voxel. */
+/** A plane of the study; `grays`, `keeps` and `maps` fetch its slices, `tables` leads to colors, `pick` takes a click on a voxel. */
 export class Plane {
-  /** @param {string} name @param {{grays: any, keeps: any, tables: () => any, indices: (values: any) => any, pick: (place: number[]) => void, largest: (name: string) => void}} having */
+  /** @param {string} name @param {{grays: any, keeps: any, maps: any, tables: () => any, indices: (values: any) => any, pick: (place: number[]) => void, largest: (name: string) => void}} having */
   constructor(name, having) {
     Object.assign(this, { name, ...having, zoom: { zoom: 1, x: 0.5, y: 0.5 }, drag: null, way: 1, image: null });
     this.canvas = el("canvas", { tabindex: 0, role: "slider", "aria-label": `${name} slice`, "aria-orientation": "vertical" });
@@ -137,15 +137,16 @@ export class Plane {
     const levels = [...slice.values.subarray(first, first + layers)].map((one) => short(one, 5)).join(", ");
     const mm = inPatient(place).map((one) => one.toFixed(1)).join(", ");
     const name = isLabels() ? ` ${looked.survey.label_names[levels] || ""}` : unit();
+    const label = looked.geometry.labelled ? this.maps.have(this.name, this.k)?.values[row * size[1] + column] : 0;
     const number = this.keeps.have(this.name, this.k)?.values[row * size[1] + column];
-    return tell("under", { line: `${levels}${name} at ${mm} mm${number ? `, component ${number === 255 ? "255 or smaller" : number}` : ""}` });
+    return tell("under", { line: `${levels}${name} at ${mm} mm${label ? `, label ${label} ${looked.survey?.label_names[label] || ""}` : ""}${number ? `, component ${number === 255 ? "255 or smaller" : number}` : ""}` });
   }
 
   async #move() {
     if (!this.plane) return;
     const { name, k } = this;
     this.draw();
-    await Promise.all([this.grays.fetch(name, k), looked.kept && this.keeps.fetch(name, k)]);
+    await Promise.all([this.grays.fetch(name, k), looked.kept && this.keeps.fetch(name, k), looked.geometry.labelled && this.maps.fetch(name, k)]);
     if (k !== this.k) return;
     this.draw();
     for (let n = 1; n <= AHEAD; n++) this.#ahead(k + n * this.way);
@@ -156,6 +157,7 @@ export class Plane {
     if (k < 0 || k >= this.plane.count) return;
     this.grays.fetch(this.name, k);
     if (looked.kept) this.keeps.fetch(this.name, k);
+    if (looked.geometry.labelled) this.maps.fetch(this.name, k);
   }
 
   #draw() {
@@ -174,12 +176,15 @@ export class Plane {
     }
     slice.indices ??= this.indices(slice.values);
     const kept = looked.kept && !looked.moving ? this.keeps.have(this.name, this.k)?.values : null;
+    const map = looked.geometry.labelled ? this.maps.have(this.name, this.k)?.values : null;
     const { roi, slice_range: range } = state.choices;
-    const now = [slice, kept, this.tables(), String(roi), String(range)];
+    const now = [slice, kept, map, this.tables(), String(roi), String(range)];
     if (now.every((one, n) => one === this.painted?.[n])) return;
     this.painted = now;
     const having = { indices: slice.indices, layers: looked.geometry.layers };
-    paint(new Uint32Array(this.image.data.buffer), having, kept || null, outsideOf(this.plane, this.k), this.tables());
+    const [out, outside] = [new Uint32Array(this.image.data.buffer), outsideOf(this.plane, this.k)];
+    paint(out, having, state.choices.select && map ? null : kept || null, outside, this.tables());
+    if (map) paintOver(out, { map, columns, kept, outside }, this.tables().over);
     this.drawn.getContext("2d", PAINTED).putImageData(this.image, 0, 0);
   }
 

@@ -25,6 +25,7 @@ const TOOLS = { cross: "Crosshair (C)", pick: "Pick (P)", box: "Box (B)" };
 const HELD = 72;
 const grays = new Slices("/slice", HELD);
 const keeps = new Slices("/kept", HELD);
+const maps = new Slices("/labels", HELD);
 let scale = null;
 let made = null;
 
@@ -34,7 +35,8 @@ function tables() {
   const { contrast, window, opacity } = looked;
   const labels = isLabels() ? labelsOf(scale, new Set(state.choices.select || [])) : null;
   const tones = window.lower.map((lower, n) => tonesOf(scale, contrast, lower, window.upper[n]));
-  made = { tones, labels, mix: mixing(opacity), any: state.choices.layers === "any" };
+  const over = looked.geometry.labelled ? { chosen: new Set(state.choices.select || []), opacity } : null;
+  made = { tones, labels, over, mix: mixing(opacity), any: state.choices.layers === "any" };
   return made;
 }
 
@@ -70,7 +72,7 @@ function makeViews(say) {
   const views = el("div", { class: "views" });
   const largest = (name) => { views.dataset.large = views.dataset.large === name ? "" : name; look(); };
   const pick = (place) => pickAt(place, say);
-  const planes = Object.fromEntries(["axial", "sagittal", "coronal"].map((name) => [name, new Plane(name, { grays, keeps, tables, indices, pick, largest })]));
+  const planes = Object.fromEntries(["axial", "sagittal", "coronal"].map((name) => [name, new Plane(name, { grays, keeps, maps, tables, indices, pick, largest })]));
   const under = el("span", { class: "under", "aria-live": "off" });
   const showOpening = el("button", { type: "button", title: "Other series and files" }, "Open ...");
   on("under", ({ line }) => { under.textContent = line; });
@@ -98,7 +100,7 @@ function pickAt(place, say) {
   const { layers } = looked.geometry;
   const levels = grays.have(name, place[plane.axis]).values.subarray(at * layers, (at + 1) * layers);
   if (isLabels()) return pickLabel(Math.round(levels[0]));
-  if (looked.survey?.beside) return pick(place);
+  if (looked.geometry.labelled) return pick(place);
   const within = [...levels].map((level, n) => level > looked.window.lower[n] && level <= looked.window.upper[n]);
   const held = state.choices.layers === "any" ? within.some(Boolean) : within.every(Boolean);
   if (looked.kept) pickComponent(place, Boolean(keeps.have(name, place[plane.axis])?.values[at]), held, say);
@@ -121,6 +123,7 @@ async function opened(page) {
   scale = null;
   grays.restart();
   keeps.restart();
+  maps.restart();
   if (state.opened.kind === "study" && state.opened.ready) await begin(page);
   else showAll(page);
 }
