@@ -18,6 +18,8 @@ from tomomesh.slabs.keep import InMemory
 from tomomesh.ways.choice import take_way
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from tomomesh.segmentation.study import Selected
@@ -109,21 +111,28 @@ def assert_the_same(volume: Volume, asked: dict[str, Any], cutting: Cutting, lab
     there = None if labels is None else lazily(labels)
     wanted = kept_or_not(volume, asked, Cutting(whole), labels)
     for study, map_ in ((volume, labels), (lazily(volume), there)):
-        found = kept_or_not(study, asked, cutting, map_)
-        if isinstance(wanted, str) or isinstance(found, str):
-            assert found == wanted
-        else:
-            assert_equal(found, wanted)
+        assert_alike(kept_or_not(study, asked, cutting, map_), wanted)
 
 
 def kept_or_not(
-    volume: Volume, asked: dict[str, Any], cutting: Cutting, labels: Volume | None
+    volume: Volume, asked: dict[str, Any], cutting: Cutting, labels: Volume | None = None
 ) -> Stage[Selected] | str:
     """Return what is kept, or why nothing is."""
+    return or_why(lambda: kept(volume, asked, cutting, labels))
+
+
+def or_why(choose: Callable[[], Stage[Selected]]) -> Stage[Selected] | str:
     try:
-        return kept(volume, asked, cutting, labels)
+        return choose()
     except TomomeshError as fault:
         return repr(fault)
+
+
+def assert_alike(found: Stage[Selected] | str, wanted: Stage[Selected] | str) -> None:
+    if isinstance(wanted, str) or isinstance(found, str):
+        assert found == wanted
+    else:
+        assert_equal(found, wanted)
 
 
 def assert_equal(found: Stage[Selected], wanted: Stage[Selected]) -> None:

@@ -20,6 +20,7 @@ from studies import TURNED, affine_of, sampled, setting, write_nifti, write_seri
 from tomomesh import Volume, phantom, segment
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.model.volume import AXES
+from tomomesh.segmentation.study import lay_out
 from tomomesh.segmentation.survey import survey
 from tomomesh.settings import Settings
 from tomomesh.view import slices, studies, windows
@@ -29,12 +30,14 @@ from tomomesh.view.session import Session
 from tomomesh.view.windows import Kept
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from numpy.typing import NDArray
     from starlette.responses import Response
 
     from tomomesh.progress import Progress
+    from tomomesh.segmentation.study import LaidOut
 
 HEAD = phantom((14, 40, 36), (6.0, 6.0, 11.0))
 SHAPE = (5, 7, 9)
@@ -164,12 +167,16 @@ def flipped(axis: int, size: int) -> NDArray[np.float64]:
     return turn
 
 
+def kept_of(volume: Volume, settings: Settings) -> Kept:
+    return Kept.of(lay_out(volume, None, settings, labelled=False), volume, settings)
+
+
 class TestKept:
     @pytest.mark.parametrize("direction", ["axial", "coronal", "sagittal"])
     @pytest.mark.parametrize("name", WINDOWS)
     def test_it_is_what_the_run_keeps(self, name: str, direction: str) -> None:
         settings = Settings().replace(slices=direction, **WINDOWS[name])
-        kept = Kept.of(HEAD.volume, None, settings)
+        kept = kept_of(HEAD.volume, settings)
         whole = np.stack([kept.plane(0, k, HEAD.volume.shape[1:]) for k in range(HEAD.volume.shape[0])])
         run = segment(HEAD.volume, settings, neurons=8)
         expected = np.zeros(HEAD.volume.shape, bool)
@@ -186,7 +193,7 @@ class TestKept:
         if stored.min() == stored.max():
             return
         volume = Volume.from_stored(stored, np.eye(4))
-        kept = Kept.of(volume, None, Settings().replace(lower=0.5, keep="all", slices=direction))
+        kept = kept_of(volume, Settings().replace(lower=0.5, keep="all", slices=direction))
         whole = np.stack([kept.plane(0, k, (4, 5)) for k in range(3)])
         assert ((whole > 0) == (stored > 0)).all()
         assert np.stack([kept.plane(1, j, (3, 5)) for j in range(4)], 1).tolist() == whole.tolist()
@@ -200,7 +207,7 @@ class TestKept:
         stored = np.zeros((1, 60, 60), np.uint8)
         stored[0, ::2, ::2] = 1
         stored[0, 0, 0:3] = 1
-        kept = Kept.of(Volume.from_stored(stored, np.eye(4)), None, Settings().replace(lower=0.5, keep="all"))
+        kept = kept_of(Volume.from_stored(stored, np.eye(4)), Settings().replace(lower=0.5, keep="all"))
         drawn = kept.plane(0, 0, (60, 60))
         assert drawn[0, 0] == 1
         assert set(drawn[stored[0] > 0].tolist()) == set(range(1, 256))
@@ -213,9 +220,9 @@ class TestKept:
         volume = Volume.from_stored(
             stored, affine_of(np.diag([1.0, -1, 1])) * np.array([[scale], [scale], [scale], [1]])
         )
-        kept = Kept.of(volume, None, Settings().replace(lower=0.5))
+        kept = kept_of(volume, Settings().replace(lower=0.5))
         for one in kept.listed():
-            alone = Kept.of(volume, None, Settings().replace(lower=0.5, keep_at=[one["place"]]))
+            alone = kept_of(volume, Settings().replace(lower=0.5, keep_at=[one["place"]]))
             assert [other["voxels"] for other in alone.listed()] == [one["voxels"]]
             assert alone.listed()[0]["inside"] == one["inside"]
 
@@ -268,6 +275,22 @@ class TestKept:
         assert numbers(windows._plane(session, "axial", "3", other[0])).shape == shape[1:]
         with pytest.raises(LookupError):
             windows._plane(session, "axial", "3", "another")
+
+    @pytest.mark.parametrize("meanwhile", [lambda one: one.choose({"lower": 9.0}), lambda one: one.open(one.opened)])
+    def test_what_nobody_waits_for_any_more_is_given_up(
+        self, monkeypatch: pytest.MonkeyPatch, meanwhile: Callable[[Session], Any]
+    ) -> None:
+        session, asked = session_of(HEAD.volume, lower=60.0), windows.select_in
+
+        def overtaken(study: LaidOut, settings: Settings, progress: Progress) -> Any:
+            monkeypatch.setattr(windows, "select_in", asked)
+            threading.Thread(target=meanwhile, args=(session,), daemon=True).start()
+            while True:
+                progress("window", 1, 4)
+
+        monkeypatch.setattr(windows, "select_in", overtaken)
+        with pytest.raises(LookupError):
+            windows.kept(session)
 
     def test_a_window_that_keeps_nothing_says_so(self) -> None:
         session = session_of(HEAD.volume, lower=1e6)

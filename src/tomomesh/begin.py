@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from .effect import without_effect
 from .errors import UsageError
+from .segmentation.selection import STEPS
 from .segmentation.study import lay_out, select_in
 from .settings import Settings
 from .stage import Stage, folded
@@ -57,7 +58,7 @@ def laid_out(
 ) -> LaidOut:
     """Lay out a study (`lay_out`), once its way to a surface does not refuse the settings."""
     require_way(settings, _input_of(volume))
-    progress("window", 0, 2)
+    progress("window", 0, STEPS)
     return lay_out(volume, labels, settings, labelled=labelled)
 
 
@@ -84,9 +85,8 @@ class Begun:
 
 def begun_on(study: LaidOut, settings: Settings, given: Collection[str], progress: Progress) -> Begun:
     """Choose the voxels of a study that was laid out, and the way to their surface; parameters as `reconstructed`."""
-    kept = select_in(study, settings)
-    progress("window", 1, 2)
+    kept = select_in(study, settings, progress)
     taken = take_way(kept.value, settings)
-    progress("window", 2, 2)
+    progress("window", STEPS, STEPS)
     begun = begin(taken.value, given, input=_input_of(study.volume))
     return Begun(kept.value, begun.value, settings, taken.value, folded(None, begun, taken, kept))

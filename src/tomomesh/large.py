@@ -17,6 +17,7 @@ from .pipeline import finished
 from .pointcloud.forecast import bytes_in_words, free_memory
 from .progress import Progress, silent
 from .report import Reported
+from .segmentation.selection import STEPS
 from .segmentation.slabwise.cut import Cutting
 from .segmentation.study import lay_out
 from .slabs.cuts import Cuts
@@ -141,7 +142,7 @@ def reconstruct_large(
     require_large(settings)
     slabs, room = _workers(client, memory, slab)
     cutting = Cutting(partial(_cuts, room=room, itemsize=volume.voxels.dtype.itemsize), slabs)
-    progress("window", 0, 2)
+    progress("window", 0, STEPS)
     study = lay_out(volume, labels, settings, labelled=settings.window.select is not None, cutting=cutting)
     begun = begun_on(study, settings, changes, progress)
     if begun.way.name not in IN_SLABS:

@@ -12,6 +12,7 @@ from .memory.heap import give_back
 from .memory.limit import memory_limit
 from .model.points import PointSet
 from .progress import Progress, silent
+from .segmentation.selection import STEPS
 from .segmentation.study import lay_out
 from .stage import Stage, folded
 
@@ -121,7 +122,7 @@ def segment(
     12
     """
     settings = settled(settings, changes)
-    progress("window", 0, 2)
+    progress("window", 0, STEPS)
     study = lay_out(volume, labels, settings, labelled=settings.window.select is not None)
     return _segmented(begun_on(study, settings, changes, progress), progress)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..model.boxes import Box
     from ..model.volume import Volume
     from .slabwise.cut import Cut
 
@@ -106,31 +105,44 @@ def largest_component(mask: RunMask) -> Components:
     return _kept(runs, np.arange(len(runs.sizes)) == np.argmax(runs.sizes))
 
 
-def components_of_body(mask: RunMask, volume: Volume, cut: Cut) -> Components:
-    """Keep the components of a window of a CT that lie in a body: those of which a tenth at least does.
+@dataclass(frozen=True)
+class Body:
+    """The patient in a CT, whatever window is chosen.
 
     A body is what is denser than air (the window `skin`) once all that is thinner than twice `THICK` is taken away,
     by opening with a ball. So it holds the bones under the skin, and a table's shells or a head's holder are no part
-    of it. Where a window joins them to the patient, they are cut away: what is as dense as bone and lies in no body,
-    with the `RIM` that it fills in part.
+    of it.
 
-    Parameters
+    Attributes
     ----------
-    mask : RunMask
-    volume : Volume
-        Hounsfield units.
-    cut : Cut
-        Its voxels.
+    inside : Coarse
+    holders : Coarse
+        What is as dense as bone and lies in no body, with the `RIM` that it fills in part.
     """
-    (every, spacing), (finer, _) = _coarse(volume), _coarse(volume, RIM)
-    levels, dense = cut.sampled(every, finer)
-    body = Coarse(_opened(levels > PRESETS_HU["skin"][0], spacing), every, cut)
-    kept = _in_body(mask, body)
-    holders = zip(cut.over(kept.mask), _holders(volume, body, dense > PRESETS_HU["spongy-bone"][0]), strict=True)
-    without = RunMask.of(part[:] & ~holder for part, holder in holders)
+
+    inside: Coarse
+    holders: Coarse
+
+    @classmethod
+    def of(cls, volume: Volume, cut: Cut) -> Body:
+        """Find it in a volume, in Hounsfield units, whose voxels are `cut`."""
+        (every, spacing), (finer, _) = _coarse(volume), _coarse(volume, RIM)
+        levels, dense = cut.sampled(every, finer)
+        inside = Coarse(_opened(levels > PRESETS_HU["skin"][0], spacing), every, cut)
+        return cls(inside, _holders(volume, inside, dense > PRESETS_HU["spongy-bone"][0]))
+
+
+def components_of_body(mask: RunMask, body: Body) -> Components:
+    """Keep the components of a window of a CT that lie in a body: those of which a tenth at least does.
+
+    Where a window joins holders to the patient, they are cut away.
+    """
+    kept = _in_body(mask, body.inside)
+    parts = zip(body.holders.cut.over(kept.mask), body.holders, strict=True)
+    without = RunMask.of(part[:] & ~holder for part, holder in parts)
     if without.count == kept.mask.count:
         return kept
-    return Components(_in_body(without, body).mask, kept.found, kept.dropped)
+    return Components(_in_body(without, body.inside).mask, kept.found, kept.dropped)
 
 
 def _holders(volume: Volume, body: Coarse, dense: Mask) -> Coarse:
@@ -249,24 +261,6 @@ def solid(body: RunMask, volume: Volume, cut: Cut) -> RunMask:
     deep = Coarse(apart <= (1 + DEEP) * radius, every, cut)
     open_ = Runs.of(RunMask.of(near & ~part[:] for near, part in zip(deep, cut.over(body), strict=True)))
     return ~open_.only(open_.within(Coarse(apart <= radius, every, cut)) > 0)
-
-
-def is_dense(mask: RunMask, cut: Cut) -> bool:
-    """Tell whether over half of a window of a CT is as dense as a body; one of lungs or airways is not."""
-    return bool(2 * cut.sum(_dense, cut.over(mask)) > mask.count)
-
-
-def _dense(levels: NDArray[Any], box: Box, mask: RunMask) -> int:
-    return int(mask.within([levels > PRESETS_HU["skin"][0]]).sum())
-
-
-def skin_of(cut: Cut) -> RunMask:
-    """Return what of a CT is denser than air."""
-    return cut.runs(_denser)
-
-
-def _denser(levels: NDArray[Any], box: Box) -> RunMask:
-    return RunMask.of([levels > PRESETS_HU["skin"][0]])
 
 
 def _kept(runs: Runs, kept: Mask) -> Components:

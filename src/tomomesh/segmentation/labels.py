@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import EmptyError, UsageError
+from ..errors import EmptyError, GeometryError, UsageError
 from ..isosurface.run_mask import RunMask
+from .grid import onto_grid
 from .slabwise.cut import HERE
 
 if TYPE_CHECKING:
@@ -244,3 +245,16 @@ def _neighbors(levels: NDArray[Any], box: Box) -> tuple[int, int] | None:
 
 def _number(levels: NDArray[Any], box: Box) -> Ints:
     return np.bincount(np.rint(levels).ravel().astype(np.int64), minlength=HIGHEST_LABEL)
+
+
+def fitting(labels: Volume, volume: Volume, cutting: Cutting = HERE) -> Volume:
+    """Lay a label map onto the study's grid; errors are those of `onto_grid`, with the option that helps."""
+    labels = whole(labels, cutting)
+    try:
+        return onto_grid(labels, volume, cutting)
+    except GeometryError as fault:
+        if option := volume.other_frame or labels.other_frame:
+            whose = "study" if volume.other_frame else "label map"
+            fault.args = (f"{fault} Or: {option}, for the {whose} holds two frames that disagree.",)
+            fault.flags += (option.split()[0],)
+        raise

@@ -11,22 +11,20 @@ import numpy as np
 from ..errors import EmptyError, UsageError
 from ..isosurface.run_mask import RunMask
 from ..model.lazy import LazyVoxels
+from ..progress import silent
 from .body import (
     Cleaned,
     components_of_body,
-    is_dense,
     largest_component,
-    skin_of,
     solid,
     thick_components,
     without_specks,
 )  # fmt: skip
 from .contours.labelled import filled_slices, gaps_in
-from .padding import as_background, padding_in
+from .gray_levels import Shown
 from .picked import picked
-from .slabwise.cut import HERE
 from .slabwise.sources import MaskVoxels
-from .window import otsu_in, window_in, window_limits
+from .window import is_dense, otsu_in, skin_of, window_in, window_limits
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,11 +32,16 @@ if TYPE_CHECKING:
     from ..isosurface.walls.walls import Walls
     from ..model.boxes import Box
     from ..model.volume import Volume
+    from ..progress import Progress
     from ..settings import Settings, WindowSettings
     from .body import Components
+    from .gray_levels import GrayLevels
     from .labels import Labelled
-    from .slabwise.cut import Cut, Cutting
+    from .slabwise.cut import Cut
     from .window import Limit
+
+STEPS = 4
+"""From a study to what is kept of it, and the way that it goes."""
 
 
 @dataclass(frozen=True)
@@ -128,21 +131,21 @@ class Chosen:
 
 
 def choose(
-    stack: Volume, labels: Labelled | None, settings: Settings, inside: RunMask | None = None,
-    cutting: Cutting = HERE,
+    levels: GrayLevels, labels: Labelled | None, settings: Settings, inside: RunMask | None = None,
+    progress: Progress = silent,
 ) -> Chosen:  # fmt: skip
     """Return what the settings keep of a study.
 
     Parameters
     ----------
-    stack : Volume
+    levels : GrayLevels
+        Of the study.
     labels : Labelled or None
         A label map on its grid, for ``select``: the study itself, or one beside it.
     settings : Settings
     inside : RunMask, optional
         The voxels that may be kept.
-    cutting : Cutting, optional
-        Who looks at them: no result depends on it.
+    progress : Progress, optional
 
     Raises
     ------
@@ -150,12 +153,15 @@ def choose(
         As `window` and `Labelled.mask`.
     """
     asked = settings.window
-    chosen = _of_levels(stack, asked, cutting) if labels is None else _of_labels(stack, labels, asked)
+    shown, chosen = _of_levels(levels, asked) if labels is None else _of_labels(levels, labels, asked)
     chosen = chosen if inside is None else replace(chosen, runs=_within(chosen.runs, inside))
-    chosen = _parts(chosen.counted(chosen.runs, window=chosen.kept), stack, asked, cutting.of(chosen.volume.voxels))
+    progress("window", 1, STEPS)
+    chosen = _parts(chosen.counted(chosen.runs, window=chosen.kept), shown, levels.volume, asked)
+    progress("window", 2, STEPS)
     if asked.keep != "all" and not settings.cubes.shared_walls:  # a speck left out of one label would be a gap
         cleaned = without_specks(chosen.runs)
         chosen = replace(chosen, runs=cleaned.mask, cleaned=cleaned)
+    progress("window", 3, STEPS)
     return chosen if asked.keep_at is None and asked.drop_at is None else _picked(chosen, asked)
 
 
@@ -164,7 +170,12 @@ def _picked(chosen: Chosen, asked: WindowSettings) -> Chosen:
     return chosen.counted(found.mask, left_out=found.dropped, left_out_voxels=chosen.kept - found.mask.count)
 
 
-def _of_labels(stack: Volume, labels: Labelled, asked: WindowSettings) -> Chosen:
+def _of_labels(levels: GrayLevels, labels: Labelled, asked: WindowSettings) -> tuple[Shown, Chosen]:
+    chosen = _labelled(levels.volume, labels, asked)
+    return Shown(chosen.volume, levels.cutting.of(chosen.volume.voxels)), chosen
+
+
+def _labelled(stack: Volume, labels: Labelled, asked: WindowSettings) -> Chosen:
     runs = labels.mask(asked.select or ())
     if asked.fill_slices:
         return _interpolated(stack, runs, labels.volume)
@@ -185,16 +196,14 @@ def _interpolated(stack: Volume, runs: RunMask, labels: Volume) -> Chosen:
     return Chosen(volume, RunMask.of([volume.voxels > 0]), 0.0, np.inf, told=told)
 
 
-def _of_levels(stack: Volume, asked: WindowSettings, cutting: Cutting) -> Chosen:
+def _of_levels(levels: GrayLevels, asked: WindowSettings) -> tuple[Shown, Chosen]:
     """Window a study whose padding is background: what its header names, and what is found where no window is given."""
     given = asked.lower is not None or asked.upper is not None
-    cut = cutting.of(stack.voxels)
-    padded = padding_in(cut, stack.padding, guessed=not given)
-    shown, changed, named = (cut, 0, 0) if padded is None else as_background(cut, padded)
-    lower, upper = window_limits(stack, shown, asked, partial(otsu_in, cut, padded))
-    runs = window_in(shown, lower=lower, upper=upper, layers=asked.layers)
-    counts = Counts(padding=changed, named_padding=named)
-    return Chosen(replace(stack, voxels=shown.voxels), runs, lower, upper, counts)
+    shown = levels.shown(guessed=not given)
+    lower, upper = window_limits(levels.volume, shown.cut, asked, partial(otsu_in, levels.cut, shown.padding))
+    runs = window_in(shown.cut, lower=lower, upper=upper, layers=asked.layers)
+    counts = Counts(padding=shown.padded, named_padding=shown.named)
+    return shown, Chosen(shown.volume, runs, lower, upper, counts)
 
 
 def _within(runs: RunMask, inside: RunMask) -> RunMask:
@@ -204,14 +213,15 @@ def _within(runs: RunMask, inside: RunMask) -> RunMask:
     return runs
 
 
-def _parts(chosen: Chosen, stack: Volume, asked: WindowSettings, cut: Cut) -> Chosen:
+def _parts(chosen: Chosen, shown: Shown, stack: Volume, asked: WindowSettings) -> Chosen:
     """Leave out components, and what is no body; where it is asked for, fill or look into the body."""
+    cut = shown.cut
     ct = stack.layers == 1 and (stack.unit == "HU" or asked.preset is not None)
     guessed, keep = asked.keep == "auto", asked.keep
     if keep == "all":
         return chosen
     if asked.preset == "lung" and guessed:
-        return _inside_body(chosen, cut)
+        return _inside_body(chosen, shown)
     if guessed:
         keep = "body" if ct and asked.select is None and is_dense(chosen.runs, cut) else "all"
     if keep == "body" and not ct:
@@ -221,7 +231,7 @@ def _parts(chosen: Chosen, stack: Volume, asked: WindowSettings, cut: Cut) -> Ch
         )  # fmt: skip
     if keep != "all":
         by_body = keep == "body"
-        kept = components_of_body(chosen.runs, chosen.volume, cut) if by_body else largest_component(chosen.runs)
+        kept = components_of_body(chosen.runs, shown.body) if by_body else largest_component(chosen.runs)
         chosen = _some(chosen, kept, guessed=guessed)
     return _filled(chosen, cut) if asked.preset == "skin" else chosen
 
@@ -241,10 +251,10 @@ def _filled(chosen: Chosen, cut: Cut) -> Chosen:
     return chosen.counted(filled, lining=filled.count - chosen.kept)
 
 
-def _inside_body(chosen: Chosen, cut: Cut) -> Chosen:
+def _inside_body(chosen: Chosen, shown: Shown) -> Chosen:
     """Leave out the air of the room, and then what is nowhere thick; not where nothing would be left."""
-    volume, window = chosen.volume, chosen.counts.window
-    body = components_of_body(skin_of(cut), volume, cut).mask
+    (volume, cut), window = (shown.volume, shown.cut), chosen.counts.window
+    body = components_of_body(skin_of(cut), shown.body).mask
     runs = chosen.runs & solid(body, volume, cut)
     if not runs.count:
         return chosen.counted(chosen.runs, spared_voxels=window)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import GeometryError, UsageError
+from ..errors import UsageError
 from ..model.volume import AXES, Volume, order_along
+from ..progress import silent
 from ..stage import Stage, folded, measured
 from .body import Cleaned
 from .crop import crop, inside_roi
-from .grid import onto_grid
-from .labels import Labelled, doubted, labels_counted, whole
+from .gray_levels import GrayLevels
+from .labels import Labelled, doubted, fitting, labels_counted, whole
 from .selection import Chosen, choose
 from .slabwise.cut import HERE
 
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..isosurface.run_mask import RunMask
+    from ..progress import Progress
     from ..settings import Settings
     from .selection import Counts
     from .slabwise.cut import Cutting
@@ -84,6 +87,11 @@ class LaidOut:
     cropped: dict[str, list[int]] | None
     cutting: Cutting = HERE
 
+    @cached_property
+    def levels(self) -> GrayLevels:
+        """Its gray levels, and what its windows have in common."""
+        return GrayLevels(self.volume, self.cutting)
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What its readers, and those of the label map, have decided."""
@@ -136,9 +144,9 @@ def _check_labelled(labels: Volume | None, settings: Settings, *, labelled: bool
         raise UsageError("no label was chosen", found="a label map", expected="--select with its labels")
 
 
-def select_in(study: LaidOut, settings: Settings) -> Stage[Selected]:
+def select_in(study: LaidOut, settings: Settings, progress: Progress = silent) -> Stage[Selected]:
     """Choose voxels of a study by gray level or label; raises as `choose` does."""
-    chosen = measured("window", choose, study.volume, study.labels, settings, study.inside, study.cutting)
+    chosen = measured("window", choose, study.levels, study.labels, settings, study.inside, progress)
     notes = study.notes + _dropped(chosen.value, settings) + _cut_off(chosen.value)
     section = _section(study.volume, study.plane, study.cropped, notes)
     doubt = () if study.labels is None else doubted(study.labels)
@@ -157,19 +165,6 @@ def _slice_axis(volume: Volume, slices: str) -> int:
     if slices == "auto":
         return volume.thickest_axis()
     return volume.stored_axis if slices == "stored" else AXES.index(slices)
-
-
-def fitting(labels: Volume, volume: Volume, cutting: Cutting = HERE) -> Volume:
-    """Lay a label map onto the study's grid; errors are those of `onto_grid`, with the option that helps."""
-    labels = whole(labels, cutting)
-    try:
-        return onto_grid(labels, volume, cutting)
-    except GeometryError as fault:
-        if option := volume.other_frame or labels.other_frame:
-            whose = "study" if volume.other_frame else "label map"
-            fault.args = (f"{fault} Or: {option}, for the {whose} holds two frames that disagree.",)
-            fault.flags += (option.split()[0],)
-        raise
 
 
 def _section(study: Volume, plane: str, cropped: dict[str, list[int]] | None, notes: tuple[str, ...]) -> dict[str, Any]:

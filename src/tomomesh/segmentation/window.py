@@ -219,3 +219,21 @@ def beside(cut: Cut, padded: Padding) -> Levels:
 
 def _unpadded(work: Looked, padded: Padding, levels: NDArray[Any], box: Box) -> Any:
     return work(levels[~padded.within(levels, box)])
+
+
+def is_dense(mask: RunMask, cut: Cut) -> bool:
+    """Tell whether over half of a window of a CT is as dense as a body; one of lungs or airways is not."""
+    return bool(2 * cut.sum(_dense, cut.over(mask)) > mask.count)
+
+
+def _dense(levels: NDArray[Any], box: Box, mask: RunMask) -> int:
+    return int(mask.within([levels > PRESETS_HU["skin"][0]]).sum())
+
+
+def skin_of(cut: Cut) -> RunMask:
+    """Return what of a CT is denser than air."""
+    return cut.runs(_denser)
+
+
+def _denser(levels: NDArray[Any], box: Box) -> RunMask:
+    return RunMask.of([levels > PRESETS_HU["skin"][0]])

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from .. import io
 from ..errors import EmptyError, FormatError, TomomeshError, UnreadableError
 from ..io.files.source import suffix_of
-from ..segmentation.study import fitting
+from ..segmentation.labels import fitting
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

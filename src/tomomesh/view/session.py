@@ -85,8 +85,8 @@ class Session:
         Runs the command line of some words.
     reach : Reach
         What may be opened.
-    surveys, selections : Remembered
-        What was found out about what is opened, and what some choices keep of it.
+    surveys, studies, selections : Remembered
+        What was found out about what is opened, the part of it that is looked at, and what some choices keep of that.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Session:
     ) -> None:  # fmt: skip
         self.opened, self.write, self.run, self.reach = opened, write, run, reach or Reach()
         self._turns, self._told = 0, count(1)
-        self.surveys, self.selections, self.colors = Remembered(1), Remembered(3), Remembered(3)
+        self.surveys, self.studies, self.selections, self.colors = map(Remembered, (1, 1, 3, 3))
         self.choices = Choices().then(choices or {})
         self.made: dict[str, Outcome] = {}
         self.events = Events()
@@ -190,6 +190,7 @@ class Session:
     def _look_at(self, opened: Opened) -> None:
         self.opened, self._turns = opened, self._turns + 1
         self.surveys.clear()
+        self.studies.clear()
         self.selections.clear()
         self.colors.clear()
         self.tell()

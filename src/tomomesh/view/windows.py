@@ -13,8 +13,9 @@ import numpy as np
 from ..errors import TomomeshError, UsageError
 from ..isosurface.runs import Runs
 from ..model.volume import AXES, order_along
+from ..progress import silent
 from ..segmentation.picked import component_at
-from ..segmentation.study import select_study
+from ..segmentation.study import lay_out, select_in
 from .routes import get, levels, post
 from .slices import axis_of
 from .studies import opened_volume
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
     from starlette.responses import Response
 
     from ..model.volume import Volume
-    from ..segmentation.study import Selected
+    from ..progress import Progress
+    from ..segmentation.study import LaidOut, Selected
     from ..settings import Settings
     from ..stage import Stage
     from .session import Session
@@ -65,12 +67,12 @@ class Kept:
     told: dict[str, Any]
 
     @classmethod
-    def of(cls, volume: Volume, labels: Volume | None, settings: Settings) -> Kept:
-        """Choose the voxels; errors are those of `segmentation.study.select_study`."""
-        chosen: Stage[Selected] = select_study(volume, labels, settings)
+    def of(cls, study: LaidOut, whole: Volume, settings: Settings, progress: Progress = silent) -> Kept:
+        """Choose the voxels of a study, a part of a whole one; errors are those of `segmentation.study.select_in`."""
+        chosen: Stage[Selected] = select_in(study, settings, progress)
         selected = chosen.value
         order = order_along(AXES.index(selected.plane))
-        corner = np.rint(volume.to_indices(selected.study.affine[None, :3, 3])[0, ::-1]).astype(np.int64)
+        corner = np.rint(whole.to_indices(selected.study.affine[None, :3, 3])[0, ::-1]).astype(np.int64)
         told = {**chosen.stats, "warnings": list(chosen.warnings)}
         return cls(selected, Runs.of(selected.chosen.runs, corners=True), order, corner, told)
 
@@ -149,13 +151,16 @@ def place_of(volume: Volume, voxel: Longs) -> Place:
     return x, y, z
 
 
-def _matters(settings: Settings) -> Any:
-    """Return the settings that choose voxels."""
-    return settings.read, settings.crop, settings.window, settings.network.slices, settings.cubes.shared_walls
+def _lies(settings: Settings) -> Any:
+    """Return the settings that tell which part of a study is looked at, and whether for labels."""
+    window = settings.window
+    return settings.read, settings.crop, settings.network.slices, window.select is not None, window.fill_slices
 
 
 def _key(settings: Settings) -> str:
-    return hashlib.sha256(repr(_matters(settings)).encode()).hexdigest()[:16]
+    """Name the settings that choose voxels."""
+    matters = (_lies(settings), settings.window, settings.cubes.shared_walls)
+    return hashlib.sha256(repr(matters).encode()).hexdigest()[:16]
 
 
 def kept(session: Session, picks: bool = True) -> tuple[str, Kept]:
@@ -168,19 +173,33 @@ def kept(session: Session, picks: bool = True) -> tuple[str, Kept]:
     TomomeshError
         As `segmentation.study.select_study`, and where no study is open.
     LookupError
-        Where other choices were made meanwhile, so that nobody waits for this.
+        Where other choices were made, or something else was opened meanwhile, so that nobody waits for this.
     """
     opened_volume(session)
     unpicked = {} if picks else dict.fromkeys(PICKS)
-    asked = _key(session.settings.replace(**unpicked))
+    opened, asked = session.opened, _key(session.settings.replace(**unpicked))
+
+    def still(*_: object) -> None:
+        if session.opened is not opened or _key(session.settings.replace(**unpicked)) != asked:
+            raise LookupError(asked)
 
     def choose() -> Kept:
         settings = session.settings.replace(**unpicked)
-        if _key(settings) != asked:
-            raise LookupError(asked)
-        return Kept.of(opened_volume(session), session.opened.chosen_labels(settings), settings)
+        still()
+        return Kept.of(laid_out(session, settings), opened_volume(session), settings, progress=still)
 
     return asked, session.selections.of(asked, choose)
+
+
+def laid_out(session: Session, settings: Settings) -> LaidOut:
+    """Lay the study out as settings ask for; what all windows have in common is found once."""
+
+    def lay() -> LaidOut:
+        labels, labelled = session.opened.chosen_labels(settings), settings.window.select is not None
+        return lay_out(opened_volume(session), labels, settings, labelled=labelled)
+
+    found: LaidOut = session.studies.of(_lies(settings), lay)
+    return found
 
 
 def _kept(session: Session) -> dict[str, Any]:
