@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import law
+from segmentations import written
 from studies import TURNED, affine_of, sampled, setting, write_nifti, write_series
 from tomomesh import Volume, phantom, segment
 from tomomesh.errors import EmptyError, UsageError
@@ -152,12 +153,47 @@ class TestBeside:
             "tomomesh", "reconstruct", gray, "--labels-in", beside, "--select=4", "-o", "mesh.stl",
         ]  # fmt: skip
 
+    def test_others_can_be_chosen_after_one(self, tmp_path: Path) -> None:
+        """A segmentation is read whole, whatever is chosen."""
+        session = segmented(tmp_path, {1: self.box(5, 10), 3: self.box(10, 15)}, select=[1])
+        assert studies._study(session)["labels"] == {"1": 300, "3": 300}
+        before = session.opened
+        session.choose({"select": [1, 3]})
+        assert session.opened is before
+        assert [one["voxels"] for one in windows.kept(session)[1].listed()] == [600]
+
+    def test_of_labels_that_overlap_those_are_read_that_are_chosen(self, tmp_path: Path) -> None:
+        session = segmented(tmp_path, {1: self.box(5, 10), 3: self.box(8, 15)})
+        assert "segments overlap" in session.opened.refused
+        assert studies._series(session)["segments"] == {"1": "Liver", "3": "Tumor"}
+        session.choose({"select": [1]})
+        told = studies._study(opened(session))
+        assert (told["labels"], told["label_names"]["3"]) == ({"1": 300, "3": None}, "Tumor")
+        session.choose({"select": [1, 3]})
+        assert studies._study(opened(session))["labels"] == {"1": 300, "3": 300}
+        assert windows.kept(session)[1].runs.mask.count == 600
+
+    def box(self, first: int, last: int) -> NDArray[np.bool_]:
+        mask = np.zeros(HEAD.volume.shape, np.bool_)
+        mask[3:9, 10:20, first:last] = True
+        return mask
+
     def test_one_that_does_not_fit_is_refused(self, tmp_path: Path) -> None:
         gray = write_nifti(tmp_path / "gray.nii", np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
         beside = write_nifti(tmp_path / "other.nii", np.ones((4, 4, 4), np.uint8), np.diag([3.0, 3, 3, 1]))
         session = Session(Opened("study", (str(gray),), str(beside)))
         session.read(session.opened)
         assert "grid" in opened(session).opened.refused
+
+
+def segmented(folder: Path, masks: dict[int, NDArray[np.bool_]], **choices: Any) -> Session:
+    """Open a study with a DICOM segmentation over it."""
+    gray = write_nifti(folder / "gray.nii", np.asarray(HEAD.volume.voxels), HEAD.volume.affine)
+    session = Session(
+        Opened("study", (str(gray),), str(written(masks, HEAD.volume.affine, folder / "seg.dcm"))), choices
+    )
+    session.read(session.opened)
+    return opened(session)
 
 
 def flipped(axis: int, size: int) -> NDArray[np.float64]:

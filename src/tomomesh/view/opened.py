@@ -28,8 +28,6 @@ SLICES = (".dcm", ".ima", "")
 """Suffixes of slices: where they lie, a mesh and a report lie beside their study."""
 LONGEST = 64 << 20
 """Bytes of a report that is read: one of a mesh of a million pieces has 20 MB."""
-WHOLE = (".nii", ".nii.gz")
-"""Suffixes of label maps with names that are read whole, whichever labels are wanted; of others, only those are."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +54,8 @@ class Opened:
         What is known of the command that made the mesh.
     names : mapping of int to str
         What the labels of a label map are called.
+    part : bool
+        Whether they overlap, so that only those that are chosen were read.
     refused : str
         Why it could not be read, in one line.
     flags : tuple of str
@@ -73,6 +73,7 @@ class Opened:
     report: Mapping[str, Any] = field(default_factory=dict, repr=False)
     repeats: tuple[str, ...] = ()
     names: Mapping[int, str] = field(default_factory=dict)
+    part: bool = False
     refused: str = ""
     flags: tuple[str, ...] = ()
 
@@ -106,7 +107,7 @@ class Opened:
         """Tell whether other settings read a study otherwise."""
         if self.kind != "study":
             return False
-        part = bool(self.refused or self.names) and suffix_of(self.beside or self.words[0]) not in WHOLE
+        part = bool(self.refused) or self.part
         return before.read != after.read or (part and before.window.select != after.window.select)
 
     @property
@@ -237,10 +238,20 @@ def _repeats(path: Path, report: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _study(path: str, settings: Settings, beside: str) -> dict[str, Any]:
-    select = settings.window.select
-    volume = io.read_volume(path, settings=settings.read, select=None if beside else select)
     if not beside:
-        return {"volume": volume, "names": io.label_names(path)}
-    labels = io.read_volume(beside, settings=settings.read, select=select)
+        volume, part = _labels(path, settings)
+        return {"volume": volume, "names": io.label_names(path), "part": part}
+    volume = io.read_volume(path, settings=settings.read)
+    labels, part = _labels(beside, settings)
     laid = fitting(labels, volume)
-    return {"volume": volume, "labels": labels, "laid": laid, "names": io.label_names(beside)}
+    return {"volume": volume, "labels": labels, "laid": laid, "names": io.label_names(beside), "part": part}
+
+
+def _labels(path: str, settings: Settings) -> tuple[Volume, bool]:
+    """Read what may be a label map, all of it, so that any label can be chosen; where they overlap, those that are."""
+    try:
+        return io.read_volume(path, settings=settings.read), False
+    except TomomeshError as fault:
+        if "--select" not in fault.flags or not settings.window.select:
+            raise
+    return io.read_volume(path, settings=settings.read, select=settings.window.select), True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from .opened import Opened, kind_of
 from .routes import get, post
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from ..model.volume import Volume
     from .session import Session
@@ -51,8 +52,17 @@ def _series(session: Session) -> dict[str, Any]:
         listing = io.list_series(opened.words[0], settings=replace(session.settings.read, series=None))
     except TomomeshError:  # told when it was read
         listing = io.Listing()
-    segments = {str(number): name for number, name in listing.segments}
+    segments = {str(number): name for number, name in _segments(opened.beside, listing)}
     return {"series": listing.told, "segments": segments, "left_out": dict(listing.left_out)}
+
+
+def _segments(beside: str, listing: io.Listing) -> Iterable[tuple[int, str]]:
+    """Return the segments that can be chosen: of the label map beside the study, where there is one."""
+    if not beside:
+        return listing.segments
+    with suppress(TomomeshError):  # told when it was read
+        return io.label_names(beside).items()
+    return ()
 
 
 def _open(session: Session, body: Any) -> dict[str, Any]:
@@ -71,9 +81,10 @@ def _study(session: Session) -> dict[str, Any]:
     volume = opened_volume(session)
     found: dict[str, Any] = session.surveys.of(None, lambda: _surveyed(session))
     slices = {"auto": found["default_plane"], "stored": AXES[volume.stored_axis]}.get(settings.network.slices)
-    names = _named(found["labels"], opened.names)
+    unread = {str(number): None for number in opened.names} if opened.part else {}
+    labels = {**unread, **found["labels"]}
     return {key: found[key] for key in found if key not in ("corner_mm", "affine")} | {
-        "label_names": names, "slices": slices or settings.network.slices,
+        "labels": labels, "label_names": _named(labels, opened.names), "slices": slices or settings.network.slices,
     }  # fmt: skip
 
 
@@ -89,7 +100,7 @@ def _counted(labels: Volume) -> dict[str, int]:
     return {str(round(number)): count for number, count in pairs if number > 0}
 
 
-def _named(labels: Mapping[str, int], names: Mapping[int, str]) -> dict[str, str]:
+def _named(labels: Iterable[str], names: Mapping[int, str]) -> dict[str, str]:
     return {label: names[int(label)] for label in labels if int(label) in names}
 
 

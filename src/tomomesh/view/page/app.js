@@ -14,6 +14,7 @@ const shown = new Map();
 const SHORT = 300;
 let current = "";
 let working = 0;
+let turn = -1;
 
 const byId = (id) => /** @type {any} */ (document.getElementById(id));
 
@@ -39,6 +40,8 @@ function open(name) {
 }
 
 function showState(now) {
+  if (turn !== now.opened.turn) fill(byId("said")); // what was said of something else
+  turn = now.opened.turn;
   byId("opened").textContent = now.opened.name;
   byId("undo").disabled = !now.undo;
   byId("redo").disabled = !now.redo;
@@ -125,7 +128,9 @@ on("state", showState);
 on("progress", showWork);
 on("done", hideWork);
 on("stopped", () => { hideWork(); say("stopped", "done"); });
-on("failed", ({ name, error }) => { hideWork(); if (name !== "reconstruct" || current !== "surface") say(error, "fault"); });
+/** Parts that say themselves what some work has failed by. */
+const SAYING = { reconstruct: "surface", read: "study" };
+on("failed", ({ name, error }) => { hideWork(); if (SAYING[name] !== current) say(error, "fault"); });
 on("fault", ({ line }) => say(line, "fault"));
 on("away", () => document.body.classList.add("away"));
 on("back", () => document.body.classList.remove("away"));

@@ -85,5 +85,5 @@ function labelRows() {
   return Object.entries(labels).map(([label, voxels]) => el("label", { class: "row" },
     el("input", { type: "checkbox", ...(chosen.has(Number(label)) ? { checked: true } : {}), onchange: () => pickLabel(Number(label)) }),
     colored(el("span", { class: "swatch" }), labelColor(Number(label))),
-    el("span", { class: "name" }, `${label} ${names[label] || ""}`), el("small", {}, counted(voxels))));
+    el("span", { class: "name" }, `${label} ${names[label] || ""}`), el("small", {}, voxels === null ? "" : counted(voxels))));
 }

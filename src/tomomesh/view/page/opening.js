@@ -44,12 +44,12 @@ function seriesTable(found) {
   const heads = ["series", "modality", "slices", "rows x columns", "pixel mm", "apart mm", "description", ""];
   const left = Object.entries(found.left_out).map(([reason, count]) => `${count} ${reason}`).join(", ");
   return [el("h2", {}, "Series"),
-    el("table", { class: "series" }, el("thead", {}, el("tr", {}, ...heads.map((one) => el("th", { scope: "col" }, one)))), el("tbody", {}, ...found.series.map(seriesRow))),
+    el("table", { class: "series" }, el("thead", {}, el("tr", {}, ...heads.map((one) => el("th", { scope: "col" }, one)))), el("tbody", {}, ...found.series.map((one) => seriesRow(one, found.series.length > 1)))),
     left ? el("p", { class: "hint" }, `Left out: ${left}.`) : null];
 }
 
-function seriesRow(one) {
-  const open = el("button", { type: "button", class: one.refused ? "" : "first", onclick: () => choose({ series: one.number }) }, one.refused ? "Try" : "Open");
+function seriesRow(one, several) {
+  const open = several && el("button", { type: "button", class: one.refused ? "" : "first", onclick: () => choose({ series: one.number }) }, one.refused ? "Try" : "Open");
   const cells = [one.number, one.modality, one.slices, `${one.rows} x ${one.columns}`, pair(one.pixel_mm, " x "), pair(one.distances_mm, " to "), one.description || ""];
   const row = el("tr", {}, ...cells.map((cell) => el("td", {}, cell)), el("td", {}, open));
   if (one.refused) row.children[6].append(el("div", { class: "refused" }, one.refused.error));
