@@ -21,7 +21,7 @@ from studies import TURNED, affine_of, sampled, setting, write_nifti, write_seri
 from tomomesh import Volume, phantom, segment
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.model.volume import AXES
-from tomomesh.segmentation.study import lay_out
+from tomomesh.segmentation.study import lay_out, select_in
 from tomomesh.segmentation.survey import survey
 from tomomesh.settings import Settings
 from tomomesh.view import slices, studies, windows
@@ -316,10 +316,10 @@ class TestKept:
     def test_what_nobody_waits_for_any_more_is_given_up(
         self, monkeypatch: pytest.MonkeyPatch, meanwhile: Callable[[Session], Any]
     ) -> None:
-        session, asked = session_of(HEAD.volume, lower=60.0), windows.select_in
+        session = session_of(HEAD.volume, lower=60.0)
 
         def overtaken(study: LaidOut, settings: Settings, progress: Progress) -> Any:
-            monkeypatch.setattr(windows, "select_in", asked)
+            monkeypatch.setattr(windows, "select_in", select_in)
             threading.Thread(target=meanwhile, args=(session,), daemon=True).start()
             while True:
                 progress("window", 1, 4)
