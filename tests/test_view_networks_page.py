@@ -151,8 +151,35 @@ def test_a_still_figure_is_not_taken_over_by_a_training_that_plays() -> None:
         until(seen, re.compile("^Presentation [1-9]"))
         seen.locator(".net-figures button", has_text="4").first.click()
         expect(seen.locator("#net-caption")).to_contain_text("LT < k <= HT")
+        expect(seen.locator(".net-curves")).to_be_hidden()
         seen.evaluate(NEXT_FRAMES)
         assert "LT < k <= HT" in seen.inner_text("#net-caption")
+
+
+def test_what_was_refused_is_forgotten_once_it_is_put_right() -> None:
+    with served() as page, looking_at(page, refused=True) as seen:
+        seen.wait_for_selector("#net-train:enabled")
+        neurons = seen.locator("#option-neurons")
+        neurons.fill("1")
+        neurons.press("Tab")
+        expect(seen.locator(".toast.fault")).to_contain_text("at least 3")
+        seen.locator("#option-neurons").fill("30")
+        seen.locator("#option-neurons").press("Tab")
+        expect(seen.locator(".toast.fault")).to_have_count(0)
+
+
+def test_half_of_a_pair_wants_the_other() -> None:
+    with served() as page, looking_at(page) as seen:
+        seen.wait_for_selector("#net-train:enabled")
+        last = seen.locator("#option-radius-last")
+        seen.locator("#option-radius").fill("4")
+        seen.locator("#option-radius").press("Tab")
+        expect(last).to_have_attribute("placeholder", "needed")
+        last.fill("1")
+        last.press("Tab")
+        expect(seen.locator(".net-option.chosen")).to_contain_text("Radius")
+        told = seen.evaluate("async () => (await (await fetch('/api/state')).json()).choices")
+        assert told == {"radius": [4, 1]}
 
 
 def test_no_epoch_is_lost_where_the_page_cannot_follow() -> None:

@@ -14,7 +14,7 @@ const shown = new Map();
 const SHORT = 300;
 let current = "";
 let working = 0;
-let turn = -1;
+let settled = "";
 
 const byId = (id) => /** @type {any} */ (document.getElementById(id));
 
@@ -40,8 +40,9 @@ function open(name) {
 }
 
 function showState(now) {
-  if (turn !== now.opened.turn) fill(byId("said")); // what was said of something else
-  turn = now.opened.turn;
+  const settles = JSON.stringify([now.opened.turn, now.choices]);
+  if (settles !== settled) byId("said").querySelectorAll(".fault").forEach((one) => one.remove()); // it was put right
+  settled = settles;
   byId("opened").textContent = now.opened.name;
   byId("undo").disabled = !now.undo;
   byId("redo").disabled = !now.redo;

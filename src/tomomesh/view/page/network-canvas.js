@@ -1,6 +1,8 @@
 /** A network over its inputs, drawn on a canvas: on a slice, in the plane, or in space. */
 import { background, boxOf, edgesOf, limitsOf, regionsOf } from "./network-backdrop.js";
 
+/** Pixels within which numbers would cover each other. */
+const TOGETHER = 18;
 /** Colors that everybody tells apart: Okabe and Ito's. */
 const TOLD_APART = ["#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"];
 
@@ -155,10 +157,21 @@ function drawUpdate(pen, { frame, inputs }, place, colors, before) {
       circle(pen, one, 9);
       if (n === winner) circle(pen, one, 13);
     }
-    pen.fillStyle = colors.ink;
-    pen.fillText(String(n + 1), one[0] + 12, one[1] - 10);
   });
+  pen.fillStyle = colors.ink;
+  for (const [[x, y], numbers] of numbered(now)) pen.fillText(numbers, x + 12, y - 13);
   if (signal) cross(pen, signal, colors);
+}
+
+/** Where numbers of neurons are written: those that lie together have one word. */
+function numbered(places) {
+  const found = [];
+  places.forEach((place, n) => {
+    const beside = found.find(([other]) => Math.hypot(place[0] - other[0], place[1] - other[1]) < TOGETHER);
+    if (beside) beside[1] += `, ${n + 1}`;
+    else found.push([place, String(n + 1)]);
+  });
+  return found;
 }
 
 function nearest(places, [x, y]) {

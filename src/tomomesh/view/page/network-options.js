@@ -99,8 +99,9 @@ function two(id, name, entry, value) {
     now[n] = given;
     if (now.every((one) => one === null)) choose({ [name]: null });
     else if (now.every((one) => one !== null)) choose({ [name]: now });
+    fields.forEach((field, m) => Object.assign(field, { required: now[m] === null && now[1 - m] !== null, placeholder: now[1 - m] === null ? "auto" : "needed" }));
   };
-  const second = numberOf(`${id}-last`, entry, now[1], change(1));
-  second.setAttribute("aria-label", `${CALLED[name]}: last`);
-  return [numberOf(id, entry, now[0], change(0)), second];
+  const fields = [numberOf(id, entry, now[0], change(0)), numberOf(`${id}-last`, entry, now[1], change(1))];
+  fields[1].setAttribute("aria-label", `${CALLED[name]}: last`);
+  return fields;
 }

@@ -21,7 +21,8 @@ export function showSide(at, course, play, trained) {
   at.player.dataset.shown = now ? String(now.n) : "";
   at.step.textContent = now ? ofFrame(course, now) : "";
   at.title.textContent = course ? `${course.title}: ${course.topology} of ${course.neurons} neurons, ${course.inputs.toLocaleString("en")} input${course.inputs === 1 ? "" : "s"}` : at.source.value === "slice" ? `Slice ${at.slice.value} of the study` : "";
-  if (course) at.saving.hidden = course.state === "running";
+  at.curves.hidden = at.maps.hidden = trained && !course;
+  at.saving.hidden = !course || course.state === "running";
   curves(at, course, play, frames.slice(0, play.at + 1).filter(Boolean));
   maps(at, course, play, now);
 }
