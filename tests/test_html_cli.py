@@ -50,6 +50,19 @@ def mesh(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.parametrize("way", ["ring", "contours", "paper"])
+def test_a_page_shows_how_a_slice_was_learned(study: Path, tmp_path: Path, way: str) -> None:
+    pages = []
+    for name in ("a.html", "b.html"):
+        words = ["reconstruct", str(study), "--way", way, "-o", str(tmp_path / "m.stl"), "--html", str(tmp_path / name)]
+        assert main([*words, "--allow-far", "--quiet"]) == 0
+        pages.append(page_at(tmp_path / name))
+    assert any("while it is trained" in one for one in shown(pages[0]))
+    assert [one for one in pages[0].elements if one[0] == "img"] == [
+        one for one in pages[1].elements if one[0] == "img"
+    ]
+
+
 def test_the_demonstration_has_a_page_of_three_megabytes_at_most(tmp_path: Path) -> None:
     assert main(["demo", "-o", str(tmp_path / "d"), "--html", str(tmp_path / "page.html"), "--quiet"]) == 0
     assert not (tmp_path / "d" / "report.html").exists()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -14,14 +14,18 @@ from scipy.spatial import cKDTree
 
 from conftest import law, seeds
 from tomomesh.errors import EmptyError, UsageError
+from tomomesh.isosurface.crossings import Levels
 from tomomesh.measure.contour import measure_contour
 from tomomesh.model.contours import BIRTH, BRANCH, DEATH, HOLE, MERGE, OUTER, WALL_INNER, WALL_OUTER
 from tomomesh.segmentation.contours.curved import finely
 from tomomesh.segmentation.contours.inputs import slices_with_several
 from tomomesh.segmentation.contours.loops import trace
+from tomomesh.segmentation.contours.one import train_slice
+from tomomesh.segmentation.contours.shown import Shown
 from tomomesh.segmentation.contours.train import train_contours
 from tomomesh.segmentation.networks.training import regions
 from tomomesh.settings import NetworkSettings, Settings
+from tomomesh.som.passes import Look
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -267,3 +271,27 @@ class TestTracks:
             for one, other in pairwise(row):
                 turn = [np.angle(complex(*(c.codebook[0] - c.codebook.mean(axis=0)))) for c in (one, other)]
                 assert abs(np.angle(np.exp(1j * (turn[1] - turn[0])))) < 0.25
+
+
+@law(12)
+@given(
+    st.lists(blots(), min_size=2, max_size=3), st.sampled_from(["components", "walls", "loops"]),
+    st.sampled_from([{}, {"training": "online", "iterations": 400}, {"neurons": 60}, {"way": "paper"}]), seeds,
+)  # fmt: skip
+def test_a_slice_is_trained_again_to_the_last_bit(
+    planes: list[Mask], kind: str, options: dict[str, Any], seed: int
+) -> None:
+    mask, settings = np.stack(planes), NetworkSettings(contours=kind, **options)
+    levels = Levels(mask.astype(np.float64) + 0.1 * (ROWS[: mask.shape[1], : mask.shape[2]] % 4), 0.5, np.inf)
+    try:
+        study = train_contours(mask, settings, levels=levels, pixel_mm=(0.7, 1.3), seed=seed, threads=2)
+    except EmptyError:
+        return
+    shown = Shown.of(mask, levels, settings, (0.7, 1.3), seed, 1)
+    for k in study.slices.tolist():
+        seen: list[list[Floats]] = [[] for _ in study.on(k)]
+        looks = [Look(lambda codebook, *_, kept=one: kept.append(codebook), 3) for one in seen]
+        for again, one, course in zip(train_slice(study, shown, k, looks), study.on(k), seen, strict=True):
+            assert repr(again) == repr(one)
+            assert again.codebook.tobytes() == one.codebook.tobytes()
+            assert {len(step) for step in course} == {len(one)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from PIL import Image
@@ -124,19 +124,21 @@ def film_slice(
 def draw_key_frames(
     mask: NDArray[np.bool_],
     codebooks: Floats | Sequence[Floats],
-    network: Lattice,
+    edges: NDArray[np.integer[Any]],
     plane: Plane = PIXELS,
     *,
     notes: Sequence[str],
     title: str = "A network over its slice",
 ) -> Page:
-    """Draw some frames of `film_slice` beside each other, three in a row.
+    """Draw some frames as those of `film_slice` beside each other, three in a row.
 
     Parameters
     ----------
     mask : (J, I) bool array
     codebooks : (s, u, 2) float array
-    network : Lattice
+        Of one network, or of several.
+    edges : (e, 2) int array
+        Which neurons are linked.
     plane : Plane
     notes : sequence of str
         What is said over each.
@@ -150,13 +152,13 @@ def draw_key_frames(
     for n, (ax, neurons) in enumerate(zip(axes, places, strict=False)):
         plane.crop(ax, bounds)
         plane.draw(ax, on_paper(np.asarray(mask, bool), PALE))
-        _draw_neurons(ax, neurons, network)
+        _draw_neurons(ax, neurons, edges)
         ax.heading(title if n == 0 else "", notes[n])
     return page
 
 
-def _draw_neurons(ax: Panel, neurons: Floats, network: Lattice) -> None:
-    lines(ax, neurons[network.edges], color=NETWORK, width=1.1)
+def _draw_neurons(ax: Panel, neurons: Floats, edges: NDArray[np.integer[Any]]) -> None:
+    lines(ax, neurons[edges], color=NETWORK, width=1.1)
     dots(ax, neurons, size=3.7, color=NETWORK, rim=WHITE, width=0.4)
 
 
@@ -174,7 +176,7 @@ def _frames(
     background, words = page.pixels.copy(), [*page.words]
     for n in chosen:
         page.pixels[:], page.words = background, [*words]
-        _draw_neurons(ax, places[n], network)
+        _draw_neurons(ax, places[n], network.edges)
         ax.heading(title, notes[n] if notes is not None else f"{n} of {len(places) - 1}")
         yield page.image()
 

@@ -6,7 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...model.contours import Contours
+from ...model.lattice import lattice
 from ...model.networks import Networks
+from ...segmentation.contours.one import train_slice
+from ...segmentation.contours.shown import Shown
 from ...segmentation.signal import outline, pixels_of
 from ...show import draw_all
 from ...show.film import draw_key_frames, film
@@ -17,11 +21,12 @@ from ...show.plane import Plane
 from ...show.render import View
 from ...show.topologies import draw_adapted, draw_update_regions
 from ...som.fit import match
+from ...som.passes import Look
 from ...som.snapshots import snapshots
 from ...ways import way_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -90,11 +95,15 @@ def film_of_network(trained: TrainedNetwork, settings: Settings, pixel_area: flo
 
 
 def key_frames(found: Segmentation[Any]) -> Page | None:
-    """Train the network of the slice with the median window once more, looking on; None where slices have none."""
-    networks, settings, volume = found.source, found.settings, found.volume
-    if not isinstance(networks, Networks) or not len(networks.slices):
-        return None
-    k, spacing = median_slice(found.mask, networks.slices), np.array(volume.spacing_mm[:2])
+    """Train what the slice with the median window has once more, looking on; None where slices have no networks."""
+    if isinstance(found.source, Networks) and len(found.source.slices):
+        return _network_frames(found, found.source)
+    return _ring_frames(found, found.source) if isinstance(found.source, Contours) else None
+
+
+def _network_frames(found: Segmentation[Any], networks: Networks) -> Page:
+    settings = found.settings
+    k, spacing = median_slice(found.mask, networks.slices), np.array(found.volume.spacing_mm[:2])
     window = found.mask[k]
     inputs = (outline if networks.outlined else pixels_of)(window)[:, :2] * spacing
     seen = snapshots(
@@ -104,7 +113,32 @@ def key_frames(found: Segmentation[Any]) -> Page | None:
     notes = [*(f"{step:,} {seen.unit}" for step in seen.steps), "as it was handed on"]
     codebooks = [*(one / spacing for one in seen.codebooks), networks.codebook_on(k)]
     title = f"{networks.lattice.name} of {len(networks.lattice)} neurons, slice {k + 1}"
-    return draw_key_frames(window, codebooks, networks.lattice, _plane(found), notes=notes, title=title)
+    return draw_key_frames(window, codebooks, networks.lattice.edges, _plane(found), notes=notes, title=title)
+
+
+def _ring_frames(found: Segmentation[Any], contours: Contours) -> Page:
+    """Draw all rings of a slice at the same shares of their trainings, which may be of different lengths."""
+    run, pixel_mm = found.settings.run, found.volume.spacing_mm[:2]
+    network = found.settings.network.taking(found.way)
+    shown = Shown.of(found.runs, found.levels, network, pixel_mm, run.seed, run.threads)
+    k = median_slice(found.mask, contours.slices)
+    seen: list[list[NDArray[np.float64]]] = [[] for _ in contours.on(k)]
+    train_slice(contours, shown, k, [Look(_kept(one), KEY_FRAMES - 2) for one in seen])
+    shares = np.linspace(0, 1, KEY_FRAMES - 1)
+    codebooks = [np.concatenate([one[round(share * (len(one) - 1))] for one in seen]) / pixel_mm for share in shares]
+    notes = ["at the start", *(f"{share:.0%} of the training" for share in shares[1:]), "as they were handed on"]
+    starts = np.cumsum([0, *map(len, contours.on(k))])
+    edges = np.concatenate(
+        [lattice("ring", n).edges + start for n, start in zip(np.diff(starts), starts, strict=False)]
+    )
+    title = f"{len(seen)} rings, slice {k + 1}" if len(seen) > 1 else f"a ring, slice {k + 1}"
+    return draw_key_frames(
+        found.mask[k], [*codebooks, contours.codebook_on(k)], edges, _plane(found), notes=notes, title=title
+    )
+
+
+def _kept(seen: list[NDArray[np.float64]]) -> Callable[..., None]:
+    return lambda codebook, done, radius, alpha: seen.append(codebook)
 
 
 def _plane(found: Segmentation[Any]) -> Plane:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from ...isosurface.crossings import Levels
     from ...isosurface.run_mask import RunMask
     from ...settings import NetworkSettings
+    from ...som.passes import Look
 
     Floats = NDArray[np.float64]
 
@@ -89,7 +90,7 @@ def train_contours(
         dropped += sum(few for _, few in rows)
         rings = [ring for k, (inputs, _) in enumerate(rows, start) for ring in _asked(k, inputs, settings, tracker)]
         told = partial(_tell, progress, start, stop, mask.shape[0])
-        found += _along_tracks(rings, partial(_trained, settings, seed, pixel_mm), last, threads, told)
+        found += _along_tracks(rings, partial(trained_ring, settings, seed, pixel_mm), last, threads, told)
     if not found:
         raise EmptyError(
             "no contour is long enough for a network",
@@ -100,7 +101,7 @@ def train_contours(
     return Contours(settings.contours, tuple(found), tracker.end(), dropped)
 
 
-class _Ring(NamedTuple):
+class Ring(NamedTuple):
     """A ring to be trained: where, on what, with how many neurons, and on which track."""
 
     slice: int
@@ -110,23 +111,23 @@ class _Ring(NamedTuple):
     track: int
 
 
-def _asked(k: int, inputs: Sequence[Inputs], settings: NetworkSettings, tracker: Tracker) -> list[_Ring]:
+def _asked(k: int, inputs: Sequence[Inputs], settings: NetworkSettings, tracker: Tracker) -> list[Ring]:
     """Return the rings of the next slice."""
     counted = settings.contours == "loops" and settings.neurons is None
     shares = neurons_of(inputs) if counted else shared(inputs, settings.neuron_count)
     tracks = tracker.follow([one.inside for one in inputs], [one.side for one in inputs])
-    return [_Ring(k, n, *one) for n, one in enumerate(zip(inputs, shares, tracks, strict=True))]
+    return [Ring(k, n, *one) for n, one in enumerate(zip(inputs, shares, tracks, strict=True))]
 
 
 def _along_tracks(
-    rings: Sequence[_Ring], train: Callable[[_Ring, Floats | None], Contour], last: dict[int, Floats], threads: int,
+    rings: Sequence[Ring], train: Callable[[Ring, Floats | None], Contour], last: dict[int, Floats], threads: int,
     done: Callable[[int, int], None],
 ) -> list[Contour]:  # fmt: skip
     """Train the rings of some slices, each track from its first to its last; by slice, then ring.
 
     `last` tells where the last ring of each track begins, and is brought up to these slices.
     """
-    tracks: dict[int, list[_Ring]] = {}
+    tracks: dict[int, list[Ring]] = {}
     for ring in rings:
         tracks.setdefault(ring.track, []).append(ring)
     each = list(tracks.items())
@@ -168,20 +169,21 @@ def neurons_of(inputs: Sequence[Inputs]) -> list[int]:
     return [min(max(FEWEST, round(share * n)), one.most) for n, one in zip(each, inputs, strict=True)]
 
 
-def _trained(
-    settings: NetworkSettings, seed: int, pixel_mm: tuple[float, float], ring: _Ring, first: Floats | None
-) -> Contour:
-    """Train one ring; `first` is where the ring before it on its track begins."""
+def trained_ring(
+    settings: NetworkSettings, seed: int, pixel_mm: tuple[float, float], ring: Ring, first: Floats | None,
+    look: Look | None = None,
+) -> Contour:  # fmt: skip
+    """Train one ring; `first` is where the ring before it on its track begins, `look` who looks on."""
     own, neurons = ring.own, ring.neurons
     graph, shown = lattice("ring", neurons), own.shown * pixel_mm
     rng, pixel_area = np.random.default_rng((seed, ring.slice, ring.number)), pixel_mm[0] * pixel_mm[1]
     if own.line is None:
-        fitted = fit(shown, graph, settings, rng, pixel_area=pixel_area)
+        fitted = fit(shown, graph, settings, rng, pixel_area=pixel_area, look=look)
         _, last = radii(shown, graph, settings, pixel_area)
     else:
         start = drawn(own.line * pixel_mm, neurons, None if first is None else first * pixel_mm)
         refined = replace(settings, radius=settings.radius or REFINED, trim=0.0 if own.outlined else settings.trim)
-        fitted = fit(shown, graph, refined, rng, pixel_area=pixel_area, start=start)
+        fitted = fit(shown, graph, refined, rng, pixel_area=pixel_area, start=start, look=look)
         _, last = refined.radius or REFINED
     found = fitted.codebook
     gaps = bridged_edges(found, graph, settings.bridge)
