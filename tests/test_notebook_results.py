@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import sys
 from html.parser import HTMLParser
@@ -10,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import nbformat
 import numpy as np
 import pytest
+from PIL import Image
 
 from browsers import SOFTWARE, Watched, chromium
 from html_pages import require_self_contained
@@ -86,10 +89,25 @@ class TestInline:
             "tr",
             "th",
             "td",
+            "img",
             "iframe",
         }
         assert "the mesh is closed" in shown.text
         assert f"{found.report['quality']['faces']:,}" in shown.text
+
+    def test_a_still_picture_is_left_where_scripts_and_frames_are_not(self, found: Surface) -> None:
+        """It is drawn by what draws the pages of pictures, the same on every call, and within some kilobytes."""
+        stage_one = found.segmentation
+        assert stage_one is not None
+        for result, caption in ((found, "The mesh, shaded"), (stage_one, "The points")):
+            (image,) = (attrs for tag, attrs in Pieces(result._repr_html_()).elements if tag == "img")
+            kind, _, data = (image["src"] or "").partition(";base64,")
+            with Image.open(io.BytesIO(base64.b64decode(data))) as picture:
+                assert kind == f"data:image/{(picture.format or '').lower()}"
+                assert np.ptp(np.asarray(picture.convert("L"))) > 100
+            assert len(data) / MEGABYTES < 0.2
+            assert (image["alt"] or "").startswith(caption)
+            assert result._repr_html_() == result._repr_html_()
 
     def test_its_frame_can_reach_nothing(self, found: Surface) -> None:
         frame = Pieces(found._repr_html_()).frame
@@ -155,6 +173,17 @@ class TestInline:
                 "SecurityError"
             )
             watched.require_quiet(file)
+
+    def test_its_frame_covers_the_still_picture(self, found: Surface, tmp_path: Path) -> None:
+        file = tmp_path / "notebook.html"
+        file.write_text(f"<!DOCTYPE html><meta charset=utf-8><body>{found._repr_html_()}", encoding="utf-8")
+        with chromium() as launch:
+            page = Watched(launch(*SOFTWARE), file).page
+            still, frame = (page.locator(name).bounding_box() for name in ("img", "iframe"))
+            assert frame["x"] <= still["x"]
+            assert frame["y"] <= still["y"]
+            assert frame["x"] + frame["width"] >= still["x"] + still["width"] > still["x"] + 100
+            assert frame["y"] + frame["height"] >= still["y"] + still["height"] > still["y"] + 100
 
     def test_a_notebook_keeps_it(self, found: Surface) -> None:
         """As a kernel hands it over: the formatters of IPython take what the result says of itself."""

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .model.volume import Volume
     from .printing.part import Part
     from .segmentation.sample import Sampling
+    from .show.render import View
 
     Regions = NDArray[np.unsignedinteger[Any]]
     Layer = tuple[Any, dict[str, Any], str]
@@ -88,11 +89,15 @@ class Segmentation(Reported, Generic[S]):
 
     def _shown(self) -> Shown:
         from .html.inline import MOST, Shown
+        from .html.pictures import smaller
         from .html.scene import scene_of_points
+        from .show.drawing.page import png
+        from .show.space import draw_points
 
         facts = [("way", self.way), ("study", repr(self.volume)), ("plane", self.plane)]
         words = f"{self.runs.count:,} voxels are kept, and {len(self.points.positions):,} points lie on them."
-        return Shown("Segmentation", words, facts, scene_of_points(self.points.positions, most=MOST))
+        still, _ = smaller("07-points", png(draw_points(self.points)))
+        return Shown("Segmentation", words, facts, scene_of_points(self.points.positions, most=MOST), still=still)
 
     def without_voxels(self) -> Segmentation[S]:
         """Return the same without the study's voxels, where its way does not go on by them."""
@@ -238,14 +243,25 @@ class Surface(Reported):
 
     def _shown(self) -> Shown:
         from .html.inline import MOST
+        from .html.pictures import SHADED, smaller
         from .html.scene import PATIENT, PLAIN, scene_of_mesh
+        from .show.drawing.page import png
+        from .show.space import draw_shaded
 
         mesh, unit, axes, told = self.mesh, "mm", PATIENT, super()._shown()
         if self.part is not None:
             mesh, told = self.part.mesh, replace(told, frame="millimeters of the part to print")
         elif self.place is not None:
             unit, axes, told = self.place.unit, PLAIN, replace(told, frame=self.place.words)
-        return replace(told, scene=scene_of_mesh(mesh, most=MOST, unit=unit, axes=axes))
+        still, _ = smaller(SHADED, png(draw_shaded(mesh, self.view)))
+        return replace(told, scene=scene_of_mesh(mesh, most=MOST, unit=unit, axes=axes), still=still)
+
+    @property
+    def view(self) -> View:
+        """How pictures look at it: the axes are the patient's where there is one, plain ones for a cloud."""
+        from .show.render import View
+
+        return View() if self.place is None else View(unit=self.place.unit, axes=("x", "y", "z"))
 
     def bare(self) -> Surface:
         """Return the same without what is only shown of how it came about."""

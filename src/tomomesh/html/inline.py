@@ -1,7 +1,8 @@
 """What a notebook shows of a result: its summary in words, and the 3-D view in a frame that cannot reach the page.
 
 The frame is sandboxed and carries its own page (HTML, 4.8.5), so that nothing is asked for and nothing of the notebook
-is touched; where scripts or frames are taken out, as of a notebook that is not trusted, the words and the table stay.
+is touched; it lies over a still picture, which is seen where scripts or frames are taken out, as of a notebook that is
+not trusted.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from .three import three_js
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from .pictures import Picture
     from .scene import Scene
 
 MOST = 40_000
@@ -39,6 +41,8 @@ class Shown:
         None where there is nothing to draw.
     frame : str
         What the numbers of places are, in words.
+    still : Picture or None
+        What it looks like.
     """
 
     title: str
@@ -46,6 +50,7 @@ class Shown:
     facts: Sequence[tuple[str, str]]
     scene: Scene | None = None
     frame: str = "millimeters of the patient (LPS: to the left, to the back, up)"
+    still: Picture | None = None
 
 
 def inline(told: Shown) -> str:
@@ -90,5 +95,5 @@ def _framed(told: Shown) -> str:
         "framed.html.jinja",
         styles=[asset("viewer.css"), asset("style.css")],
         scripts=[three_js(), asset("viewer.js"), asset("report.js")],
-        told=told, shaded=None, version=__version__,
+        told=told, shaded=told.still, version=__version__,
     )  # fmt: skip

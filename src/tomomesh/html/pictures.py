@@ -88,7 +88,7 @@ def pictures_of(drawn: Mapping[str, bytes]) -> tuple[list[Picture], list[str]]:
         if spent >= BUDGET:
             left.append(name)
             continue
-        made, size = _small(name, drawn[name])
+        made, size = smaller(name, drawn[name])
         if spent + size > BUDGET and taken:
             left.append(name)
             continue
@@ -102,7 +102,7 @@ def _rank(name: str) -> tuple[int, str]:
     return ORDER.index(number) if number in ORDER else len(ORDER), name
 
 
-def _small(name: str, png: bytes) -> tuple[Picture, int]:
+def smaller(name: str, png: bytes) -> tuple[Picture, int]:
     """Return a picture in fewer bytes, and their number."""
     image = Image.open(io.BytesIO(png)).convert("RGB")
     if image.width > WIDEST:

@@ -18,7 +18,6 @@ from ...show.fit import draw_learning
 from ...show.gallery import median_slice
 from ...show.maps import SHEETS, draw_maps
 from ...show.plane import Plane
-from ...show.render import View
 from ...show.topologies import draw_adapted, draw_update_regions
 from ...som.fit import match
 from ...som.passes import Look
@@ -50,7 +49,7 @@ def pictures(
             "smoothed": surface.smoothed,
             "mesh": surface.mesh,
             "trace": surface.trace,
-            "view": _view(surface),
+            "view": surface.view,
         }
     if surface is not None and len(surface.cuberille.quads):
         stages |= {"cuberille": surface.cuberille, "triangulated": surface.cuberille.triangulated()}
@@ -155,8 +154,3 @@ def _shown(stage_one: Segmentation[Any], settings: Settings) -> NDArray[Any]:
     if select is None or not np.isin(voxels[stage_one.mask], select).mean() > 0.5:
         return voxels
     return np.where(stage_one.mask, 2, voxels > 0).astype(np.uint8)
-
-
-def _view(surface: Surface) -> View:
-    """Name the axes of the patient where there is one, and plainly where there is a cloud."""
-    return View() if surface.place is None else View(unit=surface.place.unit, axes=("x", "y", "z"))
