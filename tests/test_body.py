@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.ndimage import distance_transform_edt
 
+from conftest import law
 from studies import shared
 from tomomesh import read_volume, segment
 from tomomesh.errors import UsageError
 from tomomesh.model.volume import Volume
+from tomomesh.segmentation import body
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 AIR, SKIN, BONE, TABLE, LUNG = -1000, 40, 900, 500, -850
 
@@ -147,3 +158,22 @@ def test_a_real_table_is_left_out_and_the_arms_stay() -> None:
     columns = np.flatnonzero(found.mask.any(axis=(0, 1)))
     assert columns.max() > 500  # an arm that lies apart
     assert np.flatnonzero(found.mask.any(axis=(0, 2))).max() < 425  # the table lies behind
+
+
+@law(150)
+@given(
+    arrays(np.bool_, st.tuples(*[st.integers(1, 9)] * 3), elements=st.booleans()), st.integers(0, 2), st.integers(0, 2),
+    st.tuples(*[st.sampled_from([0.7, 1.0, 2.5, 6.0])] * 3), st.integers(0, 3),
+)  # fmt: skip
+def test_opening_looks_at_nothing_that_matters_not(
+    core: NDArray[np.bool_], before: int, after: int, spacing: tuple[float, float, float], thicker: int
+) -> None:
+    """Beside its twin that looks at all: a mask in the middle, along a border, or on all of it."""
+    mask = np.pad(np.repeat(core, 1 + thicker, axis=2), [(before, after), (after, 0), (0, before)])
+    found = body._opened(mask, np.array(spacing))
+    if mask.all():
+        assert found.all()
+        return
+    depth = distance_transform_edt(mask, spacing)
+    radius = body._radius(depth)
+    assert np.array_equal(found, mask & (distance_transform_edt(depth <= radius, spacing) <= radius))

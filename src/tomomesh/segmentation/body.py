@@ -11,6 +11,7 @@ import scipy
 
 from ..isosurface.run_mask import RunMask
 from ..isosurface.runs import Runs
+from ..model.boxes import box_of
 from .window import PRESETS_HU
 
 if TYPE_CHECKING:
@@ -277,12 +278,18 @@ def _coarse(volume: Volume, cell: float = CELL) -> tuple[list[int], NDArray[np.f
 
 
 def _opened(mask: NDArray[np.bool_], spacing: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Take away what no ball fits into; what lies beyond the border counts as more of the same."""
-    if mask.all():
+    """Take away what no ball fits into; what lies beyond the border counts as more of the same.
+
+    Nothing farther than a voxel from the mask is looked at: what lies there is never the nearest.
+    """
+    if mask.all() or not mask.any():
         return mask
-    depth = scipy.ndimage.distance_transform_edt(mask, spacing)
+    box = tuple(slice(max(side.start - 1, 0), side.stop + 1) for side in box_of(mask))
+    depth = scipy.ndimage.distance_transform_edt(mask[box], spacing)
     radius = _radius(depth)
-    return np.asarray(scipy.ndimage.distance_transform_edt(depth <= radius, spacing) <= radius)
+    opened = np.zeros_like(mask)
+    opened[box] = scipy.ndimage.distance_transform_edt(depth <= radius, spacing) <= radius
+    return opened
 
 
 def _radius(depth: NDArray[np.float64]) -> float:
