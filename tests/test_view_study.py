@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 from conftest import law
 from segmentations import written
 from studies import TURNED, affine_of, sampled, setting, write_nifti, write_series
-from tomomesh import Volume, phantom, segment
+from tomomesh import Volume, phantom, read_volume, segment
 from tomomesh.errors import EmptyError, UsageError
 from tomomesh.model.volume import AXES
-from tomomesh.segmentation.study import lay_out, select_in
+from tomomesh.segmentation.study import lay_out, select_in, select_study
 from tomomesh.segmentation.survey import survey
 from tomomesh.settings import Settings
 from tomomesh.view import slices, studies, windows
@@ -161,6 +161,14 @@ class TestBeside:
         session.choose({"select": [1, 3]})
         assert session.opened is before
         assert [one["voxels"] for one in windows.kept(session)[1].listed()] == [600]
+
+    def test_read_whole_it_keeps_and_tells_what_the_command_does(self, tmp_path: Path) -> None:
+        session = segmented(tmp_path, {1: self.box(5, 10), 3: self.box(10, 15)}, select=[3])
+        assert session.opened.volume is not None
+        labels = read_volume(session.opened.beside, select=(3,))
+        alone, (_, found) = select_study(session.opened.volume, labels, session.settings), windows.kept(session)
+        assert found.told == {**alone.stats, "warnings": list(alone.warnings)}
+        assert np.array_equal(found.selected.mask, alone.value.mask)
 
     def test_of_labels_that_overlap_those_are_read_that_are_chosen(self, tmp_path: Path) -> None:
         session = segmented(tmp_path, {1: self.box(5, 10), 3: self.box(8, 15)})
