@@ -159,6 +159,7 @@ def test_a_still_figure_is_not_taken_over_by_a_training_that_plays() -> None:
 def test_what_was_refused_is_forgotten_once_it_is_put_right() -> None:
     with served() as page, looking_at(page, refused=True) as seen:
         seen.wait_for_selector("#net-train:enabled")
+        seen.wait_for_load_state("networkidle")
         neurons = seen.locator("#option-neurons")
         neurons.fill("1")
         neurons.press("Tab")
@@ -168,9 +169,24 @@ def test_what_was_refused_is_forgotten_once_it_is_put_right() -> None:
         expect(seen.locator(".toast.fault")).to_have_count(0)
 
 
+def test_what_is_being_typed_stays() -> None:
+    """Whatever the program tells meanwhile, as that a training has ended."""
+    with served() as page, looking_at(page) as seen:
+        seen.wait_for_selector("#net-train:enabled")
+        seen.wait_for_load_state("networkidle")
+        seen.locator("#option-neurons").press_sequentially("4")
+        seen.evaluate("() => fetch('/api/choose', { method: 'POST', body: '{}' }).then((answer) => answer.json())")
+        seen.evaluate(NEXT_FRAMES)
+        seen.locator("#option-neurons").press_sequentially("2")
+        seen.locator("#option-neurons").press("Tab")
+        expect(seen.locator(".net-option.chosen")).to_contain_text("Neurons")
+        assert seen.locator("#option-neurons").input_value() == "42"
+
+
 def test_half_of_a_pair_wants_the_other() -> None:
     with served() as page, looking_at(page) as seen:
         seen.wait_for_selector("#net-train:enabled")
+        seen.wait_for_load_state("networkidle")
         last = seen.locator("#option-radius-last")
         seen.locator("#option-radius").fill("4")
         seen.locator("#option-radius").press("Tab")

@@ -13,9 +13,14 @@ const CALLED = {
 const NOT_HERE = { network: ["none"] };
 const open = new Set();
 
+/** What the form shows: while nothing of it changes, it is left alone, with what is being typed. */
+let filled = "";
+
 /** Choose; what is refused is shown as it was. @param {Record<string, any>} changes */
 async function choose(changes) {
-  if (!(await chosen(changes))) tell("state", state);
+  if (await chosen(changes)) return;
+  filled = "";
+  tell("state", state);
 }
 
 /** Gather the schemas of all parameters by their bare names. @param {any} schema */
@@ -37,6 +42,9 @@ export function valueOf(name, entry) {
  * @param {string[]} names
  */
 export function fillOptions(form, parameters, names) {
+  const now = JSON.stringify(names.map((name) => [name, valueOf(name, parameters[name]), state.choices[name]]));
+  if (now === filled) return;
+  filled = now;
   const focused = document.activeElement && document.activeElement.id;
   fill(form, ...names.map((name) => row(name, parameters[name])));
   if (focused && form.contains(document.getElementById(focused))) document.getElementById(focused).focus();
